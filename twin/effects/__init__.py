@@ -1,0 +1,36 @@
+"""What a description may lack: one physical law per file, found by itself.
+
+An effect's identifier is its file's name. A new file with a subclass of `Effect` is in the catalogue, in the fit, in the reports
+and under test without any list to edit.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+
+from twin.effects.effect import Creep, Effect, Loads, Route, Signals, Start
+from twin.errors import UnknownNameError
+
+__all__ = ["Creep", "Effect", "Loads", "Route", "Signals", "Start", "catalogue", "named"]
+
+
+@cache
+def catalogue() -> dict[str, type[Effect]]:
+    """All laws by identifier."""
+    laws = {}
+    for module in pkgutil.iter_modules(__path__):
+        if module.name == "effect":
+            continue
+        members = vars(importlib.import_module(f"{__name__}.{module.name}")).values()
+        laws[module.name] = next(m for m in members if isinstance(m, type) and issubclass(m, Effect) and m is not Effect)
+    return laws
+
+
+def named(identifier: str) -> type[Effect]:
+    """The law with this identifier. Raises UnknownNameError, listing those that exist."""
+    try:
+        return catalogue()[identifier]
+    except KeyError:
+        raise UnknownNameError("effect", identifier, list(catalogue())) from None

@@ -1,0 +1,178 @@
+"""What an effect is: an immutable law with parameters, each with unit, bounds, source and an OFF value.
+
+A law acts in the places below, in the order of the signal, and in no other. State goes in and comes out; a law keeps none.
+
+    command   reported input -> true input      (a load cell that misreads: the inverse of its `sense`)
+    drive     command -> tension at the base    (lag, saturation; with memory)
+    edit      the body                          (stiffness, rest shape, routing)
+    surround  the loads on it                   (gravity, payload, a wall)
+    route     tension along the tendon          (friction)
+    deform    slow change of the rest shape     (creep)
+    sense     true output -> reported output    (frame, delay, drift)
+
+An effect that acts in `sense` only needs no new simulation: it is applied to what is already predicted.
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from twin.errors import TwinError
+from twin.quantities import Parameter, Values, overrides
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Surroundings of one trial: gravity (3,) m/s^2; payload (kg) and force (3,) N at the tip; a wall (5,): normal, offset (m),
+    stiffness (N/m)."""
+
+    gravity: np.ndarray
+    payload: float = 0.0
+    force: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    wall: np.ndarray = field(default_factory=lambda: np.zeros(5))
+
+
+@dataclass(frozen=True)
+class Route:
+    """Friction along the tendon: coefficient and pre-sliding travel (m)."""
+
+    mu: float = 0.0
+    presliding: float = 4e-4
+
+
+@dataclass(frozen=True)
+class Creep:
+    """Delayed strain, one element a retardation time: amplitude (delayed / instant strain) and time (s)."""
+
+    amplitude: tuple[float, ...] = ()
+    time: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The quantities of one trial that sensors see, true or reported; batch (sample) first.
+
+    time (n,) s in the trial; clock (n,) s since the first trial; tension (n, n_tendon) N; displacement (n, n_tendon) m;
+    markers (n, n_marker, 3) m; temperature (n,) K.
+    """
+
+    time: np.ndarray
+    clock: np.ndarray
+    tension: np.ndarray
+    displacement: np.ndarray
+    markers: np.ndarray
+    temperature: np.ndarray
+
+    def with_(self, **changes: np.ndarray) -> Signals:
+        return replace(self, **changes)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a fit of an effect may begin, and which of its parameters it then frees."""
+
+    values: Mapping[str, float]
+    free: tuple[str, ...]
+
+
+class Effect(ABC):
+    """Base of all laws. A subclass states its data and overrides the places it acts in; the base's places change nothing.
+
+    `per_tendon` parameters exist once per tendon, as name_1, name_2, ... `shape` names parameters that mean nothing while
+    the effect is OFF (a time constant of no creep). `richer` names parameters of a second, fuller law that stay OFF until the plain one has
+    been accepted. `moves_with` says in words what gives the effect away in a plot.
+    """
+
+    id: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    per_tendon: ClassVar[tuple[Parameter, ...]] = ()
+    shape: ClassVar[tuple[str, ...]] = ()
+    richer: ClassVar[tuple[str, ...]] = ()
+    guesses: ClassVar[tuple[Values, ...]] = ()
+    moves_with: ClassVar[str]
+
+    def __init__(self, values: Values | None = None, n_tendon: int = 3, **named: float) -> None:
+        """Raises TwinError for an unknown parameter or a value outside its bounds."""
+        try:
+            self.values: dict[str, float] = overrides(self.declared(n_tendon), {**(values or {}), **named})
+        except TwinError as error:
+            raise TwinError(f"effect {self.id}: {error}") from None
+        self.n_tendon = n_tendon
+
+    @classmethod
+    def declared(cls, n_tendon: int) -> tuple[Parameter, ...]:
+        """All parameters, those per tendon expanded."""
+        many = (replace(p, name=f"{p.name}_{i}") for i in range(1, n_tendon + 1) for p in cls.per_tendon)
+        return (*cls.parameters, *many)
+
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Where to begin a fit: each guess; for per-tendon laws each tendon alone and all together.
+
+        `predicted` is what the twin without the effect predicts, for laws that must look where the robot goes.
+        """
+        names = tuple(p.name for p in cls.parameters if p.name not in cls.richer)
+        for guess in cls.guesses:
+            yield Start(guess, names)
+        if cls.per_tendon:
+            single = [
+                Start(
+                    {f"{p.name}_{i}": p.value + p.step for p in cls.per_tendon},
+                    tuple(f"{p.name}_{i}" for p in cls.per_tendon),
+                )
+                for i in range(1, n_tendon + 1)
+            ]
+            yield from single
+            yield Start({k: v for s in single for k, v in s.values.items()}, tuple(n for s in single for n in s.free))
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[name]
+
+    def each(self, name: str) -> np.ndarray:
+        """A per-tendon parameter as an array (n_tendon,)."""
+        return np.array([self.values[f"{name}_{i}"] for i in range(1, self.n_tendon + 1)])
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((self.id, tuple(sorted(self.values.items()))))
+
+    def __repr__(self) -> str:
+        return f"{self.id}({', '.join(f'{k}={v:.4g}' for k, v in self.values.items())})"
+
+    def acts_in(self, *places: str) -> bool:
+        """Whether the law overrides any of the named places."""
+        return any(getattr(type(self), p) is not getattr(Effect, p) for p in places)
+
+    # ---- the places, in the order of the signal -----------------------------------------------------------------------
+
+    def command(self, reported: Signals) -> Signals:
+        return reported
+
+    def start(self, tension: np.ndarray) -> Any:
+        """State of `drive` at rest under the first command (n_tendon,)."""
+        return None
+
+    def drive(self, tension: np.ndarray, state: Any, dt: float) -> tuple[np.ndarray, Any]:
+        return tension, state
+
+    def edit(self, body: Any) -> None:
+        """Change the body (a `twin.robots.Body`) before it is compiled."""
+
+    def surround(self, loads: Loads) -> Loads:
+        return loads
+
+    def route(self) -> Route:
+        return Route()
+
+    def deform(self) -> Creep:
+        return Creep()
+
+    def sense(self, true: Signals) -> Signals:
+        return true

@@ -1,0 +1,29 @@
+"""Stiffness gradient: the body is stiffer or softer towards the tip than described."""
+
+from __future__ import annotations
+
+from twin.effects.effect import Effect
+from twin.quantities import Parameter
+
+
+class StiffnessGradient(Effect):
+    """Bending and twisting stiffness times 1 + gradient (s/L - 1/2), s the distance from the base.
+
+    Source: first-order Taylor expansion of EI(s) about the middle. A ground or tempered wire; a casting that cured from one end.
+
+    >>> StiffnessGradient(gradient=0.2)
+    stiffness_gradient(gradient=0.2)
+    """
+
+    id = "stiffness_gradient"
+    parameters = (Parameter("gradient", 0.0, "1", -1.6, 1.6, "relative change of EI from base to tip", scale=0.05),)
+    guesses = ({"gradient": 0.1},)
+    moves_with = "the place along the body"
+
+    def edit(self, body) -> None:
+        for at in body.joints:
+            factor = 1.0 + self["gradient"] * (at.arclength - 0.5)
+            for name in (at.bend_x, at.bend_y, at.twist):
+                joint = body.spec.joint(name)
+                joint.stiffness = joint.stiffness * factor
+                joint.damping = joint.damping * factor

@@ -1,0 +1,36 @@
+"""Tendon routing: a tendon's holes sit at another angle or radius than described."""
+
+from __future__ import annotations
+
+import math
+
+from twin.effects.effect import Effect
+from twin.quantities import Parameter
+
+
+class TendonRouting(Effect):
+    """All holes of tendon i turned by angle_i about the backbone and moved out by radius_i.
+
+    Source: geometry. A disk glued on with a twist, a hole drilled at the wrong mark.
+
+    >>> TendonRouting(angle_2=0.05)["angle_2"]
+    0.05
+    """
+
+    id = "tendon_routing"
+    per_tendon = (
+        Parameter("angle", 0.0, "rad", -0.8, 0.8, "the holes' azimuth against the description", std=0.15, scale=0.03),
+        Parameter("radius", 0.0, "m", -4e-3, 4e-3, "the holes' distance against the description", std=5e-4, scale=2e-4),
+    )
+    moves_with = "the pull of one tendon"
+
+    def edit(self, body) -> None:
+        for i, holes in enumerate(body.tendons, 1):
+            angle, further = self[f"angle_{i}"], self[f"radius_{i}"]
+            if angle == further == 0.0:
+                continue
+            for name in holes:
+                site = body.spec.site(name)
+                x, y, z = site.pos
+                radius, azimuth = math.hypot(x, y) + further, math.atan2(y, x) + angle
+                site.pos = [radius * math.cos(azimuth), radius * math.sin(azimuth), z]

@@ -1,0 +1,116 @@
+"""The static solve that quasi-static prediction and kinematics stand on: one MuJoCo hinge chain, its tendons, friction and loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from twin.effects import Creep, Loads, Route
+from twin.equilibrium.chain import Chain, Law, Load
+from twin.equilibrium.trial import run
+from twin.robots import Body
+
+TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
+
+NOT_FOUND, DIRECT, FOLLOWED = 0, 1, 2  # status of a solve
+
+__all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Path"]
+
+
+@dataclass(frozen=True)
+class Path:
+    """The equilibria of one trial: markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad, status (n,), `started`."""
+
+    markers: np.ndarray
+    path: np.ndarray
+    q: np.ndarray
+    status: np.ndarray
+    started: int
+    LU: np.ndarray = field(repr=False)  # (n, nv, nv), or empty
+
+    @property
+    def unstable_start(self) -> bool:
+        """Whether the loaded, untensioned robot has no stable shape near straight (a load past buckling)."""
+        return self.started != DIRECT
+
+
+class Equilibrium:
+    """A compiled robot ready to be solved. Holds a MuJoCo model and data, so one instance serves one thread at a time."""
+
+    def __init__(self, body: Body) -> None:
+        self.model = model = body.spec.compile()
+        self.data = data = mujoco.MjData(model)
+        site = np.vectorize(lambda name: model.site(name).id, otypes=[np.int64])
+        hole = site(np.array(body.tendons))
+        hinges = np.zeros(model.nbody, np.int64)  # from the base up to and with each body
+        for b in range(1, model.nbody):
+            hinges[b] = hinges[model.body_parentid[b]] + model.body_dofnum[b]
+        moved_by = model.dof_bodyid.astype(np.int64)
+        self.chain = Chain(
+            anchor=data.xanchor,
+            axis=data.xaxis,
+            centre=data.subtree_com,
+            site=data.site_xpos,
+            qpos=data.qpos,
+            stiffness=model.jnt_stiffness.reshape(model.nv, -1)[:, 0].copy(),
+            body=moved_by,
+            mass=model.body_subtreemass[moved_by].copy(),
+            hole=hole,
+            disk=site(np.array(body.disks)),
+            marker=site(np.array(list(body.markers.values()))),
+            first=hinges[model.site_bodyid[hole[0]]],
+        )
+        self.spring = model.qpos_spring.copy()
+        mujoco.mj_kinematics(model, data)
+        ends = data.site_xpos[hole]
+        self.straight_path: np.ndarray = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)  # (n_tendon,) m
+
+    def solve(
+        self, time: np.ndarray, tension: np.ndarray, loads: Loads, route: Route | None = None, creep: Creep | None = None,
+        delayed: np.ndarray | None = None, near: Path | None = None, keep: bool = False, tolerance: float = TOLERANCE,
+    ) -> Path:  # fmt: skip
+        """Equilibria for base tensions (n, n_tendon) N at times (n,) s, in the order of `twin.equilibrium.trial`.
+
+        `delayed` (n_element, nv) holds the creep strains and is advanced in place. `near`, a solution with LU of a neighbouring
+        problem on the same samples, speeds the solve up. Where no equilibrium was found the sample's status is NOT_FOUND and
+        its shape is the one before.
+        """
+        n, nt = tension.shape
+        nv = self.model.nv
+        route, creep = route or Route(), creep or Creep()
+        amplitude, retardation = np.array(creep.amplitude, float), np.array(creep.time, float)
+        if delayed is None:
+            delayed = np.zeros((amplitude.size, nv))
+        out = Path(
+            markers=np.empty((n, self.chain.marker.size, 3)),
+            path=np.empty((n, nt)),
+            q=np.empty((n, nv)),
+            status=np.empty(n, np.int64),
+            started=0,
+            LU=np.empty((n, nv, nv) if keep else (0, nv, nv)),
+        )
+        started = run(
+            self.model._address,
+            self.data._address,
+            self.chain,
+            self.spring,
+            Law(float(route.mu), float(route.presliding), np.asarray(loads.wall, float)),
+            Load(np.asarray(loads.gravity, float), float(loads.payload), np.asarray(loads.force, float)),
+            amplitude,
+            retardation,
+            delayed,
+            np.ascontiguousarray(time, float),
+            np.ascontiguousarray(np.maximum(tension, 0.0), float),
+            near.q if near is not None else np.empty((0, nv)),
+            near.LU if near is not None else np.empty((0, nv, nv)),
+            float(tolerance),
+            keep,
+            out.LU,
+            out.q,
+            out.markers,
+            out.path,
+            out.status,
+        )
+        return Path(out.markers, out.path, out.q, out.status, int(started), out.LU)

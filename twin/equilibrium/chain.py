@@ -1,0 +1,187 @@
+"""The balance of forces of a hinge chain pulled by tendons, and its exact tangent.
+
+Energy of the chain without friction, with hinge angles q, rest angles q0, stiffness K, tendon segments l_d under tension T_d,
+masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
+
+    E(q) = 1/2 (q-q0)' K (q-q0) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
+
+`balance` returns r = dE/dq with T_d the tensions that friction leaves, and J = dr/dq. A segment's length depends only on
+the hinges of its own disk interval, so its geometric stiffness is a small block; gravity's Hessian follows from one vector a
+hinge, n_i = a_i x M_i (C_i - p_i) (M_i, C_i mass and centre of everything distal of hinge i at p_i with axis a_i), since turning
+hinge j <= i turns n_i with it; friction adds an unsymmetric rank-one block a segment.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.compiled import cross, dot, jit
+from twin.effects.tendon_friction import slip_state, turn
+
+
+class Chain(NamedTuple):
+    """The compiled model as the solver sees it; the first five are views of MuJoCo's arrays and move with it."""
+
+    anchor: np.ndarray  # (nv, 3) hinge positions, m
+    axis: np.ndarray  # (nv, 3) hinge axes
+    centre: np.ndarray  # (nbody, 3) centre of mass of each subtree, m
+    site: np.ndarray  # (nsite, 3) m
+    qpos: np.ndarray  # (nv,) rad
+    stiffness: np.ndarray  # (nv,) N m/rad
+    body: np.ndarray  # (nv,) the body each hinge moves
+    mass: np.ndarray  # (nv,) of everything distal of the hinge, kg
+    hole: np.ndarray  # (n_tendon, n_disk + 1) sites
+    disk: np.ndarray  # (n_disk,) sites
+    marker: np.ndarray  # (n_marker,) sites
+    first: np.ndarray  # (n_disk + 1,) first hinge of each disk interval
+
+
+class Law(NamedTuple):
+    """What acts on the chain besides springs, tendons and weight."""
+
+    mu: float  # tendon friction coefficient; 0: none
+    presliding: float  # m of travel from sticking to sliding
+    wall: np.ndarray  # (5,) normal towards the free side, offset (m), stiffness (N/m; 0: no wall)
+
+
+class Load(NamedTuple):
+    gravity: np.ndarray  # (3,) m/s^2
+    payload: float  # kg at the tip
+    force: np.ndarray  # (3,) N at the tip
+
+
+@jit
+def _lever(axis, point, anchor):
+    """Velocity of `point` for unit speed of a hinge at `anchor`."""
+    return cross(axis, (point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2]))
+
+
+@jit
+def _weight_and_springs(q, rest, chain, load, r, J, tangent):
+    nv = q.shape[0]
+    g, tip = load.gravity, chain.site[chain.disk[-1]]
+    n = np.empty((nv, 3))
+    f = np.empty((nv, 3))
+    for i in range(nv):
+        p, c, m = chain.anchor[i], chain.centre[chain.body[i]], chain.mass[i]
+        b = (tip[0] - p[0], tip[1] - p[1], tip[2] - p[2])
+        n[i] = cross(
+            chain.axis[i],
+            (
+                m * (c[0] - p[0]) + load.payload * b[0],
+                m * (c[1] - p[1]) + load.payload * b[1],
+                m * (c[2] - p[2]) + load.payload * b[2],
+            ),
+        )
+        f[i] = cross(chain.axis[i], b)
+        r[i] = chain.stiffness[i] * (q[i] - rest[i]) - dot(g, n[i]) - dot(load.force, f[i])
+    if tangent:
+        for j in range(nv):
+            b = cross(chain.axis[j], g)
+            c = cross(chain.axis[j], load.force)
+            for i in range(j, nv):
+                J[i, j] = b[0] * n[i, 0] + b[1] * n[i, 1] + b[2] * n[i, 2] + c[0] * f[i, 0] + c[1] * f[i, 1] + c[2] * f[i, 2]
+                J[j, i] = J[i, j]
+            J[j, j] += chain.stiffness[j]
+
+
+@jit
+def _wall(chain, wall, r, J, tangent):
+    """Penalty force k max(0, -gap) along the wall's normal at each disk centre."""
+    normal, stiffness = wall[:3], wall[4]
+    for k in range(chain.disk.shape[0]):
+        x = chain.site[chain.disk[k]]
+        gap = dot(normal, x) - wall[3]
+        if gap >= 0.0:
+            continue
+        f = -stiffness * gap
+        n = chain.first[k + 1]
+        X = np.empty((n, 3))
+        for i in range(n):
+            X[i] = _lever(chain.axis[i], x, chain.anchor[i])
+            r[i] -= f * dot(normal, X[i])
+        if tangent:
+            for j in range(n):
+                b = cross(chain.axis[j], normal)  # normal . (a_j x X_i) = -(a_j x normal) . X_i
+                for i in range(j, n):
+                    h = f * dot(b, X[i]) + stiffness * dot(normal, X[i]) * dot(normal, X[j])
+                    J[i, j] += h
+                    if i > j:
+                        J[j, i] += h
+
+
+@jit
+def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J, tangent):
+    """Residual r (nv,) in N m and, where `tangent`, its derivative J (nv, nv), at angles q already in MuJoCo's data.
+
+    (z0, s0) (n_tendon, n_disk) is the slip state and distal cable length of each hole when last at rest; (z, s) is what they are
+    at q; s[:, 0] is the whole path.
+    """
+    nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
+    nv = q.shape[0]
+    _weight_and_springs(q, rest, chain, load, r, J, tangent)
+    if law.wall[4] > 0.0:
+        _wall(chain, law.wall, r, J, tangent)
+    u = np.empty((nd, 3))
+    length = np.empty(nd)
+    theta = np.empty(nd)
+    T = np.empty(nd)
+    X = np.empty((nv, 3))
+    dl = np.zeros(nv)
+    dlog = np.empty(nv)
+    for t in range(nt):
+        for d in range(nd):
+            a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
+            v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+            length[d] = np.sqrt(dot(v, v))
+            u[d] = (v[0] / length[d], v[1] / length[d], v[2] / length[d])
+            for i in range(chain.first[d], chain.first[d + 1]):
+                X[i] = _lever(chain.axis[i], b, chain.anchor[i])
+                dl[i] = dot(u[d], X[i])
+        distal = 0.0
+        for d in range(nd - 1, -1, -1):
+            distal += length[d]
+            s[t, d] = distal
+        wrapped = 0.0
+        T[0] = tension[t]
+        for d in range(1, nd):
+            v = cross(u[d - 1], u[d])
+            theta[d] = np.arctan2(np.sqrt(dot(v, v)), dot(u[d - 1], u[d]))
+            z[t, d] = slip_state(z0[t, d], s0[t, d] - s[t, d], law.presliding)
+            wrapped += z[t, d] * turn(theta[d])[0]
+            T[d] = tension[t] * np.exp(-law.mu * wrapped)
+        for d in range(nd):
+            for i in range(chain.first[d], chain.first[d + 1]):
+                r[i] += T[d] * dl[i]
+                if tangent:
+                    b = cross(u[d], chain.axis[i])
+                    for k in range(i, chain.first[d + 1]):
+                        h = T[d] * (dot(b, X[k]) + (dot(X[i], X[k]) - dl[i] * dl[k]) / length[d])
+                        J[k, i] += h
+                        if k > i:
+                            J[i, k] += h
+        if not (tangent and law.mu > 0.0 and tension[t] > 0.0):
+            continue
+        dlog[:] = 0.0  # derivative of sum_{j<=d} z_j turn(theta_j)
+        for d in range(1, nd):
+            p, v = u[d - 1], u[d]
+            co = dot(p, v)
+            rounded, slope = turn(theta[d])
+            sine = np.sin(theta[d])
+            f = -z[t, d] * slope / sine if theta[d] > 1e-9 else -z[t, d] * 1e3
+            w = (p[0] - co * v[0], p[1] - co * v[1], p[2] - co * v[2])
+            y = (v[0] - co * p[0], v[1] - co * p[1], v[2] - co * p[2])
+            m = cross(v, p)
+            for i in range(chain.first[d - 1], chain.first[d]):
+                dlog[i] += f * (dot(y, X[i]) / length[d - 1] + dot(chain.axis[i], m))
+            for i in range(chain.first[d], chain.first[d + 1]):
+                dlog[i] += f * dot(w, X[i]) / length[d]
+            if abs(z[t, d]) < 1.0:
+                for i in range(chain.first[d], nv):
+                    dlog[i] -= rounded / law.presliding * dl[i]
+            for i in range(chain.first[d], chain.first[d + 1]):
+                f = -law.mu * T[d] * dl[i]
+                for j in range(nv):
+                    J[i, j] += f * dlog[j]

@@ -1,0 +1,125 @@
+"""`Robot` is data: the numbers of a `robot.toml`, each with unit and source, and the name of the family that builds it."""
+
+from __future__ import annotations
+
+import importlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import DataError, UnknownNameError
+from twin.quantities import Parameter, Values, overrides, si_factor
+from twin.robots.body import Body
+
+FORMAT = "twin-robot/1"
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A described robot; nothing in it is hidden in code.
+
+    `parameters` hold SI values; those with a `std` are uncertain in a built robot (the nuisance parameters). `effects` are
+    the laws the robot is known to have: (identifier, parameter values). `accuracy` (m) is the description's own error.
+    """
+
+    name: str
+    family: str
+    title: str
+    folder: Path
+    structure: Mapping[str, object]
+    parameters: tuple[Parameter, ...]
+    gravity: np.ndarray  # (3,) m/s^2
+    accuracy: float
+    effects: tuple[tuple[str, Values], ...] = ()
+
+    @property
+    def nuisance(self) -> tuple[Parameter, ...]:
+        """What a built robot may differ in from its description."""
+        return tuple(p for p in self.parameters if p.std is not None)
+
+    def build(self, values: Values | None = None) -> Body:
+        """The MuJoCo body at the given parameter values, nominal where none is given. Raises TwinError for a bad name."""
+        family = importlib.import_module(f"twin.robots.{self.family}")
+        return family.build(self.structure, overrides(self.parameters, values or {}))
+
+
+def models_folder() -> Path:
+    """Where the robots lie: inside the wheel, or beside the package in a checkout."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "models"
+    return inside if inside.is_dir() else package.parent / "models"
+
+
+def available() -> list[str]:
+    """Names of the robots that ship with the twin."""
+    return sorted(p.parent.name for p in models_folder().glob("*/robot.toml"))
+
+
+def load(name: str, relative_to: Path | None = None) -> Robot:
+    """The robot called `name`: a folder under `models/`, or a path to a folder, relative to `relative_to`.
+
+    Raises UnknownNameError where there is no such robot, DataError where its `robot.toml` is broken.
+    """
+    folder = models_folder() / name
+    if name not in available():
+        folder = (relative_to or Path.cwd()) / name
+        if not (folder / "robot.toml").is_file():
+            raise UnknownNameError("robot", name, available())
+    return _read(folder.resolve())
+
+
+@lru_cache(maxsize=16)
+def _read(folder: Path) -> Robot:
+    path = folder / "robot.toml"
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DataError(f"{path}: {error}") from None
+    if table.get("format") != FORMAT:
+        raise DataError(f"{path}: format is {table.get('format')!r}; this program reads {FORMAT!r}")
+    try:
+        parameters = tuple(p for name, entry in table["parameters"].items() for p in _parameters(path, name, entry))
+        gravity = np.array(table["gravity"]["value"], float) * si_factor(table["gravity"]["unit"], str(path))
+        accuracy = float(table["accuracy"]["value"]) * si_factor(table["accuracy"]["unit"], str(path))
+        declared = tuple((e["id"], dict(e.get("parameters", {}))) for e in table.get("effect", []))
+        gravity.setflags(write=False)
+        return Robot(
+            folder.name,
+            table["family"],
+            table["title"],
+            folder,
+            table["structure"],
+            parameters,
+            gravity,
+            accuracy,
+            declared,
+        )
+    except KeyError as error:
+        raise DataError(f"{path}: {error.args[0]!r} is missing") from None
+
+
+def _parameters(path: Path, name: str, entry: Mapping[str, object]) -> list[Parameter]:
+    missing = {"value", "unit", "source"} - set(entry)
+    if missing:
+        raise DataError(f"{path}: parameter {name!r} lacks {', '.join(sorted(missing))}; every number has a unit and a source")
+    factor = si_factor(str(entry["unit"]), f"{path}: parameter {name!r}")
+    value = entry["value"]
+    many = isinstance(value, list)
+    numbers: list[float] = [float(v) for v in value] if isinstance(value, list) else [float(value)]  # type: ignore[arg-type]
+    std = float(entry["std"]) * factor if "std" in entry else None  # type: ignore[arg-type]
+    return [
+        Parameter(
+            name=f"{name}_{k}" if many else name,
+            value=v * factor,
+            unit=str(entry["unit"]),
+            low=float(entry["low"]) * factor if "low" in entry else -np.inf,  # type: ignore[arg-type]
+            high=float(entry["high"]) * factor if "high" in entry else np.inf,  # type: ignore[arg-type]
+            source=str(entry["source"]),
+            std=std,
+        )
+        for k, v in enumerate(numbers, 1)
+    ]
