@@ -1,0 +1,69 @@
+"""Point clouds: an NPZ of plain arrays, looked at before anything is unpacked. Nothing in it is ever executed."""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import DataError
+from twin.measurements.files import LARGEST_CLOUD, check_size, located
+from twin.measurements.quantity_strings import shown
+from twin.measurements.recording import Clouds
+
+_MEMBERS = ("points", "offsets", "time")
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+
+
+def read_clouds(path: Path) -> Clouds:
+    """The clouds of one trial.
+
+    Raises DataError for a file that is no NPZ of points (M, 3), offsets (F + 1,) and time (F,), that is or unpacks to more
+    than `LARGEST_CLOUD` bytes, or that holds pickled objects.
+    """
+    check_size(path, LARGEST_CLOUD)
+    with located(path):
+        try:
+            with zipfile.ZipFile(path) as archive:
+                arrays = _members(archive)
+        except (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, RuntimeError, OverflowError) as fault:
+            # RuntimeError covers encrypted members and NotImplementedError, unknown compressions.
+            raise DataError(f"cannot be read as NPZ ({shown(str(fault))}); write it with numpy.savez_compressed") from None
+        return Clouds(**arrays)
+
+
+def _members(archive: zipfile.ZipFile) -> dict[str, np.ndarray]:
+    names = sorted(info.filename for info in archive.infolist())
+    if names != sorted(f"{name}.npy" for name in _MEMBERS):
+        raise DataError(f"holds {shown(', '.join(names))}; exactly points, offsets and time are allowed")
+    if (declared := sum(info.file_size for info in archive.infolist())) > LARGEST_CLOUD:
+        raise DataError(f"unpacks to {declared} bytes; at most {LARGEST_CLOUD} are read, use fewer points or frames")
+    arrays, left = {}, LARGEST_CLOUD
+    for name in _MEMBERS:
+        with archive.open(f"{name}.npy") as member, located(name):
+            data = member.read(left + 1)
+            left -= len(data)
+            if left < 0:
+                raise DataError(f"unpacks to more than {LARGEST_CLOUD} bytes; use fewer points or frames")
+            arrays[name] = _array(data, "iu" if name == "offsets" else "iuf")
+    return arrays
+
+
+def _array(data: bytes, kinds: str) -> np.ndarray:
+    """One .npy file; its header is believed only as far as the bytes behind it bear it out."""
+    stream = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(stream)
+        shape, fortran, dtype = _HEADERS[version](stream, max_header_size=4096)
+    except (ValueError, KeyError, TypeError, SyntaxError, RecursionError, MemoryError, OverflowError):
+        raise DataError("is no plain .npy array; write it with numpy.savez_compressed") from None
+    if dtype.kind not in kinds:
+        raise DataError(f"has type {shown(str(dtype))}; {'integers are' if kinds == 'iu' else 'numbers are'} needed")
+    body = data[stream.tell() :]
+    if any(isinstance(size, bool) or size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(body):
+        raise DataError(f"declares shape {shown(shape)} but holds {len(body)} bytes; write it again")
+    return np.frombuffer(body, dtype).reshape(shape, order="F" if fortran else "C")

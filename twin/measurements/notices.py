@@ -1,0 +1,43 @@
+"""Notices: what a user should know about a set that is otherwise in order, one plain sentence a kind of finding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from twin.measurements.channels import Channel
+from twin.measurements.recording import Trial
+from twin.measurements.tables import Table
+
+
+def notices_of(channels: Sequence[Channel], trials: Sequence[Trial], tables: Sequence[Table]) -> list[str]:
+    """Undeclared columns, conditions that are not understood, inputs with gaps and channels that are empty in a trial."""
+    notices = []
+    for name, files in _where((table.path.name, table.extra) for table in tables).items():
+        notices.append(f"column {name!r} is not declared in measurements.toml and not read ({_listed(files)})")
+    for name, files in _where((trial.name, trial.other) for trial in trials).items():
+        notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_listed(files)})")
+    for channel in channels:
+        gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}
+        empty = [trial.name for trial in trials if gaps[trial.name] == len(trial.time)]
+        holed = [name for name, count in gaps.items() if count and name not in empty]
+        if empty:
+            notices.append(f"{channel.role} {channel.name} has no value in {_listed(empty)}")
+        if holed and channel.role == "input":
+            count = sum(gaps[name] for name in holed)
+            notices.append(f"input {channel.name} misses {count} values, which are not filled in ({_listed(holed)})")
+    return notices
+
+
+def _where(found: Iterable[tuple[str, Iterable[str]]]) -> dict[str, list[str]]:
+    """File and the names found in it -> name and the files it stands in."""
+    files: dict[str, list[str]] = {}
+    for file, names in found:
+        for name in names:
+            files.setdefault(name, []).append(file)
+    return files
+
+
+def _listed(files: Sequence[str]) -> str:
+    return ", ".join(files) if len(files) <= 3 else f"{files[0]}, {files[1]} and {len(files) - 2} more"

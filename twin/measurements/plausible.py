@@ -1,0 +1,66 @@
+"""What measured numbers must satisfy before a twin may look at them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.errors import DataError
+from twin.measurements.channels import Channel
+from twin.measurements.recording import Trial
+from twin.measurements.tables import Table
+
+_LEAST_SAMPLES = 3
+_SIGMAS = 5.0  # of declared noise: how far below zero an input tension may read
+_UNDECLARED_SLACK = (0.05, 0.02)  # N, and part of the largest tension: the same where no noise is declared
+
+
+def check_table(table: Table, channels: Sequence[Channel]) -> None:
+    """Raises DataError, naming the cell, for time that does not increase, a pushing tendon and a temperature below 0 K."""
+    time = table.columns["time"]
+    if len(missing := np.flatnonzero(np.isnan(time))):
+        raise DataError(f"{table.cell(int(missing[0]), 'time')}: missing; every row needs its time in seconds")
+    if len(back := np.flatnonzero(np.diff(time) <= 0)):
+        at = int(back[0]) + 1
+        order = f"{float(time[at])!r} after {float(time[at - 1])!r}"
+        raise DataError(f"{table.cell(at, 'time')}: {order}; time must strictly increase, sort or split the trial")
+    for channel in channels:
+        column = channel.scale.to_si(table.columns[channel.name])
+        if channel.si_unit == "K":
+            _check_floor(table, channel, column, 0.0, "below absolute zero; leave the cell empty if it is missing")
+        elif channel.kind == "tendon_tension" and channel.role == "input" and not np.all(np.isnan(column)):
+            absolute, relative = _UNDECLARED_SLACK
+            slack = max(absolute, relative * float(np.nanmax(column))) if channel.noise is None else _SIGMAS * channel.noise
+            advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise); correct sign or bias"
+            _check_floor(table, channel, column, -slack, advice)
+
+
+def _check_floor(table: Table, channel: Channel, column: np.ndarray, floor: float, advice: str) -> None:
+    if len(below := np.flatnonzero(column < floor)):
+        at = int(below[0])
+        read = float(table.columns[channel.name][at])
+        raise DataError(f"{table.cell(at, channel.name)}: {read!r} {channel.unit}, {advice}")
+
+
+def why_unusable(trial: Trial, channels: Sequence[Channel]) -> str:
+    """Why nothing can be learnt from a trial; empty if something can."""
+    if len(trial.time) < _LEAST_SAMPLES:
+        return f"{len(trial.time)} samples, at least {_LEAST_SAMPLES} are needed"
+    outputs = [trial.values[channel.name] for channel in channels if channel.role == "output"]
+    if outputs and all(np.all(np.isnan(column)) for column in outputs):
+        return "not one output value in it"
+    return ""
+
+
+def check_set(channels: Sequence[Channel], trials: Sequence[Trial], least_trials: int) -> None:
+    """Raises DataError for a set without input, output or enough usable trials, and for a channel without a single value."""
+    for role in ("input", "output"):
+        if not any(channel.role == role for channel in channels):
+            raise DataError(f'no {role} channel; give at least one [[channel]] role = "{role}"')
+    if len(trials) < least_trials:
+        needed = f"at least {least_trials} are needed, each with {_LEAST_SAMPLES} samples and an output value"
+        raise DataError(f"{len(trials)} usable trials; {needed}")
+    for channel in channels:
+        if trials and all(np.all(np.isnan(trial.values[channel.name])) for trial in trials):
+            raise DataError(f"channel {channel.name} has no value in any usable trial; remove it, or export the data again")

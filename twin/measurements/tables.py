@@ -1,0 +1,139 @@
+"""Tables: a trial's CSV or Parquet file as columns of numbers, and the exact cell where one is at fault.
+
+A CSV goes through pyarrow; where that objects, the slow reader looks for the row and column to name.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from twin.errors import DataError
+from twin.measurements.files import LARGEST_TRIAL, check_size, read_text
+from twin.measurements.quantity_strings import shown
+
+_NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
+_MISSING = ("", "nan", "+nan", "-nan")  # compared in lower case
+_LARGEST_COUNT = LARGEST_TRIAL // 8  # numbers in a Parquet file
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns as written, not yet in SI."""
+
+    path: Path
+    columns: dict[str, np.ndarray]  # wanted name -> (n,), NaN where missing
+    extra: tuple[str, ...]  # names of columns nobody asked for
+    first_row: int  # the number people see beside the first sample: 2 under a CSV's header, 1 in Parquet
+
+    def cell(self, index: int, name: str) -> str:
+        """Where a sample stands, for a message."""
+        return f"{self.path}, row {index + self.first_row}, column {name}"
+
+
+def read_table(path: Path, names: Sequence[str]) -> Table:
+    """The columns `names` of a CSV or Parquet file.
+
+    Raises DataError for a file that is too large or no table, a column that is missing or there twice, a ragged row, a cell
+    that is no number and one that is infinite.
+    """
+    table = _read_parquet(path, names) if path.suffix == ".parquet" else _read_csv(path, names)
+    for name, column in table.columns.items():
+        if len(infinite := np.flatnonzero(np.isinf(column))):
+            raise DataError(f"{table.cell(int(infinite[0]), name)}: infinite value; write a number, or nothing if it is missing")
+    return table
+
+
+def _read_csv(path: Path, names: Sequence[str]) -> Table:
+    data = read_text(path, LARGEST_TRIAL)
+    first, _, _ = data.partition(b"\n")
+    header = [name.strip() for name in _cells(path, 1, first.decode())]
+    extra = _check_header(f"{path}, row 1", header, names)
+    try:
+        columns = _fast_columns(data, header, names)
+    except pa.ArrowException:
+        columns = _slow_columns(path, data, header, names)
+    return Table(path, columns, extra, first_row=2)
+
+
+def _check_header(where: str, header: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    if len(set(header)) < len(header):
+        twice = next(name for name in header if header.count(name) > 1)
+        raise DataError(f"{where}: column {shown(twice)} is there twice; keep one")
+    for name in names:
+        if name not in header:
+            hint = " (columns are separated by commas)" if len(header) == 1 else ""
+            found = f"no column {name}{hint}, only {shown(', '.join(header))}"
+            raise DataError(f"{where}: {found}; add it, or remove the channel from measurements.toml")
+    return tuple(name for name in header if name not in names)
+
+
+def _fast_columns(data: bytes, header: Sequence[str], names: Sequence[str]) -> dict[str, np.ndarray]:
+    table = pyarrow.csv.read_csv(
+        pa.BufferReader(data.rstrip()),
+        read_options=pyarrow.csv.ReadOptions(use_threads=False, column_names=list(header), skip_rows=1),
+        parse_options=pyarrow.csv.ParseOptions(ignore_empty_lines=False),
+        convert_options=pyarrow.csv.ConvertOptions(
+            column_types=dict.fromkeys(names, pa.float64()), include_columns=list(names), null_values=["", "NaN", "nan"]
+        ),
+    )
+    return {name: _numbers(table.column(name)) for name in names}
+
+
+def _slow_columns(path: Path, data: bytes, header: Sequence[str], names: Sequence[str]) -> dict[str, np.ndarray]:
+    rows: list[list[float]] = []
+    where = [header.index(name) for name in names]
+    for row, line in enumerate(data.rstrip().decode().split("\n")[1:], start=2):
+        cells = _cells(path, row, line)
+        if len(cells) != len(header):
+            raise DataError(f"{path}, row {row}: {len(cells)} cells under {len(header)} headings; give each row one a column")
+        rows.append([_cell_number(path, row, name, cells[at]) for name, at in zip(names, where, strict=True)])
+    array = np.array(rows, float).reshape(len(rows), len(names))
+    return {name: array[:, at] for at, name in enumerate(names)}
+
+
+def _cells(path: Path, row: int, line: str) -> list[str]:
+    try:
+        return next(csv.reader([line], strict=True), [])
+    except csv.Error as fault:
+        raise DataError(f"{path}, row {row}: no CSV ({fault}); separate cells by commas, without quotes") from None
+
+
+def _cell_number(path: Path, row: int, name: str, cell: str) -> float:
+    text = cell.strip()
+    if text.lower() in _MISSING:
+        return np.nan
+    if not _NUMBER.fullmatch(text):
+        raise DataError(f"{path}, row {row}, column {name}: {shown(cell)} is not a number; write one, or nothing if it is missing")
+    return float(text)
+
+
+def _read_parquet(path: Path, names: Sequence[str]) -> Table:
+    check_size(path, LARGEST_TRIAL)
+    try:
+        with pyarrow.parquet.ParquetFile(path) as file:
+            schema, count = file.schema_arrow, file.metadata.num_rows
+            extra = _check_header(str(path), schema.names, names)
+            if count * len(names) > _LARGEST_COUNT:
+                raise DataError(f"{path}: {count} rows; at most {_LARGEST_COUNT // len(names)} are read, split the trial")
+            for name in names:
+                kind = schema.field(name).type
+                if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+                    raise DataError(f"{path}, column {name}: holds {kind}; store it as a number (float64)")
+            table = file.read(columns=list(names), use_threads=False)
+            columns = {name: _numbers(table.column(name)) for name in names}
+    except (pa.ArrowException, OSError, ValueError, KeyError, OverflowError, MemoryError) as fault:
+        raise DataError(f"{path}: cannot be read as Parquet ({shown(str(fault))}); write it again") from None
+    return Table(path, columns, extra, first_row=1)
+
+
+def _numbers(column: pa.ChunkedArray) -> np.ndarray:
+    return column.cast(pa.float64()).to_numpy(zero_copy_only=False)

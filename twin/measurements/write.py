@@ -1,0 +1,95 @@
+"""Writing a measurement set: whole or not at all, in the units its channels declare."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+
+from twin.errors import DataError
+from twin.measurements.conditions import SCALARS
+from twin.measurements.files import check_name
+from twin.measurements.read import FILE, FORMAT
+from twin.measurements.recording import Recording, Trial
+from twin.measurements.toml_text import toml_lines
+
+FileFormat = Literal["csv", "parquet"]
+
+
+def write(recording: Recording, folder: str | Path, *, file_format: FileFormat = "csv") -> None:
+    """Writes measurements.toml, one table a trial and its clouds; `read` gives the same values back.
+
+    The files appear together: they are written beside `folder` and moved there at the end.
+
+    Raises DataError for a folder that holds something already, for trial names that clash or lead out of it, and if the disk
+    does not take it.
+    """
+    folder = Path(folder)
+    if file_format not in ("csv", "parquet"):
+        raise DataError(f"file format {file_format!r}; allowed: csv, parquet")
+    labels = [check_name(trial.label) for trial in recording.trials]
+    if len(set(labels)) < len(labels):
+        raise DataError(f"{folder}: two trials have the same name; give each its own")
+    draft = folder.absolute().parent / f".{folder.absolute().name}.{os.getpid()}.writing"
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise DataError(f"{folder}: holds something already and is not overwritten; name a new folder or empty this one")
+        draft.mkdir(parents=True)
+        try:
+            (draft / FILE).write_text(_toml(recording, file_format), encoding="utf-8")
+            for trial in recording.trials:
+                _write_trial(recording, trial, draft, file_format)
+            if folder.exists():
+                folder.rmdir()
+            draft.rename(folder)
+        except BaseException:
+            shutil.rmtree(draft, ignore_errors=True)
+            raise
+    except (OSError, UnicodeError, pa.ArrowException) as fault:
+        raise DataError(f"{folder}: cannot be written ({fault}); choose another place") from None
+
+
+def _toml(recording: Recording, file_format: FileFormat) -> str:
+    gravity = None if recording.gravity is None else recording.gravity.tolist()
+    lines = toml_lines(
+        {"format": FORMAT, "robot": recording.robot, "title": recording.title, "source": recording.source, "gravity": gravity}
+    )
+    for channel in recording.channels:
+        noise = None if channel.noise is None else float(channel.scale.difference().from_si(np.array([channel.noise]))[0])
+        declared = {"name": channel.name, "role": channel.role, "unit": channel.unit, "noise": noise}
+        lines += ["", "[[channel]]", *toml_lines(declared)]
+    for trial in recording.trials:
+        cloud = None if trial.clouds is None else f"{trial.label}.clouds.npz"
+        conditions = {name: _condition(name, value) for name, value in trial.conditions.items()}
+        entry = {"file": f"{trial.label}.{file_format}", "start": trial.start, **conditions, **trial.other, "cloud": cloud}
+        lines += ["", "[[trial]]", *toml_lines(entry)]
+    return "\n".join(lines) + "\n"
+
+
+def _condition(name: str, value: float | np.ndarray) -> object:
+    return f"{float(value)!r} {SCALARS[name]}" if name in SCALARS else np.asarray(value).tolist()
+
+
+def _write_trial(recording: Recording, trial: Trial, folder: Path, file_format: FileFormat) -> None:
+    path = folder / f"{trial.label}.{file_format}"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    columns = {"time": trial.time}
+    columns |= {channel.name: channel.scale.from_si(trial.values[channel.name]) for channel in recording.channels}
+    if file_format == "parquet":
+        pyarrow.parquet.write_table(pa.table(columns), path)
+    else:
+        path.write_text(_csv(columns), encoding="utf-8")
+    if trial.clouds is not None:
+        clouds = trial.clouds
+        np.savez_compressed(folder / f"{trial.label}.clouds.npz", points=clouds.points, offsets=clouds.offsets, time=clouds.time)
+
+
+def _csv(columns: Mapping[str, np.ndarray]) -> str:
+    cells = [["" if value != value else repr(value) for value in column.tolist()] for column in columns.values()]
+    return "\n".join([",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n"
