@@ -81,6 +81,7 @@ class Channel:
     noise: float | None = None  # one standard deviation, in `si_unit`; None where none is declared
 
     def __post_init__(self) -> None:
+        meaning(self.name)
         if self.role not in get_args(Role):
             raise DataError(f"role {shown(self.role)} of {self.name}; allowed: {', '.join(get_args(Role))}")
         unit_scale(self.unit, self.si_unit)

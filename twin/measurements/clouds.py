@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import math
+import struct
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -30,8 +32,8 @@ def read_clouds(path: Path) -> Clouds:
         try:
             with zipfile.ZipFile(path) as archive:
                 arrays = _members(archive)
-        except (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, RuntimeError, OverflowError) as fault:
-            # RuntimeError covers encrypted members and NotImplementedError, unknown compressions.
+        except (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, ValueError, RuntimeError, OverflowError) as fault:
+            # RuntimeError stands for encrypted members.
             raise DataError(f"cannot be read as NPZ ({shown(str(fault))}); write it with numpy.savez_compressed") from None
         return Clouds(**arrays)
 
@@ -40,6 +42,8 @@ def _members(archive: zipfile.ZipFile) -> dict[str, np.ndarray]:
     names = sorted(info.filename for info in archive.infolist())
     if names != sorted(f"{name}.npy" for name in _MEMBERS):
         raise DataError(f"holds {shown(', '.join(names))}; exactly points, offsets and time are allowed")
+    if any(info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for info in archive.infolist()):
+        raise DataError("is packed in an unusual way; write it with numpy.savez_compressed")
     if (declared := sum(info.file_size for info in archive.infolist())) > LARGEST_CLOUD:
         raise DataError(f"unpacks to {declared} bytes; at most {LARGEST_CLOUD} are read, use fewer points or frames")
     arrays, left = {}, LARGEST_CLOUD
@@ -59,7 +63,7 @@ def _array(data: bytes, kinds: str) -> np.ndarray:
     try:
         version = np.lib.format.read_magic(stream)
         shape, fortran, dtype = _HEADERS[version](stream, max_header_size=4096)
-    except (ValueError, KeyError, TypeError, SyntaxError, RecursionError, MemoryError, OverflowError):
+    except (ValueError, KeyError, TypeError, SyntaxError, tokenize.TokenError, RecursionError, MemoryError):
         raise DataError("is no plain .npy array; write it with numpy.savez_compressed") from None
     if dtype.kind not in kinds:
         raise DataError(f"has type {shown(str(dtype))}; {'integers are' if kinds == 'iu' else 'numbers are'} needed")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from twin.errors import DataError
 from twin.measurements.quantity_strings import shown
@@ -30,7 +30,14 @@ def check_name(name: object) -> str:
     if not isinstance(name, str) or not name.strip():
         raise DataError(f"{shown(name)} is no file name; write one in quotes, relative to the set's folder")
     path = PurePosixPath(name)
-    if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name or path.name in ("", "."):
+    if (
+        path.is_absolute()
+        or ".." in path.parts
+        or "\\" in name
+        or PureWindowsPath(name).drive
+        or not path.name
+        or not name.isprintable()
+    ):
         raise DataError(f"file {shown(name)} leads out of the set's folder; write a relative path with / and without ..")
     return name
 

@@ -26,11 +26,11 @@ def fingerprint(recording: Recording) -> str:
 
     text("robot", recording.robot)
     for channel in recording.channels:
-        text("channel", channel.name, channel.role, channel.si_unit, channel.noise)
+        text("channel", channel.name, channel.role, channel.si_unit, channel.noise and float(channel.noise))
     if recording.gravity is not None:
         numbers("gravity", recording.gravity)
     for trial in recording.trials:
-        text("trial", trial.label, trial.start, sorted(trial.other.items()))
+        text("trial", trial.label, None if trial.start is None else float(trial.start), sorted(trial.other.items()))
         for name, value in sorted(trial.conditions.items()):
             numbers(name, [value])
         numbers("time", trial.time)

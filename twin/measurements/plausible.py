@@ -17,8 +17,9 @@ _UNDECLARED_SLACK = (0.05, 0.02)  # N, and part of the largest tension: the same
 
 
 def check_table(table: Table, channels: Sequence[Channel]) -> None:
-    """Raises DataError, naming the cell, for time that does not increase, a pushing tendon and a temperature below 0 K."""
+    """Raises DataError, naming the cell, for an infinite value, time that does not increase, a pushing tendon and less than 0 K."""
     time = table.columns["time"]
+    _check_finite(table, "time", time)
     if len(missing := np.flatnonzero(np.isnan(time))):
         raise DataError(f"{table.cell(int(missing[0]), 'time')}: missing; every row needs its time in seconds")
     if len(back := np.flatnonzero(np.diff(time) <= 0)):
@@ -27,6 +28,7 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         raise DataError(f"{table.cell(at, 'time')}: {order}; time must strictly increase, sort or split the trial")
     for channel in channels:
         column = channel.scale.to_si(table.columns[channel.name])
+        _check_finite(table, channel.name, column)
         if channel.si_unit == "K":
             _check_floor(table, channel, column, 0.0, "below absolute zero; leave the cell empty if it is missing")
         elif channel.kind == "tendon_tension" and channel.role == "input" and not np.all(np.isnan(column)):
@@ -34,6 +36,11 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
             slack = max(absolute, relative * float(np.nanmax(column))) if channel.noise is None else _SIGMAS * channel.noise
             advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise); correct sign or bias"
             _check_floor(table, channel, column, -slack, advice)
+
+
+def _check_finite(table: Table, name: str, column: np.ndarray) -> None:
+    if len(infinite := np.flatnonzero(np.isinf(column))):
+        raise DataError(f"{table.cell(int(infinite[0]), name)}: infinite value; write a number, or nothing if it is missing")
 
 
 def _check_floor(table: Table, channel: Channel, column: np.ndarray, floor: float, advice: str) -> None:
@@ -48,16 +55,20 @@ def why_unusable(trial: Trial, channels: Sequence[Channel]) -> str:
     if len(trial.time) < _LEAST_SAMPLES:
         return f"{len(trial.time)} samples, at least {_LEAST_SAMPLES} are needed"
     outputs = [trial.values[channel.name] for channel in channels if channel.role == "output"]
-    if outputs and all(np.all(np.isnan(column)) for column in outputs):
+    if all(np.all(np.isnan(column)) for column in outputs):
         return "not one output value in it"
     return ""
 
 
-def check_set(channels: Sequence[Channel], trials: Sequence[Trial], least_trials: int) -> None:
-    """Raises DataError for a set without input, output or enough usable trials, and for a channel without a single value."""
+def check_roles(channels: Sequence[Channel]) -> None:
+    """Raises DataError for a set without input or without output."""
     for role in ("input", "output"):
         if not any(channel.role == role for channel in channels):
             raise DataError(f'no {role} channel; give at least one [[channel]] role = "{role}"')
+
+
+def check_trials(channels: Sequence[Channel], trials: Sequence[Trial], least_trials: int) -> None:
+    """Raises DataError for too few usable trials, and for a channel without a single value in them."""
     if len(trials) < least_trials:
         needed = f"at least {least_trials} are needed, each with {_LEAST_SAMPLES} samples and an output value"
         raise DataError(f"{len(trials)} usable trials; {needed}")

@@ -45,7 +45,8 @@ class Scale:
 
     def to_si(self, declared: Any) -> Any:
         """Readings in the declared unit, any shape -> SI."""
-        return declared * self.numerator / self.denominator + self.offset
+        with np.errstate(over="ignore"):
+            return declared * self.numerator / self.denominator + self.offset
 
     def from_si(self, si: np.ndarray) -> np.ndarray:
         """SI values (n,) -> declared unit, chosen among the nearest floats so that `to_si` gives the same bits where it can."""
@@ -104,7 +105,7 @@ def quantity(value: object, si_unit: str) -> float:
 
     Raises DataError for anything but a finite number followed by a unit of the right dimension.
     """
-    example = f'"{10} {EXAMPLES[si_unit].split(", ")[-1]}"'
+    example = f'"10 {EXAMPLES[si_unit].split(", ")[-1]}"'
     if not isinstance(value, str):
         raise DataError(f"{shown(value)} has no unit; write a quantity in quotes, such as {example}")
     match = _NUMBER.fullmatch(value) if len(value) <= _LONGEST else None

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any, cast
 
 from twin.errors import DataError
-from twin.measurements.channels import Channel
+from twin.measurements.channels import Channel, Role
 from twin.measurements.clouds import read_clouds
 from twin.measurements.conditions import read_conditions
-from twin.measurements.files import LARGEST_TOML, inside, located, read_text
+from twin.measurements.files import LARGEST_TOML, check_name, inside, located, read_text
 from twin.measurements.notices import notices_of
-from twin.measurements.plausible import check_set, check_table, why_unusable
+from twin.measurements.plausible import check_roles, check_table, check_trials, why_unusable
 from twin.measurements.quantity_strings import number, shown, vector
 from twin.measurements.recording import Recording, Trial
 from twin.measurements.tables import Table, read_table
@@ -48,6 +48,7 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
         with located("gravity"):
             gravity = vector(document["gravity"], "m/s^2") if "gravity" in document else None
         channels = _channels(_tables(document, "channel"))
+        check_roles(channels)
         written = _tables(document, "trial")
     notes = [_unknown_keys("measurements.toml", document, _TOP_KEYS)]
     notes += [_unknown_keys(f"channel {table['name']}", table, _CHANNEL_KEYS) for table in _tables(document, "channel")]
@@ -60,13 +61,15 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
     for at, entry in enumerate(written, start=1):
         with located(f"{file}, trial {at}"):
             trial_file = _trial_file(file.parent, entry)
-            start = number(entry["start"]) if "start" in entry else None
+            cloud_file = inside(file.parent, entry["cloud"]) if "cloud" in entry else None
+            with located("start"):
+                start = number(entry["start"]) if "start" in entry else None
             conditions, other = read_conditions(entry)
         table = read_table(trial_file, ["time", *(channel.name for channel in channels)])
         check_table(table, channels)
         values = {channel.name: channel.scale.to_si(table.columns[channel.name]) for channel in channels}
         name = trial_file.relative_to(file.parent).as_posix()
-        clouds = read_clouds(inside(file.parent, entry["cloud"])) if "cloud" in entry else None
+        clouds = read_clouds(cloud_file) if cloud_file else None
         trial = Trial(name, table.columns["time"], values, conditions, other, start, clouds)
         if trial.label in labels:
             raise DataError(f"{file}, trial {at}: file {shown(name)} is there twice; list every trial once")
@@ -77,18 +80,18 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
         else:
             trials.append(trial)
     with located(file):
-        check_set(channels, trials, least_trials)
+        check_trials(channels, trials, least_trials)
     notes += notices_of(channels, trials, tables)
     return Recording(robot, title, source, gravity, channels, tuple(trials), file.parent, tuple(note for note in notes if note))
 
 
 def _read_toml(file: Path) -> dict[str, Any]:
-    if not file.is_file():
-        raise DataError(f"{file}: no such file; a measurement set is a folder with a {FILE}")
     try:
+        if not file.is_file():
+            raise DataError(f"{file}: no such file; a measurement set is a folder with a {FILE}")
         return tomllib.loads(read_text(file, LARGEST_TOML).decode())
-    except (ValueError, RecursionError) as fault:
-        raise DataError(f"{file}: not TOML ({shown(str(fault))}); correct it there") from None
+    except (ValueError, RecursionError, OSError) as fault:
+        raise DataError(f"{file}: not TOML ({shown(str(fault))}); correct the file") from None
 
 
 def _text(document: Mapping[str, object], key: str, default: str | None) -> str:
@@ -110,7 +113,7 @@ def _channels(tables: list[dict[str, Any]]) -> tuple[Channel, ...]:
     for at, table in enumerate(tables, start=1):
         with located(f"channel {at}"):
             name = _text(table, "name", None)
-            role = cast(Any, _text(table, "role", None))
+            role = cast(Role, table.get("role"))
             channel = Channel(name, role, _text(table, "unit", None))
             if name in (other.name for other in channels):
                 raise DataError(f"{name} is declared twice; declare it once")
@@ -123,9 +126,9 @@ def _channels(tables: list[dict[str, Any]]) -> tuple[Channel, ...]:
 
 
 def _trial_file(folder: Path, entry: Mapping[str, object]) -> Path:
-    name = _text(entry, "file", None)
-    if not name.endswith(_SUFFIXES):
-        found = [suffix for suffix in _SUFFIXES if (folder / (name + suffix)).is_file()] if "." not in name else []
+    name = check_name(entry.get("file"))
+    if not name.lower().endswith(_SUFFIXES):
+        found = [suffix for suffix in _SUFFIXES if (folder / (name + suffix)).is_file()]
         if len(found) != 1:
             raise DataError(f"file {shown(name)} ends neither in .csv nor in .parquet; name one that does")
         name += found[0]

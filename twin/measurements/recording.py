@@ -98,7 +98,8 @@ class Trial(_Rebuilt):
     @property
     def label(self) -> str:
         """The file's name without its ending, as reports print it."""
-        return str(PurePosixPath(self.name).with_suffix("")) if self.name.endswith((".csv", ".parquet")) else self.name
+        path = PurePosixPath(self.name)
+        return str(path.with_suffix("")) if path.suffix.lower() in (".csv", ".parquet") else self.name
 
 
 @dataclass(frozen=True, eq=False)

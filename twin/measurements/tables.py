@@ -17,7 +17,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from twin.errors import DataError
-from twin.measurements.files import LARGEST_TRIAL, check_size, read_text
+from twin.measurements.files import LARGEST_TRIAL, LONGEST_LINE, check_size, read_text
 from twin.measurements.quantity_strings import shown
 
 _NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
@@ -42,14 +42,10 @@ class Table:
 def read_table(path: Path, names: Sequence[str]) -> Table:
     """The columns `names` of a CSV or Parquet file.
 
-    Raises DataError for a file that is too large or no table, a column that is missing or there twice, a ragged row, a cell
-    that is no number and one that is infinite.
+    Raises DataError for a file that is too large or no table, a column that is missing or there twice, a ragged row and a cell
+    that is no number.
     """
-    table = _read_parquet(path, names) if path.suffix == ".parquet" else _read_csv(path, names)
-    for name, column in table.columns.items():
-        if len(infinite := np.flatnonzero(np.isinf(column))):
-            raise DataError(f"{table.cell(int(infinite[0]), name)}: infinite value; write a number, or nothing if it is missing")
-    return table
+    return _read_parquet(path, names) if path.suffix.lower() == ".parquet" else _read_csv(path, names)
 
 
 def _read_csv(path: Path, names: Sequence[str]) -> Table:
@@ -57,11 +53,7 @@ def _read_csv(path: Path, names: Sequence[str]) -> Table:
     first, _, _ = data.partition(b"\n")
     header = [name.strip() for name in _cells(path, 1, first.decode())]
     extra = _check_header(f"{path}, row 1", header, names)
-    try:
-        columns = _fast_columns(data, header, names)
-    except pa.ArrowException:
-        columns = _slow_columns(path, data, header, names)
-    return Table(path, columns, extra, first_row=2)
+    return Table(path, _fast_columns(data, header, names) or _slow_columns(path, data, header, names), extra, first_row=2)
 
 
 def _check_header(where: str, header: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
@@ -76,15 +68,23 @@ def _check_header(where: str, header: Sequence[str], names: Sequence[str]) -> tu
     return tuple(name for name in header if name not in names)
 
 
-def _fast_columns(data: bytes, header: Sequence[str], names: Sequence[str]) -> dict[str, np.ndarray]:
-    table = pyarrow.csv.read_csv(
-        pa.BufferReader(data.rstrip()),
-        read_options=pyarrow.csv.ReadOptions(use_threads=False, column_names=list(header), skip_rows=1),
-        parse_options=pyarrow.csv.ParseOptions(ignore_empty_lines=False),
-        convert_options=pyarrow.csv.ConvertOptions(
-            column_types=dict.fromkeys(names, pa.float64()), include_columns=list(names), null_values=["", "NaN", "nan"]
-        ),
-    )
+def _fast_columns(data: bytes, header: Sequence[str], names: Sequence[str]) -> dict[str, np.ndarray] | None:
+    """The columns, or None for a table that only the slow reader can read or blame; a quoted cell could hide a line end."""
+    if b'"' in data:
+        return None
+    try:
+        table = pyarrow.csv.read_csv(
+            pa.BufferReader(data.rstrip()),
+            read_options=pyarrow.csv.ReadOptions(
+                use_threads=False, block_size=2 * LONGEST_LINE, column_names=list(header), skip_rows=1
+            ),
+            parse_options=pyarrow.csv.ParseOptions(quote_char=False, ignore_empty_lines=False),
+            convert_options=pyarrow.csv.ConvertOptions(
+                column_types=dict.fromkeys(names, pa.float64()), include_columns=list(names), null_values=["", "NaN", "nan"]
+            ),
+        )
+    except pa.ArrowException:
+        return None
     return {name: _numbers(table.column(name)) for name in names}
 
 

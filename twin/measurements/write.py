@@ -15,6 +15,7 @@ import pyarrow.parquet
 from twin.errors import DataError
 from twin.measurements.conditions import SCALARS
 from twin.measurements.files import check_name
+from twin.measurements.quantity_strings import shown
 from twin.measurements.read import FILE, FORMAT
 from twin.measurements.recording import Recording, Trial
 from twin.measurements.toml_text import toml_lines
@@ -52,7 +53,7 @@ def write(recording: Recording, folder: str | Path, *, file_format: FileFormat =
             shutil.rmtree(draft, ignore_errors=True)
             raise
     except (OSError, UnicodeError, pa.ArrowException) as fault:
-        raise DataError(f"{folder}: cannot be written ({fault}); choose another place") from None
+        raise DataError(f"{folder}: cannot be written ({shown(str(fault))}); choose another place") from None
 
 
 def _toml(recording: Recording, file_format: FileFormat) -> str:
