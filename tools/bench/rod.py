@@ -1,0 +1,194 @@
+"""The reference robot: an inextensible Kirchhoff rod with rigid disks and tendons, solved without `twin` or MuJoCo.
+
+    from tools.bench.rod import Rod, solve
+    shape = solve(Rod(), tension=[2.0, 0.0, 0.0], gravity=[0, 0, 9.81], payload=0.010)
+    shape.disks[-1]                                      # tip, m, in the base frame
+
+Base frame: origin at the base plate on the backbone, +z along the straight robot, tendon 1 at +x. SI units throughout.
+`solve` is one equilibrium; `follow` walks a path of tensions with friction and creep. A tension is the true one at the
+base end of the tendon, before the base hole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tools.bench.frames import gauss_mesh
+from tools.bench.march import Creep, Path, Record, march
+from tools.bench.statics import Body, Load
+from tools.bench.tendons import IWAN_SPREAD, Friction
+
+NO_FIELDS = np.zeros((0, 10))
+
+
+class NoEquilibrium(RuntimeError):
+    """Newton found no balance, even when the load came in 1024 parts: the rod has buckled or the load is absurd."""
+
+
+@dataclass(frozen=True)
+class Rod:
+    """One built robot; the defaults are Peng's Table 2 (doi 10.20517/ss.2025.31) with an ideal assembly.
+
+    EI(s) = E pi/4 r(s)^4 (1 + stiffness_gradient (s/L - 1/2)) stiffness_profile_k,  r(s) = r (1 + taper (1/2 - s/L));
+    bending about the stiff axis carries sqrt(asymmetry), about the soft axis 1/sqrt(asymmetry) of it.
+    """
+
+    pitch: np.ndarray = field(default_factory=lambda: np.full(8, 0.015))  # (N,) m
+    backbone_radius: float = 0.4e-3  # m
+    radius_taper: float = 0.0  # (r(0) - r(L)) / r
+    youngs_modulus: float = 77.59e9  # Pa
+    poisson_ratio: float = 0.33
+    backbone_mass: float = 0.6e-3  # kg
+    disk_mass: np.ndarray = field(default_factory=lambda: np.full(8, 0.63e-3))  # (N,) kg
+    hole_radius: np.ndarray = field(default_factory=lambda: np.full((9, 3), 0.008))  # (N+1, T) m, base plate first
+    hole_angle: np.ndarray = field(default_factory=lambda: np.tile(np.radians([0.0, 120.0, 240.0]), (9, 1)))  # rad
+    precurvature: np.ndarray = field(default_factory=lambda: np.zeros((8, 3)))  # (N, 3) 1/m, section frame
+    stiffness_asymmetry: float = 1.0  # stiff over soft bending stiffness
+    asymmetry_angle: float = 0.0  # rad from +x of the soft direction: a tip force there bends the rod most
+    stiffness_gradient: float = 0.0
+    stiffness_profile: np.ndarray = field(default_factory=lambda: np.ones(8))  # (N,)
+    marker_offset: np.ndarray = field(default_factory=lambda: np.zeros(8))  # (N,) m, along the disk's axis
+
+    @property
+    def length(self) -> float:
+        return float(self.pitch.sum())
+
+    def holes(self) -> np.ndarray:
+        """Hole positions (N+1, T, 3) in their disks' frames."""
+        c, s = np.cos(self.hole_angle), np.sin(self.hole_angle)
+        return np.stack([self.hole_radius * c, self.hole_radius * s, np.zeros_like(c)], axis=-1)
+
+    def compliance(self, nodes: int) -> np.ndarray:
+        """1/(N m^2), (N, G, 3, 3), in the section's frame; the third axis is twist."""
+        x = (np.polynomial.legendre.leggauss(nodes)[0] + 1) / 2
+        s = (np.cumsum(self.pitch) - self.pitch)[:, None] + self.pitch[:, None] * x  # (N, G)
+        from_middle = s / self.length - 0.5
+        area_moment = np.pi / 4 * (self.backbone_radius * (1 - self.radius_taper * from_middle)) ** 4
+        factor = (1 + self.stiffness_gradient * from_middle) * self.stiffness_profile[:, None]
+        bending = self.youngs_modulus * area_moment * factor
+        # Bending into the direction `soft` is a rotation about the axis 90 degrees further on.
+        about_soft = np.array([-np.sin(self.asymmetry_angle), np.cos(self.asymmetry_angle), 0.0])
+        about_stiff = np.array([np.cos(self.asymmetry_angle), np.sin(self.asymmetry_angle), 0.0])
+        root = np.sqrt(self.stiffness_asymmetry)
+        in_section = root * np.outer(about_soft, about_soft) + np.outer(about_stiff, about_stiff) / root
+        in_section[2, 2] = 1 + self.poisson_ratio  # GJ = EI / (1 + nu)
+        return in_section / bending[..., None, None]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Equilibria along a path; leading axis m = number of rows. `solve` returns one row without that axis."""
+
+    disks: np.ndarray  # (m, N, 3) m
+    rotations: np.ndarray  # (m, N, 3, 3) section frame to base frame
+    markers: np.ndarray  # (m, N, 3) m
+    path_length: np.ndarray  # (m, T) m, base hole to tip hole
+    displacement: np.ndarray  # (m, T) m, path length of the straight robot minus path length
+    tension: np.ndarray  # (m, N, T) N, of every segment, base to tip
+    curvature: np.ndarray  # (m, N, G, 3) 1/m at the Gauss nodes
+    moment: np.ndarray  # (m, N, G, 3) N m carried by the rod, base frame
+
+    def __getitem__(self, row: int | slice) -> Shape:
+        return Shape(**{name: value[row] for name, value in vars(self).items()})
+
+
+def straight_lengths(rod: Rod) -> np.ndarray:
+    """Tendon path lengths (T,) of the straight robot."""
+    hole = rod.holes()
+    hole[:, :, 2] = np.concatenate([[0.0], np.cumsum(rod.pitch)])[:, None]
+    return np.linalg.norm(np.diff(hole, axis=0), axis=-1).sum(axis=0)
+
+
+def follow(
+    rod: Rod,
+    drive: ArrayLike,  # (n, T) base tension in N; with by_length the tendon's free length minus its straight length, m
+    *,
+    gravity: ArrayLike = (0.0, 0.0, 9.81),
+    payload: float = 0.0,
+    tip_force: ArrayLike = (0.0, 0.0, 0.0),
+    weight: ArrayLike | None = None,  # (n,) factor on gravity and tip force; 1
+    softness: ArrayLike | None = None,  # (n,) factor on the compliance; 1
+    dt: ArrayLike | None = None,  # (n,) s taken to reach each row; 0
+    mu: float = 0.0,
+    stroke: float = 1e-4,  # m, mean slip before a hole slides
+    creep: Creep | None = None,  # its `delayed` state goes on from where it was
+    fields: np.ndarray = NO_FIELDS,
+    share: ArrayLike | None = None,  # (N, T) tension of a segment over the base tension, on top of friction
+    by_length: bool = False,
+    stretch: float = 0.0,  # m/N, elasticity of a tendon between motor and tip
+    keep: ArrayLike | None = None,  # (n,) rows to return; all
+    nodes: int = 3,
+) -> Shape:
+    """Equilibria along a quasi-static path that starts from the unloaded robot at rest.
+
+    Friction remembers the path, so take steps of 0.25 N or less where mu > 0. Raises NoEquilibrium.
+    """
+    drive = np.array(drive, float)
+    n, T = drive.shape
+    N = len(rod.pitch)
+    g = np.asarray(gravity, float)
+    disk_force = rod.disk_mass[:, None] * g
+    disk_force[-1] += payload * g + np.asarray(tip_force, float)
+    if by_length:
+        drive = drive + straight_lengths(rod)
+    kept = np.ones(n, bool) if keep is None else np.asarray(keep, bool)
+    m = int(kept.sum())
+    record = Record(
+        kept, np.zeros((m, N + 1, 3)), np.zeros((m, N + 1, 3, 3)), np.zeros((m, T)), np.zeros((m, N, T)),
+        np.zeros((m, N, nodes, 3)), np.zeros((m, N, nodes, 3)),
+    )  # fmt: skip
+    rest = np.repeat(rod.precurvature[:, None, :], nodes, axis=1)
+    body = Body(np.array(rod.pitch, float), rod.compliance(nodes), rest, rod.holes())
+    ones = np.ones((N, T)) if share is None else np.array(share, float)
+    load = Load(
+        disk_force, rod.backbone_mass / rod.length * g, np.array(fields, float), np.zeros(T), ones, np.zeros(T),
+        np.full(T, float(stretch)), by_length,
+    )  # fmt: skip
+    friction = Friction(float(mu), stroke * IWAN_SPREAD, np.zeros((N - 1, T, len(IWAN_SPREAD))), np.zeros((N - 1, T)))
+    if creep is None:
+        creep = no_creep(N, nodes)
+    path = Path(drive, _series(weight, n, 1.0), _series(softness, n, 1.0), _series(dt, n, 0.0))
+    failed = march(gauss_mesh(nodes), body, load, friction, creep, path, record)
+    if failed >= 0:
+        raise NoEquilibrium(f"row {failed} of {n}: no balance at drive {drive[failed]}, payload {payload} kg")
+    disks, rotations = record.disk_r[:, 1:], record.disk_R[:, 1:]
+    markers = disks + rod.marker_offset[:, None] * rotations[..., 2]
+    slack = straight_lengths(rod) - record.length
+    return Shape(disks, rotations, markers, record.length, slack, record.tension, record.curvature, record.moment)
+
+
+def no_creep(disks: int, nodes: int) -> Creep:
+    return Creep(np.zeros(0), np.zeros(0), np.zeros((0, disks, nodes, 3)), np.zeros((disks, nodes, 3)))
+
+
+def _series(value: ArrayLike | None, n: int, default: float) -> np.ndarray:
+    return np.full(n, default) if value is None else np.array(np.broadcast_to(np.asarray(value, float), n))
+
+
+def solve(
+    rod: Rod,
+    tension: ArrayLike = (0.0, 0.0, 0.0),  # (T,) N at the base, or (N, T) of every segment
+    *,
+    gravity: ArrayLike = (0.0, 0.0, 9.81),
+    payload: float = 0.0,
+    tip_force: ArrayLike = (0.0, 0.0, 0.0),
+    fields: np.ndarray = NO_FIELDS,
+    nodes: int = 3,
+) -> Shape:
+    """One frictionless equilibrium, reached from the unloaded robot in proportional steps; see `follow` for paths."""
+    tension = np.asarray(tension, float)
+    base, share = tension, None
+    if tension.ndim == 2:
+        base = np.where(tension[0] > 0, tension[0], 1.0)
+        share = tension / base
+    steps = max(1, int(np.ceil(2 * np.abs(base).max())))
+    weight = np.arange(1, steps + 1) / steps
+    keep = np.arange(steps) == steps - 1
+    shape = follow(
+        rod, weight[:, None] * base, gravity=gravity, payload=payload, tip_force=tip_force, weight=weight,
+        fields=fields, share=share, keep=keep, nodes=nodes,
+    )  # fmt: skip
+    return shape[0]
