@@ -31,5 +31,5 @@ class BaseTilt(Effect):
     moves_with = "payload"
 
     def surround(self, loads: Loads) -> Loads:
-        turn = Rotation.from_rotvec([self[a] for a in ABOUT])
-        return replace(loads, gravity=turn.apply(loads.gravity))
+        turn = Rotation.from_rotvec([self[a] for a in ABOUT]).as_matrix()
+        return replace(loads, gravity=turn @ loads.gravity)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -21,13 +21,16 @@ __all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Path"
 
 @dataclass(frozen=True)
 class Path:
-    """The equilibria of one trial: markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad, status (n,), `started`."""
+    """The equilibria of one trial: markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad, status (n,), `started`;
+    slip states and distal tendon lengths (n_tendon, n_disk) at its end."""
 
     markers: np.ndarray
     path: np.ndarray
     q: np.ndarray
     status: np.ndarray
     started: int
+    slip: np.ndarray
+    distal: np.ndarray
     LU: np.ndarray = field(repr=False)  # (n, nv, nv), or empty
 
     @property
@@ -89,6 +92,8 @@ class Equilibrium:
             q=np.empty((n, nv)),
             status=np.empty(n, np.int64),
             started=0,
+            slip=np.zeros((nt, self.chain.disk.size)),
+            distal=np.zeros((nt, self.chain.disk.size)),
             LU=np.empty((n, nv, nv) if keep else (0, nv, nv)),
         )
         started = run(
@@ -96,21 +101,23 @@ class Equilibrium:
             self.data._address,
             self.chain,
             self.spring,
-            Law(float(route.mu), float(route.presliding), np.asarray(loads.wall, float)),
-            Load(np.asarray(loads.gravity, float), float(loads.payload), np.asarray(loads.force, float)),
+            Law(float(route.mu), float(route.presliding), np.array(loads.wall, float)),
+            Load(np.array(loads.gravity, float), float(loads.payload), np.array(loads.force, float)),
             amplitude,
             retardation,
             delayed,
-            np.ascontiguousarray(time, float),
-            np.ascontiguousarray(np.maximum(tension, 0.0), float),
+            np.array(time, float),
+            np.maximum(tension, 0.0, order="C"),
             near.q if near is not None else np.empty((0, nv)),
             near.LU if near is not None else np.empty((0, nv, nv)),
             float(tolerance),
             keep,
+            out.slip,
+            out.distal,
             out.LU,
             out.q,
             out.markers,
             out.path,
             out.status,
         )
-        return Path(out.markers, out.path, out.q, out.status, int(started), out.LU)
+        return replace(out, started=int(started))

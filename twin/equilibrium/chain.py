@@ -53,7 +53,7 @@ class Load(NamedTuple):
 
 
 @jit
-def _lever(axis, point, anchor):
+def lever(axis, point, anchor):
     """Velocity of `point` for unit speed of a hinge at `anchor`."""
     return cross(axis, (point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2]))
 
@@ -88,7 +88,7 @@ def _weight_and_springs(q, rest, chain, load, r, J, tangent):
 
 
 @jit
-def _wall(chain, wall, r, J, tangent):
+def wall_force(chain, wall, r, J, tangent):
     """Penalty force k max(0, -gap) along the wall's normal at each disk centre."""
     normal, stiffness = wall[:3], wall[4]
     for k in range(chain.disk.shape[0]):
@@ -100,7 +100,7 @@ def _wall(chain, wall, r, J, tangent):
         n = chain.first[k + 1]
         X = np.empty((n, 3))
         for i in range(n):
-            X[i] = _lever(chain.axis[i], x, chain.anchor[i])
+            X[i] = lever(chain.axis[i], x, chain.anchor[i])
             r[i] -= f * dot(normal, X[i])
         if tangent:
             for j in range(n):
@@ -123,7 +123,7 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J, tangent):
     nv = q.shape[0]
     _weight_and_springs(q, rest, chain, load, r, J, tangent)
     if law.wall[4] > 0.0:
-        _wall(chain, law.wall, r, J, tangent)
+        wall_force(chain, law.wall, r, J, tangent)
     u = np.empty((nd, 3))
     length = np.empty(nd)
     theta = np.empty(nd)
@@ -138,7 +138,7 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J, tangent):
             length[d] = np.sqrt(dot(v, v))
             u[d] = (v[0] / length[d], v[1] / length[d], v[2] / length[d])
             for i in range(chain.first[d], chain.first[d + 1]):
-                X[i] = _lever(chain.axis[i], b, chain.anchor[i])
+                X[i] = lever(chain.axis[i], b, chain.anchor[i])
                 dl[i] = dot(u[d], X[i])
         distal = 0.0
         for d in range(nd - 1, -1, -1):

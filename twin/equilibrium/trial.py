@@ -28,15 +28,15 @@ def creep(delayed, instant, amplitude, time, dt):
 
 @jit
 def run(
-    model, data, chain, spring, law, load, amplitude, retardation, delayed, time, tension, guess, guess_LU, tol, keep, LUs, q_out,
-    marker, path, status,
+    model, data, chain, spring, law, load, amplitude, retardation, delayed, time, tension, guess, guess_LU, tol, keep, z, s, LUs,
+    q_out, marker, path, status,
 ):  # fmt: skip
     """Solve a whole trial.
 
     `spring` (nv,) rest angles; `delayed` (n_element, nv) creep strains, advanced in place; `time` (n,), `tension` (n, n_tendon).
     `guess` (n, nv) and `guess_LU` (n, nv, nv), empty or from a neighbouring solution, replace extrapolation as first guess.
     With `keep` a tangent factorised at each solution goes to LUs (n, nv, nv).
-    Out: angles q_out (n, nv), markers (n, n_marker, 3), path lengths (n, n_tendon), status (n,) as `solve` returns it.
+    Out: slip states z and distal lengths s (n_tendon, n_disk) at the end, angles q_out (n, nv), markers (n, n_marker, 3), path lengths (n, n_tendon), status (n,) as `solve` returns it.
     Returns the status of the start: 1, or 2 where the loaded robot has no stable equilibrium near straight.
     """
     n, nv, nt = tension.shape[0], spring.size, tension.shape[1]
@@ -44,7 +44,7 @@ def run(
     for m in range(amplitude.size):
         q += delayed[m]
     rest = q.copy()
-    z, s = np.zeros((nt, chain.hole.shape[1] - 1)), np.zeros((nt, chain.hole.shape[1] - 1))
+    z[:] = 0.0
     LU, fresh, T = np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt)
     r, z1, s1 = np.empty(nv), np.empty_like(z), np.empty_like(s)
     place(model, data, chain, q)

@@ -61,7 +61,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
         spec=spec,
         joints=tuple(joints),
         tendons=tuple(tuple(s) for s in tendons),
-        markers={f"disk_{k}": f"disk_{k}" for k in range(1, n_disk + 1)},
+        markers={**{f"disk_{k}": f"disk_{k}" for k in range(1, n_disk + 1)}, "tip": f"disk_{n_disk}"},
         disks=tuple(f"disk_{k}_centre" for k in range(1, n_disk + 1)),
         tip=f"disk_{n_disk}_centre",
         length=length,

@@ -1,0 +1,158 @@
+"""What prediction needs of a recording, taken out once: driving inputs, loads and clocks per trial, measured outputs as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.effects import Loads
+from twin.errors import DataError
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import Robot
+
+ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """One trial as the twin is driven: time and clock (n,) s, reported tension (n, n_tendon) N, temperature (n,) K, its loads."""
+
+    name: str
+    time: np.ndarray
+    clock: np.ndarray
+    tension: np.ndarray
+    temperature: np.ndarray
+    loads: Loads
+
+
+@dataclass(frozen=True)
+class Output:
+    """One output channel the robot can predict: where it stands in a trial's signals."""
+
+    channel: Channel
+    group: str  # "marker" or "displacement"
+    index: int  # marker or tendon, from 0
+    axis: int  # 0, 1, 2 for x, y, z; 0 for a scalar
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A recording prepared for a robot. `measured[k]` is (n_k, n_output), NaN where missing; trials are in order of their clock."""
+
+    recording: Recording
+    robot: Robot
+    inputs: tuple[Inputs, ...]
+    outputs: tuple[Output, ...]
+    measured: tuple[np.ndarray, ...]
+    notices: tuple[str, ...]
+
+    @property
+    def n_tendon(self) -> int:
+        return int(self.robot.structure["tendons"])  # type: ignore[call-overload]
+
+    @property
+    def n_sample(self) -> int:
+        return sum(len(i.time) for i in self.inputs)
+
+
+def prepare(recording: Recording, robot: Robot) -> Bench:
+    """The bench of a recording. Raises DataError where the inputs do not determine the robot, or no output is predictable."""
+    notices = list(recording.notices)
+    n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
+    drives = {c.index: c for c in recording.inputs() if c.kind == "tendon_tension"}
+    missing = [f"tendon_{i}_tension" for i in range(1, n_tendon + 1) if i not in drives]
+    if missing:
+        raise DataError(
+            f"{_where(recording)}: the inputs do not determine robot {robot.name!r}: no input channel {', '.join(missing)}; "
+            f"give all {n_tendon} tensions the role 'input'"
+        )
+    notices += [
+        f"input {c.name} does not drive robot {robot.name!r} and is not used"
+        for c in recording.inputs()
+        if c.kind != "tendon_tension"
+    ]
+    outputs, unknown = _outputs(recording, robot, n_tendon)
+    if not outputs:
+        raise DataError(f"{_where(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
+    notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
+    clocks, note = _clocks(recording)
+    notices += note
+    order = np.argsort([c[0] for c in clocks], kind="stable")
+    inputs, measured = [], []
+    for k in order:
+        trial = recording.trials[k]
+        tension, note = _tensions(trial, [drives[i].name for i in range(1, n_tendon + 1)])
+        notices += note
+        notices += [f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in trial.other]
+        inputs.append(
+            Inputs(trial.name, trial.time, clocks[k], tension, _temperature(recording, trial), _loads(recording, trial, robot))
+        )
+        measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
+    return Bench(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices))
+
+
+def _where(recording: Recording) -> str:
+    return str(recording.folder / "measurements.toml") if recording.folder else recording.title
+
+
+def _outputs(recording: Recording, robot: Robot, n_tendon: int) -> tuple[tuple[Output, ...], list[str]]:
+    markers = list(robot.build().markers)
+    found, unknown = [], []
+    for channel in recording.outputs():
+        name = channel.name.rpartition("_")[0]
+        if channel.axis is not None and name in markers:
+            found.append(Output(channel, "marker", markers.index(name), "xyz".index(channel.axis)))
+        elif channel.kind == "tendon_displacement" and channel.index is not None and channel.index <= n_tendon:
+            found.append(Output(channel, "displacement", channel.index - 1, 0))
+        else:
+            unknown.append(channel.name)
+    return tuple(found), unknown
+
+
+def _clocks(recording: Recording) -> tuple[list[np.ndarray], list[str]]:
+    starts = [t.start for t in recording.trials]
+    if all(s is not None for s in starts):
+        return [s + t.time - t.time[0] for s, t in zip(starts, recording.trials, strict=True) if s is not None], []
+    clocks, now = [], 0.0
+    for trial in recording.trials:
+        now = trial.start if trial.start is not None else now
+        clocks.append(now + trial.time - trial.time[0])
+        now = float(clocks[-1][-1])
+    return clocks, ["some trials have no `start`: they are taken to follow each other without a pause, which blurs drift and creep"]
+
+
+def _tensions(trial: Trial, names: list[str]) -> tuple[np.ndarray, list[str]]:
+    """The driving tensions; a gap is bridged linearly, because the robot was pulled there too, and said so."""
+    columns, notes = [], []
+    for name in names:
+        values = trial.values[name]
+        known = np.isfinite(values)
+        if not known.any():
+            raise DataError(f"{trial.name}: input {name} is empty in this trial; remove the trial or log the channel")
+        if not known.all():
+            notes.append(
+                f"{trial.name}: {int((~known).sum())} missing values of input {name}; the twin is driven by a straight line there"
+            )
+            values = np.interp(trial.time, trial.time[known], values[known])
+        columns.append(values)
+    return np.stack(columns, axis=1), notes
+
+
+def _temperature(recording: Recording, trial: Trial) -> np.ndarray:
+    for channel in recording.channels:
+        if channel.kind == "ambient_temperature":
+            values = trial.values[channel.name]
+            known = np.isfinite(values)
+            if known.any():
+                return np.interp(trial.time, trial.time[known], values[known])
+    return np.full(len(trial.time), float(trial.conditions.get("ambient_temperature", ROOM)))
+
+
+def _loads(recording: Recording, trial: Trial, robot: Robot) -> Loads:
+    gravity = trial.conditions.get("gravity", recording.gravity if recording.gravity is not None else robot.gravity)
+    return Loads(
+        gravity=np.asarray(gravity, float),
+        payload=float(trial.conditions.get("tip_payload", 0.0)),
+        force=np.asarray(trial.conditions.get("tip_force", np.zeros(3)), float),
+    )

@@ -1,0 +1,251 @@
+"""The robot's own uncertain parameters, and those of effects in force, fitted to the trials set aside for fitting.
+
+Minimises  sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2  over x, the parameters in units of their `step`, within bounds:
+Gauss-Newton (SciPy's trust region) on derivatives by finite differences. A difference costs a fraction of a prediction, because a
+changed twin is solved from the equilibria and tangents of the unchanged one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from joblib import Parallel, delayed
+from scipy.optimize import least_squares
+
+from twin.bench import Bench
+from twin.effects import Effect, named
+from twin.errors import SolveError
+from twin.quantities import Fitted, Parameter
+from twin.residual import Whitener
+from twin.robots import Robot
+from twin.twin import Trace, Twin, readings, report, simulate
+
+NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
+UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
+
+
+@dataclass(frozen=True)
+class Free:
+    """One parameter a fit may move: of the robot (`effect` None) or of an effect."""
+
+    effect: str | None
+    parameter: Parameter
+
+    @property
+    def label(self) -> str:
+        return self.parameter.name if self.effect is None else f"{self.effect}.{self.parameter.name}"
+
+
+@dataclass(frozen=True)
+class Model:
+    """A twin and which of its parameters are free."""
+
+    twin: Twin
+    free: tuple[Free, ...]
+
+    @staticmethod
+    def base(robot: Robot, twin: Twin | None = None) -> Model:
+        """The robot as described with its nuisance parameters free."""
+        return Model(twin or Twin.of(robot), tuple(Free(None, p) for p in robot.nuisance))
+
+    def value(self, free: Free) -> float:
+        if free.effect is None:
+            return float(self.twin.values.get(free.parameter.name, free.parameter.value))
+        return next(e for e in self.twin.effects if e.id == free.effect)[free.parameter.name]
+
+    def vector(self) -> np.ndarray:
+        """Free parameters (n_free,) in units of their steps."""
+        return np.array([self.value(f) / f.parameter.step for f in self.free])
+
+    def at(self, x: np.ndarray) -> Model:
+        """The same model with its free parameters at x (in steps)."""
+        values = dict(self.twin.values)
+        effects: dict[str, dict[str, float]] = {e.id: dict(e.values) for e in self.twin.effects}
+        for f, v in zip(self.free, x, strict=True):
+            target = values if f.effect is None else effects[f.effect]
+            target[f.parameter.name] = float(np.clip(v * f.parameter.step, f.parameter.low, f.parameter.high))
+        built = tuple(type(e)(effects[e.id], e.n_tendon) for e in self.twin.effects)
+        return Model(replace(self.twin, values=values, effects=built), self.free)
+
+    def with_effect(self, identifier: str, values: Mapping[str, float], names: Sequence[str], n_tendon: int) -> Model:
+        """This model plus an effect, its named parameters free."""
+        law = named(identifier)
+        table = {p.name: p for p in law.declared(n_tendon)}
+        effects = (*self.twin.effects, law(values, n_tendon))
+        return Model(replace(self.twin, effects=effects), (*self.free, *(Free(identifier, table[n]) for n in names)))
+
+    def without_effect(self, identifier: str) -> Model:
+        effects = tuple(e for e in self.twin.effects if e.id != identifier)
+        return Model(replace(self.twin, effects=effects), tuple(f for f in self.free if f.effect != identifier))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A model's prediction of the fitted trials: traces, raw residuals (n_k, n_output) SI, whitened residual flat (n,)."""
+
+    model: Model
+    traces: list[Trace]
+    raw: list[np.ndarray]
+    z: np.ndarray
+
+
+class Objective:
+    """Residuals and derivatives of models on the listed trials of a bench, white under `whitener`."""
+
+    def __init__(self, bench: Bench, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
+        self.bench, self.trials, self.whitener, self.jobs = bench, list(trials), whitener, jobs
+        self.n = int(sum(np.isfinite(bench.measured[k]).sum() for k in trials))
+
+    def predict(self, twin: Twin, near: list[Trace] | None = None, keep: bool = False) -> tuple[list[Trace], list[np.ndarray]]:
+        traces = simulate(twin, self.bench, trials=self.trials, near=near, keep=keep)
+        own = traces[-len(self.trials) :] if len(traces) == len(self.trials) else [traces[k] for k in self.trials]
+        return traces, [readings(self.bench, report(twin.effects, t.true)) for t in own]
+
+    def evaluate(self, model: Model, near: list[Trace] | None = None) -> Evaluation:
+        traces, predicted = self.predict(model.twin, near, keep=True)
+        raw = [self.bench.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]
+        return Evaluation(model, traces, raw, self.white(raw))
+
+    def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
+
+    def columns(self, at: Evaluation, models: Sequence[tuple[Model, float]]) -> np.ndarray:
+        """White change of the residual per unit, (n, n_model), for neighbouring models and the size of their difference."""
+
+        def column(model: Model, size: float) -> np.ndarray:
+            if _same_simulation(at.model.twin, model.twin):
+                own = at.traces if len(at.traces) == len(self.trials) else [at.traces[k] for k in self.trials]
+                predicted = [readings(self.bench, report(model.twin.effects, t.true)) for t in own]
+            else:
+                predicted = self.predict(model.twin, at.traces)[1]
+            raw = [self.bench.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]
+            return self.white(raw) / size
+
+        with Parallel(n_jobs=self.jobs, backend="threading") as parallel:
+            done = parallel(delayed(column)(m, s) for m, s in models)
+        return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
+
+    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
+        """dz/dx (n, len(which)) for the listed free parameters, x in steps."""
+        x = at.model.vector()
+        neighbours = []
+        for i in which:
+            p = at.model.free[i].parameter
+            size = NUDGE if (x[i] + NUDGE) * p.step <= p.high else -NUDGE
+            moved = x.copy()
+            moved[i] += size
+            neighbours.append((at.model.at(moved), size))
+        return self.columns(at, neighbours)
+
+
+def _same_simulation(a: Twin, b: Twin) -> bool:
+    """Whether two twins differ in what sensors report of outputs only, so that one simulation serves both."""
+    physical = ("command", "drive", "edit", "surround", "route", "deform")
+
+    def acting(t: Twin) -> list[Effect]:
+        return [e for e in t.effects if e.acts_in(*physical)]
+
+    return a.values == b.values and acting(a) == acting(b)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model. `J` (n, n_free) whitened derivatives at the solution, x in steps; `cost` = |z|^2 + prior terms."""
+
+    evaluation: Evaluation
+    J: np.ndarray
+    cost: float
+
+    @property
+    def model(self) -> Model:
+        return self.evaluation.model
+
+    @property
+    def z(self) -> np.ndarray:
+        return self.evaluation.z
+
+    def information(self) -> np.ndarray:
+        """Posterior information (n_free, n_free) in steps: J'J plus that of the priors."""
+        return self.J.T @ self.J + np.diag(prior_weight(self.model) ** 2)
+
+    def std(self) -> np.ndarray:
+        """Standard errors (n_free,) in SI, widened where the residual is larger than the noise it was divided by."""
+        inflation = max(1.0, float(self.z @ self.z) / max(self.z.size - len(self.model.free), 1))
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information())), 0.0) * inflation)
+        return spread * np.array([f.parameter.step for f in self.model.free])
+
+    def effective_parameters(self) -> float:
+        """How many parameters the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
+        data = self.J.T @ self.J
+        return float(np.trace(np.linalg.solve(self.information() + 1e-12 * np.eye(len(data)), data)))
+
+    def fitted(self, effect: str | None) -> dict[str, Fitted]:
+        """Values and standard errors of the robot's (None) or an effect's free parameters."""
+        return {
+            f.parameter.name: Fitted(self.model.value(f), float(s), f.parameter.unit)
+            for f, s in zip(self.model.free, self.std(), strict=True)
+            if f.effect == effect
+        }
+
+    def unfixed(self) -> list[str]:
+        """Labels of the parameters the data do not fix: their standard error stays near their prior's."""
+        out = []
+        for f, s in zip(self.model.free, self.std(), strict=True):
+            if f.parameter.std is not None and s > UNFIXED * f.parameter.std:
+                out.append(f.label)
+        return out
+
+
+def prior_weight(model: Model) -> np.ndarray:
+    """1 / std in steps, zero where nothing is believed beforehand."""
+    return np.array([0.0 if f.parameter.std is None else f.parameter.step / f.parameter.std for f in model.free])
+
+
+def fit(
+    objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, evaluations: int = 12,
+    tolerance: float = 1e-5,
+) -> Fit:  # fmt: skip
+    """Fit a model's free parameters.
+
+    With `J`, whitened derivatives (n, m) for the first m free parameters from a neighbouring fit, those columns are kept and
+    only the rest is differentiated anew: enough to rank effects, at a fraction of the cost.
+    Raises SolveError where the model cannot be solved at its start.
+    """
+    frozen = 0 if J is None else J.shape[1]
+    prior = np.array([f.parameter.value / f.parameter.step for f in model.free])
+    weight = prior_weight(model)
+    active = np.flatnonzero(weight)
+    state = {"at": objective.evaluate(model, near.traces if near else None), "J": np.zeros((0, 0))}
+
+    def at(x: np.ndarray) -> Evaluation | None:
+        if not np.allclose(x, state["at"].model.vector(), rtol=0, atol=1e-12):
+            try:
+                state["at"] = objective.evaluate(model.at(x), state["at"].traces)
+            except SolveError:
+                return None
+        return state["at"]
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        found = at(x)
+        z = found.z if found is not None else np.full(state["at"].z.size, 1e3)
+        return np.concatenate([z, (weight * (x - prior))[active]])
+
+    def derivative(x: np.ndarray) -> np.ndarray:
+        found = at(x)
+        assert found is not None  # SciPy differentiates at accepted points only
+        new = objective.jacobian(found, range(frozen, len(model.free)))
+        state["J"] = np.concatenate([J, new], axis=1) if J is not None else new
+        return np.concatenate([state["J"], np.diag(weight)[active]])
+
+    steps = np.array([f.parameter.step for f in model.free])
+    low = np.array([f.parameter.low for f in model.free]) / steps
+    high = np.array([f.parameter.high for f in model.free]) / steps
+    x0 = np.clip(model.vector(), low + 1e-9, high - 1e-9)
+    found = least_squares(
+        residual, x0, derivative, bounds=(low, high), method="trf", x_scale=1.0, ftol=tolerance, xtol=1e-4, gtol=1e-8, max_nfev=evaluations
+    )  # fmt: skip
+    final = at(found.x)
+    assert final is not None
+    return Fit(final, state["J"], float(2 * found.cost))

@@ -1,0 +1,219 @@
+"""How well a model explains the data when the alternative is "some smooth error nobody has named".
+
+The whitened residual of each channel is modelled as z ~ N(0, I + Phi D Phi'), Phi the regressors below (unit RMS, one block a
+component: static, direction, rate, memory, slow, trial) and D their variances, one a component and group of channels. The
+variances are found by maximising the likelihood (MacKay's fixed point). Kennedy and O'Hagan's discrepancy, as variance components.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bench import Bench, Inputs
+
+COMPONENTS = ("static", "direction", "rate", "memory", "slow", "trial")
+IN_WORDS = {
+    "static": "the pose (tensions and payload)",
+    "direction": "the direction of pull",
+    "rate": "the rate of pull",
+    "memory": "the recent past (2-30 s)",
+    "slow": "time or temperature over the session",
+    "trial": "the trial as a whole",
+}
+MEMORY = (2.0, 8.0, 30.0)  # s
+ROUNDS = 60
+
+
+@dataclass(frozen=True)
+class Regressors:
+    """Phi (n, p), the component of each column (p,), and names for reports."""
+
+    matrix: np.ndarray
+    component: np.ndarray
+    names: tuple[str, ...]
+
+
+def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
+    """What an unnamed error could move with, on the listed trials' samples (n, p)."""
+    inputs = [bench.inputs[k] for k in trials]
+    span = max(max(float(i.tension.max()) for i in inputs), 1e-6)
+    u = [i.tension / span for i in inputs]
+    slopes = [_slope(i, w) for i, w in zip(inputs, u, strict=True)]
+    typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
+    U, dU = np.concatenate(u), np.concatenate(slopes)
+    payload = np.concatenate([np.full(len(i.time), i.loads.payload) for i in inputs])
+    clock = np.concatenate([i.clock for i in inputs])
+    t = (clock - clock.mean()) / max(np.ptp(clock), 1e-9) * 2.0
+    warm = np.concatenate([i.temperature for i in inputs])
+    warm = (warm - warm.mean()) / max(float(warm.std()), 0.5)
+    n_tendon = U.shape[1]
+    blocks: dict[str, list[tuple[str, np.ndarray]]] = {c: [] for c in COMPONENTS}
+    T = [f"T{i + 1}" for i in range(n_tendon)]
+    static = blocks["static"]
+    static.append(("1", np.ones(len(U))))
+    for a in range(n_tendon):
+        static.append((T[a], U[:, a]))
+        for b in range(a, n_tendon):
+            static.append((f"{T[a]} {T[b]}", U[:, a] * U[:, b]))
+            static += [(f"{T[a]} {T[b]} {T[c]}", U[:, a] * U[:, b] * U[:, c]) for c in range(b, n_tendon)]
+    if np.ptp(payload) > 0:
+        m = payload / payload.max()
+        static += [("payload", m), *((f"payload {T[a]}", m * U[:, a]) for a in range(n_tendon))]
+    for a in range(n_tendon):
+        sign = np.tanh(dU[:, a] / typical)
+        blocks["direction"] += [(f"direction of {T[a]}", sign), (f"direction of {T[a]} x {T[a]}", sign * U[:, a])]
+        blocks["rate"] += [(f"rate of {T[a]}", dU[:, a]), (f"rate of {T[a]} x {T[a]}", dU[:, a] * U[:, a])]
+        for tau in MEMORY:
+            past = np.concatenate([_lagged(i.time, w[:, a], tau) for i, w in zip(inputs, u, strict=True)])
+            blocks["memory"].append((f"{T[a]} over the last {tau:g} s", U[:, a] - past))
+        blocks["slow"] += [(f"time x {T[a]}", t * U[:, a]), (f"temperature x {T[a]}", warm * U[:, a])]
+    blocks["slow"] += [("time", t), ("time^2", t**2), ("time^3", t**3), ("temperature", warm)]
+    which = np.repeat(np.arange(len(inputs)), [len(i.time) for i in inputs])
+    if len(inputs) > 2:
+        blocks["trial"] += [(f"trial {bench.inputs[k].name}", (which == j).astype(float)) for j, k in enumerate(trials)]
+    columns, component, names = [], [], []
+    for c, name in enumerate(COMPONENTS):
+        for label, column in blocks[name]:
+            size = np.sqrt(np.mean(column**2))
+            if size > 1e-9:
+                columns.append(column / size)
+                component.append(c)
+                names.append(label)
+    return Regressors(np.stack(columns, axis=1), np.array(component), tuple(names))
+
+
+def _slope(inputs: Inputs, u: np.ndarray) -> np.ndarray:
+    """du/dt (n, n_tendon) of tensions smoothed over three samples, so that noise alone makes no direction."""
+    padded = np.pad(u, ((1, 1), (0, 0)), mode="edge")
+    smooth = (padded[:-2] + padded[1:-1] + padded[2:]) / 3.0
+    return np.gradient(smooth, inputs.time, axis=0) if len(u) > 1 else np.zeros_like(u)
+
+
+def _lagged(time: np.ndarray, u: np.ndarray, tau: float) -> np.ndarray:
+    """First-order low-pass of u with time constant tau (s), at rest at the start."""
+    out = np.empty_like(u)
+    out[0] = u[0]
+    for i, keep in enumerate(np.exp(-np.diff(time) / tau), 1):
+        out[i] = keep * out[i - 1] + (1.0 - keep) * u[i]
+    return out
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """The smooth error left in a residual.
+
+    `gain` = 2 (log N(z; 0, I + Phi D Phi') - log N(z; 0, I)); `mean` (n, m) its posterior mean in sigmas; `variance`
+    (n_group, n_component); `coefficients` (p, m).
+    """
+
+    gain: float
+    mean: np.ndarray
+    variance: np.ndarray
+    coefficients: np.ndarray
+
+    @property
+    def size(self) -> float:
+        """Root-mean-square of the posterior mean, in sigmas."""
+        return float(np.sqrt(np.mean(self.mean**2)))
+
+
+class Evidence:
+    """Discrepancy of whitened residuals on fixed trials; everything that does not depend on the residual is made once."""
+
+    def __init__(self, bench: Bench, trials: Sequence[int]) -> None:
+        self.phi = regressors(bench, trials)
+        groups = list(dict.fromkeys(o.group for o in bench.outputs))
+        self.groups = groups
+        self.member = np.array([groups.index(o.group) for o in bench.outputs])
+        present = np.isfinite(np.concatenate([bench.measured[k] for k in trials]))
+        self.present = present
+        self.gram = np.stack([self.phi.matrix.T @ (self.phi.matrix * present[:, [j]]) for j in range(present.shape[1])])
+
+    def discrepancy(self, z: np.ndarray) -> Discrepancy:
+        """The most likely discrepancy of z (n * m,) or (n, m)."""
+        Z = z.reshape(self.present.shape)
+        n_group, n_component = len(self.groups), len(COMPONENTS)
+        variance = np.full((n_group, n_component), 1e-2)
+        b = (self.phi.matrix.T @ Z).T  # (m, p)
+        component = self.phi.component
+        for _ in range(ROUNDS):
+            D = variance[self.member][:, component]  # (m, p)
+            covariance = np.linalg.inv(self.gram + _diagonal(1.0 / D))
+            mean = np.einsum("mpq,mq->mp", covariance, b)
+            explained = mean**2
+            determined = 1.0 - np.einsum("mpp->mp", covariance) / D
+            new = np.empty_like(variance)
+            for g in range(n_group):
+                rows = self.member == g
+                for c in range(n_component):
+                    block = np.ix_(rows, component == c)
+                    new[g, c] = explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else 1e-8
+            new = np.clip(new, 1e-8, 1e4)
+            settled = np.abs(np.log(new / variance)).max() < 0.05
+            variance = new
+            if settled:
+                break
+        D = variance[self.member][:, component]
+        inner = np.eye(len(component)) + np.sqrt(D)[:, :, None] * self.gram * np.sqrt(D)[:, None, :]
+        scaled = np.sqrt(D) * b
+        gain = float(
+            np.einsum("mp,mp->", scaled, np.linalg.solve(inner, scaled[..., None])[..., 0]) - np.linalg.slogdet(inner)[1].sum()
+        )
+        covariance = np.linalg.inv(self.gram + _diagonal(1.0 / D))
+        coefficients = np.einsum("mpq,mq->mp", covariance, b)
+        return Discrepancy(gain, (self.phi.matrix @ coefficients.T) * self.present, variance, coefficients.T)
+
+    def whiten(self, discrepancy: Discrepancy, X: np.ndarray) -> np.ndarray:
+        """(I + Phi D Phi')^-1 X for columns X (n * m, k)."""
+        n, m = self.present.shape
+        Y = X.reshape(n, m, -1)
+        D = discrepancy.variance[self.member][:, self.phi.component]
+        inside = np.linalg.inv(self.gram + _diagonal(1.0 / D))
+        b = np.einsum("np,nmk->mpk", self.phi.matrix, Y, optimize=True)
+        c = np.einsum("mpq,mqk->mpk", inside, b, optimize=True)
+        smooth = np.einsum("np,mpk->nmk", self.phi.matrix, c, optimize=True) * self.present[:, :, None]
+        return (Y - smooth).reshape(X.shape)
+
+    def log_likelihood_gain(self, z: np.ndarray) -> tuple[float, Discrepancy]:
+        """2 max log N(z; 0, I + Phi D Phi') up to a constant, -|z|^2 + gain, and the discrepancy."""
+        found = self.discrepancy(z)
+        return found.gain - float(z.ravel() @ z.ravel()), found
+
+    def strongest(self, discrepancy: Discrepancy, count: int = 5) -> list[tuple[str, float]]:
+        """Regressors that carry most of a discrepancy: (name, RMS in sigmas)."""
+        size = np.sqrt(np.mean(discrepancy.coefficients**2, axis=1))
+        return [(self.phi.names[i], float(size[i])) for i in np.argsort(-size)[:count]]
+
+
+def _diagonal(x: np.ndarray) -> np.ndarray:
+    """Rows of x (m, p) as diagonal matrices (m, p, p)."""
+    return x[:, :, None] * np.eye(x.shape[1])
+
+
+def spectral_peak(bench: Bench, trials: Sequence[int], rest: np.ndarray) -> tuple[float, float]:
+    """The strongest line in the spectrum of what is left when the smooth error is removed: (z-score, frequency in Hz).
+
+    Periodograms of all trials and channels (n, m) are added on one absolute grid of frequencies; white noise gives each grid
+    point a chi-square with 2 (trials x channels) degrees of freedom.
+    """
+    times = [bench.inputs[k].time for k in trials]
+    fastest = 0.45 / float(np.median(np.concatenate([np.diff(t) for t in times])))
+    longest = max(float(t[-1] - t[0]) for t in times)
+    grid = np.arange(4.0 / longest, fastest, 0.5 / longest)
+    if grid.size < 4:
+        return 0.0, 0.0
+    power, count, row = np.zeros(grid.size), 0, 0
+    for t in times:
+        x = rest[row : row + len(t)]
+        row += len(t)
+        wave = np.exp(-2j * np.pi * np.outer(grid, t - t[0]))
+        used = x.std(axis=0) > 0
+        x = x[:, used] - x[:, used].mean(axis=0)
+        power += (np.abs(wave @ x) ** 2 / (len(t) * x.var(axis=0) + 1e-12)).sum(axis=1)
+        count += int(used.sum())
+    score = (power - np.median(power)) / np.sqrt(count)
+    best = int(np.argmax(score))
+    return float(score[best]), float(grid[best])

@@ -1,0 +1,133 @@
+"""Beam search over sets of effects: screen, refit, weigh by evidence, add while it pays, then drop what does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.calibrate import Fit, Model, Objective, fit
+from twin.diagnose.evidence import Discrepancy, Evidence
+from twin.diagnose.screen import screen
+from twin.effects import catalogue
+from twin.errors import SolveError
+
+ACCEPT = 12.0  # evidence an effect must bring, after k log n: odds of e^6, safe over two dozen candidates
+WIDTH = 3  # models carried from level to level
+BEHIND = 400.0  # a model this far behind the best is not extended
+DEEPEST = 3  # effects at once
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, up to a constant."""
+
+    fit: Fit
+    score: float
+    discrepancy: Discrepancy
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return tuple(sorted(e.id for e in self.fit.model.twin.effects))
+
+
+@dataclass(frozen=True)
+class Search:
+    """The base model, the best set found, and every set that was weighed (best start each), best first."""
+
+    base: Weighed
+    best: Weighed
+    all: tuple[Weighed, ...]
+
+
+def weigh(objective: Objective, evidence: Evidence, fitted: Fit) -> Weighed:
+    gain, discrepancy = evidence.log_likelihood_gain(fitted.z)
+    prior = fitted.cost - float(fitted.z @ fitted.z)
+    return Weighed(fitted, gain - prior - fitted.effective_parameters() * float(np.log(objective.n)), discrepancy)
+
+
+def search(objective: Objective, evidence: Evidence, base: Weighed, progress: Progress) -> Search:
+    """From the calibrated base to the best set of effects."""
+    known: dict[tuple[str, ...], Weighed] = {base.effects: base}
+    beam = [base]
+    for level in range(1, DEEPEST + 1):
+        best_before = max(w.score for w in known.values())
+        fresh: dict[tuple[str, ...], Weighed] = {}
+        for member in beam:
+            if member.score < best_before - BEHIND:
+                continue
+            for candidate in screen(objective, evidence, member.fit, member.discrepancy):
+                if candidate.gain < ACCEPT:
+                    continue
+                progress(f"level {level}: {' + '.join((*member.effects, candidate.effect))}")
+                found = _extended(objective, evidence, member, candidate.effect, dict(candidate.start.values), candidate.start.free)
+                if found is not None and (found.effects not in fresh or found.score > fresh[found.effects].score):
+                    fresh[found.effects] = found
+        known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
+        beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
+        if not beam or beam[0].score < best_before + ACCEPT:
+            break
+    best = max(known.values(), key=lambda w: w.score - ACCEPT * len(w.effects))
+    best = _fuller(objective, evidence, best, progress)
+    best = _leaner(objective, evidence, best, known, progress)
+    return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+
+
+def _extended(
+    objective: Objective, evidence: Evidence, member: Weighed, effect: str, values: dict[str, float], free: tuple[str, ...]
+) -> Weighed | None:
+    model = member.fit.model.with_effect(effect, values, free, objective.bench.n_tendon)
+    try:
+        found = fit(objective, model, near=member.fit.evaluation, J=member.fit.J)
+        return weigh(objective, evidence, found)
+    except SolveError:
+        return None
+
+
+def _fuller(objective: Objective, evidence: Evidence, best: Weighed, progress: Progress) -> Weighed:
+    """The fuller law of an effect (a second creep time), where the data ask for it."""
+    for effect in best.effects:
+        richer = catalogue()[effect].richer
+        if not richer:
+            continue
+        progress(f"fuller law of {effect}")
+        table = {p.name: p for p in catalogue()[effect].declared(objective.bench.n_tendon)}
+        current = next(e for e in best.fit.model.twin.effects if e.id == effect)
+        values = {**current.values, **{n: table[n].value + (0.0 if n in current.shape else table[n].step) for n in richer}}
+        free = tuple(f.parameter.name for f in best.fit.model.free if f.effect == effect) + richer
+        bare = best.fit.model.without_effect(effect)
+        try:
+            found = weigh(objective, evidence, fit(objective, bare.with_effect(effect, values, free, objective.bench.n_tendon)))
+        except SolveError:
+            continue
+        if found.score > best.score + ACCEPT:
+            best = found
+    return best
+
+
+def _leaner(
+    objective: Objective, evidence: Evidence, best: Weighed, known: dict[tuple[str, ...], Weighed], progress: Progress
+) -> Weighed:
+    """Drop every effect whose removal costs less than `ACCEPT`."""
+    while len(best.effects) > 1:
+        reduced = []
+        for effect in best.effects:
+            rest = tuple(e for e in best.effects if e != effect)
+            if rest not in known:
+                progress(f"without {effect}")
+                known[rest] = refit_without(objective, evidence, best, effect)
+            reduced.append(known[rest])
+        lean = max(reduced, key=lambda w: w.score)
+        if lean.score < best.score - ACCEPT:
+            break
+        best = lean
+    return best
+
+
+def refit_without(objective: Objective, evidence: Evidence, best: Weighed, effect: str) -> Weighed:
+    """The best set less one effect, everything else fitted again."""
+    model: Model = best.fit.model.without_effect(effect)
+    return weigh(objective, evidence, fit(objective, model))

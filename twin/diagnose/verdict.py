@@ -1,0 +1,379 @@
+"""The main job: from a recording to what the twin lacks, how sure that is, and the error before and after on unseen trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from twin.bench import Bench, prepare
+from twin.calibrate import Fit, Model, Objective, fit
+from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, spectral_peak
+from twin.diagnose.experiment import Experiment, next_experiment
+from twin.diagnose.search import ACCEPT, Progress, Search, Weighed, refit_without, search, weigh
+from twin.diagnose.split import split
+from twin.effects import Effect
+from twin.errors import DataError
+from twin.measurements import Recording
+from twin.quantities import Fitted
+from twin.residual import Noise, Whitener, estimate_noise
+from twin.twin import Trace, Twin, readings, report, simulate, unstable_starts
+
+MATERIAL = 0.1  # sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say
+LEFT = (
+    0.15,
+    0.3,
+    0.45,
+)  # sigma, share, sigma: left-over structure counts if above the first and this share of before, or the third
+HALF = 0.5  # effects that leave more than this share of the structure do not explain it
+LINE = 30.0  # z-score of a spectral line that counts
+TEMPER = 20.0  # odds are exp(score / 20): the likelihood takes the laws' form for exact, which makes raw odds absurd
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a diagnosis is run: seed of the split, worker threads."""
+
+    seed: int = 0
+    jobs: int = 2
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An effect in force (or a runner-up): parameters, the held-out error without it (or with it alone), its probability."""
+
+    effect: str
+    parameters: dict[str, Fitted]
+    error: float
+    probability: float
+    contribution: float = 0.0  # sigma: how far dropping it moves the fitted trials
+
+
+@dataclass(frozen=True)
+class Errors:
+    """RMS on the held-out trials, SI, by group of outputs ("marker": Euclidean per marker); confidence intervals over trials."""
+
+    nominal: dict[str, float]
+    calibrated: dict[str, float]
+    after: dict[str, float]
+    floor: dict[str, float]
+    ci_calibrated: dict[str, tuple[float, float]]
+    ci_after: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a report shows. Residuals are measured - predicted (n_k, n_output) SI, by stage, all trials in clock order."""
+
+    verdict: str
+    twin: Twin
+    calibrated: Twin
+    claims: tuple[Claim, ...]
+    runners_up: tuple[Claim, ...]
+    below_materiality: tuple[Claim, ...]
+    parameters: dict[str, Fitted]
+    unfixed: tuple[str, ...]
+    errors: Errors
+    noise: Noise
+    structure_before: float  # sigma
+    structure_after: float
+    structure: dict[str, float]  # component -> RMS in sigmas, after
+    strongest: tuple[tuple[str, float], ...]
+    line: tuple[float, float]  # z-score, Hz
+    worst_channel: str
+    description: str
+    ambiguous: tuple[tuple[str, ...], ...]
+    experiment: Experiment | None
+    bench: Bench
+    fitted_trials: tuple[int, ...]
+    held_trials: tuple[int, ...]
+    predictions: dict[str, list[np.ndarray]]
+    notices: tuple[str, ...]
+    settings: Settings
+    scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
+
+
+def diagnose(
+    recording: Recording, twin: Twin, settings: Settings | None = None, progress: Progress = lambda words: None
+) -> Diagnosis:
+    """Diagnose a recording against a twin. Raises TwinError for data that cannot be used."""
+    settings = settings or Settings()
+    bench = prepare(recording, twin.robot)
+    if len(bench.inputs) < 2:
+        raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one held out")
+    fitted, held = split(bench, settings.seed)
+    progress("nominal prediction")
+    nominal_traces = simulate(twin, bench)
+    notices = [
+        *bench.notices,
+        *(f"{n}: unstable start, its shape is one of several" for n in unstable_starts(bench, nominal_traces)),
+    ]
+    progress("noise")
+    objective, notes = _objective(bench, twin, fitted, settings)
+    notices += notes
+    evidence = Evidence(bench, fitted)
+    progress("calibration")
+    base = weigh(objective, evidence, fit(objective, Model.base(twin.robot, twin)))
+    found = search(objective, evidence, base, progress)
+    progress("verdict")
+    best, dropped, small = _gate(objective, evidence, found, bench, twin.robot.accuracy, progress)
+    before, after = base.discrepancy.size, best.discrepancy.size
+    line = spectral_peak(bench, fitted, (best.fit.z - best.discrepancy.mean.ravel()).reshape(best.discrepancy.mean.shape))
+    own = tuple(e.id for e in twin.effects)
+    added = tuple(e for e in best.effects if e not in own)
+    verdict = _verdict(added, before, after, line[0])
+    final = base if verdict in ("noise", "unexplained") else best
+    held_out = _HeldOut(bench, held)
+    claims = tuple(
+        Claim(
+            e,
+            final.fit.fitted(e),
+            held_out.rms(dropped[e].fit.model.twin),
+            _probability(found, e),
+            _contribution(final, dropped[e], objective),
+        )
+        for e in added
+        if final is best
+    )
+    runners = _runners_up(found, set() if verdict == "unexplained" else set(added), own, held_out)
+    ambiguous = _ambiguous(found, final)
+    experiment = None
+    if ambiguous or (verdict not in ("noise",) and runners):
+        rival = _rival(found, final, own)
+        if rival is not None:
+            progress("next experiment")
+            experiment = next_experiment(bench, objective.whitener.noise, final.fit, rival.fit, settings.jobs)
+    predictions = {
+        name: _predict_all(t, bench)
+        for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin), ("after", final.fit.model.twin))
+    }
+    components = _components(best)
+    worst = _worst_channel(bench, fitted, best)
+    strongest = tuple(evidence.strongest(best.discrepancy))
+    return Diagnosis(
+        verdict=verdict,
+        twin=final.fit.model.twin,
+        calibrated=base.fit.model.twin,
+        claims=tuple(sorted(claims, key=lambda c: -c.contribution)),
+        runners_up=runners,
+        below_materiality=small,
+        parameters=final.fit.fitted(None),
+        unfixed=tuple(final.fit.unfixed()),
+        errors=_errors(bench, held, predictions, objective.whitener.noise, settings.seed),
+        noise=objective.whitener.noise,
+        structure_before=before,
+        structure_after=after,
+        structure=components,
+        strongest=strongest,
+        line=line,
+        worst_channel=worst,
+        description=_describe(verdict, components, strongest, line, worst, after),
+        ambiguous=ambiguous,
+        experiment=experiment,
+        bench=bench,
+        fitted_trials=tuple(fitted),
+        held_trials=tuple(held),
+        predictions=predictions,
+        notices=tuple(notices),
+        settings=settings,
+        scores=tuple((w.effects, w.score) for w in found.all),
+    )
+
+
+def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Objective, list[str]]:
+    """Noise from a first, unweighted calibration; then the objective every later fit uses."""
+    measured = [bench.measured[k] for k in fitted]
+    rough = np.array([2.5e-4 if o.group == "marker" else 5e-5 for o in bench.outputs])
+    first = Noise(rough, 0.0, np.zeros(len(rough)), "start")
+    none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
+    objective = Objective(bench, fitted, Whitener(first, measured, none), settings.jobs)
+    start = fit(objective, Model.base(twin.robot, twin), evaluations=4, tolerance=1e-3)
+    sensitivity = _sensitivity(objective, start)
+    noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
+    return Objective(bench, fitted, Whitener(noise, measured, sensitivity), settings.jobs), notes
+
+
+def _sensitivity(objective: Objective, at: Fit) -> list[np.ndarray]:
+    """dy/dT (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each tension reading."""
+    bench, step = objective.bench, 0.02
+    out = [np.empty((*r.shape, bench.n_tendon)) for r in at.evaluation.raw]
+    for t in range(bench.n_tendon):
+        push = step * np.eye(bench.n_tendon)[t]
+        moved = replace(bench, inputs=tuple(replace(i, tension=i.tension + push) for i in bench.inputs))
+        shifted = Objective(moved, objective.trials, objective.whitener, objective.jobs).predict(
+            at.model.twin, at.evaluation.traces
+        )[1]
+        for G, k, y, r in zip(out, objective.trials, shifted, at.evaluation.raw, strict=True):
+            G[:, :, t] = np.nan_to_num((y - (bench.measured[k] - r)) / step)
+    return out
+
+
+def _gate(
+    objective: Objective, evidence: Evidence, found: Search, bench: Bench, accuracy: float, progress: Progress
+) -> tuple[Weighed, dict[str, Weighed], tuple[Claim, ...]]:
+    """Drop effects below materiality, smallest first; returns what stays, each survivor's drop-one refit, and what was too small."""
+    best, small = found.best, []
+    own = set(found.base.effects)
+    sigma = np.array([s for s, o in zip(objective.whitener.noise.sigma, bench.outputs, strict=True) if o.group == "marker"])
+    bar = max(MATERIAL, accuracy / float(np.mean(sigma)) if sigma.size else 0.0)
+    while True:
+        dropped = {}
+        for e in best.effects:
+            if e in own:
+                continue
+            progress(f"without {e}")
+            dropped[e] = refit_without(objective, evidence, best, e)
+        if not dropped:
+            return best, {}, tuple(small)
+        least = min(dropped, key=lambda e: _contribution(best, dropped[e], objective))
+        c = _contribution(best, dropped[least], objective)
+        if c >= bar:
+            return best, dropped, tuple(small)
+        small.append(Claim(least, best.fit.fitted(least), float("nan"), 0.0, c))
+        best = dropped[least]
+
+
+def _contribution(best: Weighed, without: Weighed, objective: Objective) -> float:
+    """How far (sigma RMS) dropping an effect and refitting everything else moves the fitted trials."""
+    fall = float(without.fit.z @ without.fit.z - best.fit.z @ best.fit.z)
+    return float(np.sqrt(max(0.0, fall) / objective.n))
+
+
+def _verdict(added: tuple[str, ...], before: float, after: float, line: float) -> str:
+    left = (after > LEFT[0] and after > LEFT[1] * before) or after > LEFT[2] or line > LINE
+    if not added:
+        left = after > LEFT[1] or line > LINE
+        return "unexplained" if left else "noise"
+    if not left:
+        return "explained"
+    return "unexplained" if after > HALF * before else "partly_explained"
+
+
+def _probability(found: Search, effect: str) -> float:
+    """Share of the tempered weight exp(score / 20) of all weighed sets that contain the effect."""
+    top = max(w.score for w in found.all)
+    weights = np.array([np.exp((w.score - top) / TEMPER) for w in found.all])
+    inside = np.array([effect in w.effects for w in found.all])
+    return float(weights[inside].sum() / weights.sum())
+
+
+class _HeldOut:
+    """Errors on the held-out trials."""
+
+    def __init__(self, bench: Bench, held: Sequence[int]) -> None:
+        self.bench, self.held = bench, list(held)
+
+    def rms(self, twin: Twin) -> float:
+        """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group."""
+        traces: list[Trace] = simulate(twin, self.bench, trials=self.held)
+        raw = [
+            self.bench.measured[k] - readings(self.bench, report(twin.effects, t.true))
+            for k, t in zip(self.held, traces, strict=True)
+        ]
+        groups = list(dict.fromkeys(o.group for o in self.bench.outputs))
+        return group_rms(self.bench, raw, "marker" if "marker" in groups else groups[0])
+
+
+def group_rms(bench: Bench, raw: Sequence[np.ndarray], group: str) -> float:
+    """RMS of residuals (n_k, n_output) of one group; markers as Euclidean distances of complete markers."""
+    errors = _squares(bench, raw, group)
+    return float(np.sqrt(np.mean(np.concatenate(errors)))) if sum(map(len, errors)) else float("nan")
+
+
+def _squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
+    """Squared errors of a group, one array a trial: per marker and sample (Euclidean) or per channel and sample."""
+    out = []
+    for r in raw:
+        if group == "marker":
+            parts = []
+            for index in dict.fromkeys(o.index for o in bench.outputs if o.group == "marker"):
+                columns = [j for j, o in enumerate(bench.outputs) if o.group == "marker" and o.index == index]
+                parts.append((r[:, columns] ** 2).sum(axis=1))
+            squares = np.concatenate(parts)
+        else:
+            squares = r[:, [j for j, o in enumerate(bench.outputs) if o.group == group]].ravel() ** 2
+        out.append(squares[np.isfinite(squares)])
+    return out
+
+
+def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], noise: Noise, seed: int) -> Errors:
+    groups = list(dict.fromkeys(o.group for o in bench.outputs))
+    raw = {name: [bench.measured[k] - y[k] for k in held] for name, y in predictions.items()}
+    return Errors(
+        *({g: group_rms(bench, raw[name], g) for g in groups} for name in ("nominal", "calibrated", "after")),
+        noise.floor(bench),
+        *({g: _interval(_squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")),
+    )
+
+
+def _interval(squares: list[np.ndarray], seed: int) -> tuple[float, float]:
+    """95 % bootstrap interval of an RMS, over whole trials and blocks of ten samples within them, since neighbours are alike."""
+    blocks = [b for s in squares for b in np.array_split(s, max(1, len(s) // 10)) if len(b)]
+    sums, counts = np.array([b.sum() for b in blocks]), np.array([len(b) for b in blocks])
+    pick = np.random.default_rng(seed).integers(len(blocks), size=(1000, len(blocks)))
+    values = np.sqrt(sums[pick].sum(axis=1) / counts[pick].sum(axis=1))
+    low, high = np.quantile(values, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _predict_all(twin: Twin, bench: Bench) -> list[np.ndarray]:
+    return [readings(bench, report(twin.effects, t.true)) for t in simulate(twin, bench)]
+
+
+def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], held_out: _HeldOut) -> tuple[Claim, ...]:
+    """Effects weighed and not claimed, each in its best set, best first; `error` is that set's on the held-out trials."""
+    out: dict[str, Claim] = {}
+    for w in found.all:
+        for e in w.effects:
+            if e not in claimed and e not in own and e not in out:
+                out[e] = Claim(e, w.fit.fitted(e), held_out.rms(w.fit.model.twin), _probability(found, e))
+    return tuple(list(out.values())[:6])
+
+
+def _ambiguous(found: Search, final: Weighed) -> tuple[tuple[str, ...], ...]:
+    """Sets of other effects whose evidence is within `ACCEPT` of what is claimed."""
+    return tuple(w.effects for w in found.all if w.effects != final.effects and w.effects and abs(w.score - final.score) < ACCEPT)
+
+
+def _rival(found: Search, final: Weighed, own: tuple[str, ...]) -> Weighed | None:
+    """The best set that tells another story: not a superset of the claimed one."""
+    for w in found.all:
+        if w.effects != final.effects and set(w.effects) != set(own) and not set(final.effects) < set(w.effects):
+            return w
+    return None
+
+
+def _components(best: Weighed) -> dict[str, float]:
+    """RMS (sigmas) of the left-over smooth error by component, over all channels."""
+    return {c: float(np.sqrt(np.mean(v))) for c, v in zip(COMPONENTS, best.discrepancy.variance.T, strict=True)}
+
+
+def _worst_channel(bench: Bench, fitted: list[int], best: Weighed) -> str:
+    z = best.fit.z.reshape(best.discrepancy.mean.shape)
+    return bench.outputs[int(np.argmax((z**2).mean(axis=0)))].channel.name
+
+
+def _describe(
+    verdict: str,
+    components: dict[str, float],
+    strongest: Sequence[tuple[str, float]],
+    line: tuple[float, float],
+    worst: str,
+    size: float,
+) -> str:
+    """What is left, so that an engineer knows where to look."""
+    if verdict in ("noise", "explained"):
+        return f"What is left looks like noise (smooth part {size:.2f} sigma)."
+    main = max(components, key=lambda c: components[c])
+    words = f"A smooth part of {size:.2f} sigma is left. It moves mostly with {IN_WORDS[main]} ({components[main]:.2f} sigma)"
+    words += f", strongest with {strongest[0][0]!r}; it is largest in {worst}."
+    if line[0] > LINE:
+        words += f" It has a line at {line[1]:.2f} Hz."
+    return words
+
+
+def added_effects(diagnosis: Diagnosis) -> tuple[Effect, ...]:
+    """The effects in force that the robot's description did not have."""
+    names = {c.effect for c in diagnosis.claims}
+    return tuple(e for e in diagnosis.twin.effects if e.id in names)

@@ -1,0 +1,192 @@
+"""Measured - predicted, in sensor sigmas: how large the noise is, and the residual made white by it.
+
+Two noises meet in a marker. Its own, sigma, and that of the tension readings that drive the twin: a reading wrong by dT moves the
+predicted shape by G dT, the same way in all channels. With A = sigma_T G / sigma the residual in sigmas has covariance
+I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Successive
+samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from twin.bench import Bench
+
+SAME = 0.03  # two trials repeat each other if their tensions differ by less than this share of their range (RMS), or 3 sigma
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations: sigma (n_output,) SI per channel; tension (N) of a tension reading; rho (n_output,) lag-1 correlation."""
+
+    sigma: np.ndarray
+    tension: float
+    rho: np.ndarray
+    source: str
+
+    def floor(self, bench: Bench) -> dict[str, float]:
+        """RMS error of a perfect twin without tension noise, by group: Euclidean per marker (m), per channel otherwise."""
+        floors = {}
+        for group in dict.fromkeys(o.group for o in bench.outputs):
+            square = float(np.mean([self.sigma[j] ** 2 for j, o in enumerate(bench.outputs) if o.group == group]))
+            floors[group] = np.sqrt(square * (3.0 if group == "marker" else 1.0))
+        return floors
+
+
+class Whitener:
+    """Makes residuals and derivatives of them white under a Noise and the tension sensitivities G, a list of (n_k, n_output, n_tendon)."""
+
+    def __init__(self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> None:
+        self.noise = noise
+        self.present = [np.isfinite(y) for y in measured]
+        self._mix = [self._across(p, g) for p, g in zip(self.present, sensitivity, strict=True)]
+
+    def _across(self, present: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        A = self.noise.tension * G / self.noise.sigma[:, None] * present[:, :, None]  # (n, m, t)
+        eigen, V = np.linalg.eigh(np.einsum("nmt,nms->nts", A, A))
+        eigen = np.maximum(eigen, 1e-12)
+        core = np.einsum("nij,nj,nkj->nik", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
+        return A, core
+
+    def trial(self, k: int, r: np.ndarray) -> np.ndarray:
+        """Whitened residual (n, m) of trial k; zero where nothing was measured. Works for columns of a Jacobian alike."""
+        present = self.present[k]
+        x = np.where(present, r, 0.0) / self.noise.sigma
+        A, core = self._mix[k]
+        x = x + np.einsum("nmt,nt->nm", A, np.einsum("nts,ns->nt", core, np.einsum("nmt,nm->nt", A, x)))
+        return self._along(x, present)
+
+    def _along(self, x: np.ndarray, present: np.ndarray) -> np.ndarray:
+        if not self.noise.rho.any():
+            return np.where(present, x, 0.0)
+        z = np.zeros_like(x)
+        for j, rho in enumerate(self.noise.rho):
+            at = np.flatnonzero(present[:, j])
+            if at.size == 0:
+                continue
+            decay = rho ** np.diff(at)
+            z[at[0], j] = x[at[0], j]
+            z[at[1:], j] = (x[at[1:], j] - decay * x[at[:-1], j]) / np.sqrt(1.0 - decay**2)
+        return z
+
+
+def repeats(bench: Bench) -> list[tuple[int, int]]:
+    """Pairs of trials that repeat each other: same loads, same number of samples, same tensions but for noise."""
+    pairs = []
+    for a in range(len(bench.inputs)):
+        for b in range(a + 1, len(bench.inputs)):
+            A, B = bench.inputs[a], bench.inputs[b]
+            same_loads = (
+                np.allclose(A.loads.gravity, B.loads.gravity)
+                and A.loads.payload == B.loads.payload
+                and np.allclose(A.loads.force, B.loads.force)
+            )
+            if not same_loads or len(A.time) != len(B.time):
+                continue
+            span = max(np.ptp(A.tension), 1e-3)
+            if np.sqrt(np.mean((A.tension - B.tension) ** 2)) < max(SAME * span, 0.02):
+                pairs.append((a, b))
+    return pairs
+
+
+def estimate_noise(
+    bench: Bench, trials: Sequence[int], residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]
+) -> tuple[Noise, list[str]]:
+    """The noise of the listed trials, and what had to be assumed, in plain words.
+
+    From repeats among the trials (differences cancel what the model lacks), else as declared, else from second differences along
+    each trial (which cancel what is smooth, and cannot see correlated noise). Tension noise as declared, else by maximum likelihood
+    from the same differences. `residual` and `sensitivity` follow `trials`.
+    """
+    place = {k: i for i, k in enumerate(trials)}
+    pairs = [(place[a], place[b]) for a, b in repeats(bench) if a in place and b in place]
+    declared = np.array([o.channel.noise or np.nan for o in bench.outputs])
+    cells = [c.noise for c in bench.recording.inputs() if c.kind == "tendon_tension" and c.noise]
+    tension = float(np.mean(cells)) if cells else None
+    notes = []
+    if pairs:
+        d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]].time) for a, b in pairs]
+        G, source = [sensitivity[a] for a, _ in pairs], f"{len(pairs)} pairs of repeated trials"
+    else:
+        d = [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual]
+        G, source = [g[1:-1] for g in sensitivity], "second differences along each trial; assumed white in time"
+        notes.append("no repeated trials: the noise floor is read off second differences and assumed white in time")
+        if np.isfinite(declared).all():
+            source = "as declared"
+    groups = list(dict.fromkeys(o.group for o in bench.outputs))
+    member = np.array([groups.index(o.group) for o in bench.outputs])
+    D, G_all = np.concatenate(d), np.concatenate(G)
+    if source == "as declared":
+        sigma = declared
+        if tension is None:
+            tension = _likeliest(D, G_all, member, len(groups), sigma=declared)[1]
+    else:
+        sigma, fitted = _likeliest(D, G_all, member, len(groups), tension=tension)
+        tension = fitted if tension is None else tension
+    noise = Noise(sigma, float(tension), np.zeros(len(sigma)), source)
+    if pairs:
+        noise = replace(noise, rho=_correlation(noise, d, G, member))
+    if not cells:
+        notes.append(f"no noise declared for the tension inputs: estimated as {1e3 * noise.tension:.0f} mN from the data")
+    return noise, notes
+
+
+def _detrended(d: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Differences of repeats less a line in time, which absorbs drift between the two."""
+    t = (time - time[0]) / max(time[-1] - time[0], 1e-9) - 0.5
+    basis = np.stack([np.ones_like(t), t], axis=1)
+    out = np.full_like(d, np.nan)
+    for j in range(d.shape[1]):
+        ok = np.isfinite(d[:, j])
+        if ok.sum() > 4:
+            fit = np.linalg.lstsq(basis[ok], d[ok, j], rcond=None)[0]
+            out[ok, j] = (d[ok, j] - basis[ok] @ fit) * np.sqrt(ok.sum() / (ok.sum() - 2))
+    return out
+
+
+def _likeliest(
+    d: np.ndarray, G: np.ndarray, member: np.ndarray, n_group: int, *, tension: float | None = None, sigma: np.ndarray | None = None
+) -> tuple[np.ndarray, float]:
+    """Maximum-likelihood sigma per group and sigma_T for differences d (n, m) ~ N(0, diag sigma^2 + sigma_T^2 G G')."""
+    rows = np.isfinite(d).all(axis=1)
+    if rows.sum() < 10:
+        rows = np.isfinite(d).any(axis=1)
+    d, G = np.nan_to_num(d[rows]), G[rows]
+    scale = np.array([max(1.4826 * np.median(np.abs(d[:, member == g])), 1e-9) for g in range(n_group)])
+
+    def unpack(x: np.ndarray) -> tuple[np.ndarray, float]:
+        s = sigma if sigma is not None else (scale * np.exp(x[:n_group]))[member]
+        return s, tension if tension is not None else float(1e-2 * np.exp(x[-1]))
+
+    def minus_log_likelihood(x: np.ndarray) -> float:
+        s, s_T = unpack(x)
+        A, r = s_T * G / s[:, None], d / s
+        inner = np.eye(G.shape[2]) + np.einsum("nmt,nms->nts", A, A)
+        b = np.einsum("nmt,nm->nt", A, r)
+        quadratic = (r**2).sum() - np.einsum("nt,nt->", b, np.linalg.solve(inner, b[..., None])[..., 0])
+        return 0.5 * (quadratic + np.linalg.slogdet(inner)[1].sum()) + len(d) * np.log(s).sum()
+
+    start = np.zeros((0 if sigma is not None else n_group) + (tension is None))
+    if start.size == 0:
+        return unpack(start)
+    bounds = [(-3.0, 3.0)] * start.size
+    return unpack(minimize(minus_log_likelihood, start, method="L-BFGS-B", bounds=bounds).x)
+
+
+def _correlation(noise: Noise, d: Sequence[np.ndarray], G: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
+    """Lag-1 correlation per group of the whitened differences; zero unless it is clearly there (3 standard errors)."""
+    white = Whitener(noise, d, G)
+    z = [white.trial(k, x) for k, x in enumerate(d)]
+    rho = np.zeros(member.size)
+    for g in range(member.max() + 1):
+        columns = member == g
+        product = sum(float((x[1:, columns] * x[:-1, columns]).sum()) for x in z)
+        power = sum(float((x[:, columns] ** 2).sum()) for x in z)
+        count = sum(x[1:, columns].size for x in z)
+        if power > 0 and product / power > 3.0 / np.sqrt(count):
+            rho[columns] = min(product / power, 0.9)
+    return rho

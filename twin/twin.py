@@ -1,0 +1,180 @@
+"""Robot + parameters + effects: a twin, and its prediction of a recording. The only place that steps or solves MuJoCo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twin.bench import Bench, Inputs, prepare
+from twin.dynamics import Dynamics
+from twin.effects import Creep, Effect, Loads, Route, Signals, named
+from twin.equilibrium import Equilibrium, Path
+from twin.errors import SolveError
+from twin.measurements import Recording
+from twin.quantities import Values
+from twin.robots import Robot, load
+
+
+@dataclass(frozen=True)
+class Twin:
+    """What predicts: a robot, the values of its parameters that differ from nominal, and the effects in force."""
+
+    robot: Robot
+    values: Values = field(default_factory=dict)
+    effects: tuple[Effect, ...] = ()
+
+    @staticmethod
+    def of(robot: Robot | str) -> Twin:
+        """The robot as described: nominal parameters, and the effects its `robot.toml` declares."""
+        robot = load(robot) if isinstance(robot, str) else robot
+        n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
+        return Twin(robot, {}, tuple(named(name)(values, n_tendon) for name, values in robot.effects))
+
+    def predict(self, recording: Recording, *, dynamic: bool | None = None) -> Recording:
+        """The recording's outputs as the twin sees them, on its trials' samples and inputs, with `source` saying so.
+
+        Slow recordings are predicted by static equilibria, fast ones by MuJoCo steps (`dynamic`, or by the recording's rates).
+        Raises DataError where the inputs do not determine the robot, SolveError where no equilibrium exists.
+        """
+        bench = prepare(recording, self.robot)
+        traces = simulate(self, bench, dynamic=is_dynamic(bench) if dynamic is None else dynamic)
+        values = {
+            inputs.name: {
+                o.channel.name: column for o, column in zip(bench.outputs, readings(bench, report(self.effects, trace.true)).T)
+            }
+            for inputs, trace in zip(bench.inputs, traces, strict=True)
+        }
+        return recording.with_values([values[t.name] for t in recording.trials], f"simulation: twin of {self.robot.name}")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One simulated trial: the true signals, and the static path they came from (None after a dynamic simulation)."""
+
+    true: Signals
+    path: Path | None
+
+
+def is_dynamic(bench: Bench) -> bool:
+    """Whether a recording is too fast for static equilibria.
+
+    It is where its samples resolve the motion and some tension crosses its range (10 to 90 %, noise smoothed away) within one
+    period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static motion.
+    """
+    period = 1.0 / first_mode(bench.robot)
+    for trial in bench.inputs:
+        dt = np.diff(trial.time)
+        width = int(np.ceil(0.3 * period / np.median(dt)))
+        if width < 2:
+            continue
+        smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(width) / width, "valid"), 0, trial.tension)  # noqa: B023
+        span = np.ptp(smooth, axis=0)
+        slope = np.abs(np.gradient(smooth, np.median(dt), axis=0)).max(axis=0)
+        if np.any((span > 0.3) & (slope > 0.8 * span / period)):
+            return True
+    return False
+
+
+def simulate(
+    twin: Twin, bench: Bench, *, trials: Sequence[int] | None = None, near: Sequence[Trace] | None = None, keep: bool = False,
+    dynamic: bool = False,
+) -> list[Trace]:  # fmt: skip
+    """The true signals of the bench's trials (all, or those listed) in order of their clock.
+
+    With creep every trial before is simulated too, since the body remembers. `near` (traces with kept tangents of a
+    neighbouring twin, same trials) speeds the solves up; `keep` keeps tangents for that. Raises SolveError where a
+    static equilibrium was not found.
+    """
+    body = twin.robot.build(twin.values)
+    for effect in twin.effects:
+        effect.edit(body)
+    solver = Dynamics(body) if dynamic else Equilibrium(body)
+    creep = _merge([e.deform() for e in twin.effects])
+    routes = [r for e in twin.effects if (r := e.route()).mu > 0.0]
+    route = routes[0] if routes else Route()
+    wanted = range(len(bench.inputs)) if trials is None else trials
+    run = range(max(wanted) + 1) if creep.amplitude else wanted
+    delayed = np.zeros((len(creep.amplitude), solver.model.nv))
+    traces, rested = {}, 0.0
+    for position, k in enumerate(run):
+        inputs = bench.inputs[k]
+        pause = max(0.0, float(inputs.clock[0]) - rested)
+        delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
+        rested = float(inputs.clock[-1])
+        close = near[position].path if near is not None and len(near) == len(run) else None
+        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep)
+    return [traces[k] for k in (run if keep else wanted)]
+
+
+def _trial(
+    twin: Twin, solver: Equilibrium | Dynamics, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray, near: Path | None,
+    keep: bool,
+) -> Trace:  # fmt: skip
+    n = len(inputs.time)
+    seen = Signals(
+        inputs.time, inputs.clock, inputs.tension, np.zeros_like(inputs.tension), np.zeros((n, 0, 3)), inputs.temperature
+    )
+    for effect in reversed(twin.effects):
+        seen = effect.command(seen)
+    tension = _driven(twin.effects, inputs.time, seen.tension)
+    loads: Loads = inputs.loads
+    for effect in twin.effects:
+        loads = effect.surround(loads)
+    path = solver.solve(inputs.time, tension, loads, route, creep, delayed, near, keep)
+    if not path.status.all():
+        bad = int(np.flatnonzero(path.status == 0)[0])
+        raise SolveError(
+            f"{inputs.name}: no static equilibrium at sample {bad + 1} (t = {inputs.time[bad]:.3g} s, tensions "
+            f"{np.round(tension[bad], 2).tolist()} N, payload {loads.payload * 1e3:.3g} g); check the loads' units and directions"
+        )
+    true = Signals(inputs.time, inputs.clock, tension, solver.straight_path - path.path, path.markers, inputs.temperature)
+    return Trace(true, path)
+
+
+def _driven(effects: tuple[Effect, ...], time: np.ndarray, tension: np.ndarray) -> np.ndarray:
+    """Commands to tensions through every `drive` law with a memory, sample by sample."""
+    for effect in effects:
+        if not effect.acts_in("drive"):
+            continue
+        state, out = effect.start(tension[0]), np.empty_like(tension)
+        for i, dt in enumerate(np.diff(time, prepend=time[0])):
+            out[i], state = effect.drive(tension[i], state, float(dt))
+        tension = out
+    return tension
+
+
+def _merge(creeps: list[Creep]) -> Creep:
+    return Creep(tuple(a for c in creeps for a in c.amplitude), tuple(t for c in creeps for t in c.time))
+
+
+def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
+    """What the sensors say of the true signals."""
+    for effect in effects:
+        true = effect.sense(true)
+    return true
+
+
+def readings(bench: Bench, seen: Signals) -> np.ndarray:
+    """The bench's output channels of one trial's signals, (n, n_output)."""
+    columns = [seen.markers[:, o.index, o.axis] if o.group == "marker" else seen.displacement[:, o.index] for o in bench.outputs]
+    return np.stack(columns, axis=1)
+
+
+def unstable_starts(bench: Bench, traces: Sequence[Trace]) -> list[str]:
+    """Names of the trials whose loaded, untensioned robot has no stable shape near straight: their branch is a guess."""
+    return [inputs.name for inputs, t in zip(bench.inputs, traces, strict=True) if t.path is not None and t.path.unstable_start]
+
+
+def first_mode(robot: Robot) -> float:
+    """Frequency (Hz) of the robot's first bending mode, as a cantilever with all its mass spread: a scale for rates.
+
+    f = 1.875^2 / (2 pi L^2) sqrt(EI / (m/L)) (Euler-Bernoulli).
+    """
+    body = robot.build()
+    model = body.spec.compile()
+    stiffness = float(model.jnt_stiffness.reshape(model.nv, -1)[0, 0]) * body.joints[0].length
+    per_length = float(model.body_mass.sum()) / body.length
+    return 1.875**2 / (2 * math.pi * body.length**2) * math.sqrt(stiffness / per_length)
