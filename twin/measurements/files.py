@@ -30,14 +30,8 @@ def check_name(name: object) -> str:
     if not isinstance(name, str) or not name.strip():
         raise DataError(f"{shown(name)} is no file name; write one in quotes, relative to the set's folder")
     path = PurePosixPath(name)
-    if (
-        path.is_absolute()
-        or ".." in path.parts
-        or "\\" in name
-        or PureWindowsPath(name).drive
-        or not path.name
-        or not name.isprintable()
-    ):
+    abroad = path.is_absolute() or ".." in path.parts or "\\" in name or PureWindowsPath(name).drive
+    if abroad or not path.name or not name.isprintable():
         raise DataError(f"file {shown(name)} leads out of the set's folder; write a relative path with / and without ..")
     return name
 

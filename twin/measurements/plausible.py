@@ -12,8 +12,8 @@ from twin.measurements.recording import Trial
 from twin.measurements.tables import Table
 
 _LEAST_SAMPLES = 3
-_SIGMAS = 5.0  # of declared noise: how far below zero an input tension may read
-_UNDECLARED_SLACK = (0.05, 0.02)  # N, and part of the largest tension: the same where no noise is declared
+# How far below zero an input tension may read: sigmas of declared noise, N, part of the largest tension; the widest counts.
+_SLACK_SIGMAS, _SLACK_NEWTON, _SLACK_PART = 5.0, 0.05, 0.02
 
 
 def check_table(table: Table, channels: Sequence[Channel]) -> None:
@@ -32,8 +32,7 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         if channel.si_unit == "K":
             _check_floor(table, channel, column, 0.0, "below absolute zero; leave the cell empty if it is missing")
         elif channel.kind == "tendon_tension" and channel.role == "input" and not np.all(np.isnan(column)):
-            absolute, relative = _UNDECLARED_SLACK
-            slack = max(absolute, relative * float(np.nanmax(column))) if channel.noise is None else _SIGMAS * channel.noise
+            slack = max(_SLACK_SIGMAS * (channel.noise or 0.0), _SLACK_NEWTON, _SLACK_PART * float(np.nanmax(column)))
             advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise); correct sign or bias"
             _check_floor(table, channel, column, -slack, advice)
 

@@ -6,7 +6,7 @@ Nothing read is changed or repaired in silence: what is left out, missing or not
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -59,24 +59,13 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
     tables: list[Table] = []
     labels: set[str] = set()
     for at, entry in enumerate(written, start=1):
-        with located(f"{file}, trial {at}"):
-            trial_file = _trial_file(file.parent, entry)
-            cloud_file = inside(file.parent, entry["cloud"]) if "cloud" in entry else None
-            with located("start"):
-                start = number(entry["start"]) if "start" in entry else None
-            conditions, other = read_conditions(entry)
-        table = read_table(trial_file, ["time", *(channel.name for channel in channels)])
-        check_table(table, channels)
-        values = {channel.name: channel.scale.to_si(table.columns[channel.name]) for channel in channels}
-        name = trial_file.relative_to(file.parent).as_posix()
-        clouds = read_clouds(cloud_file) if cloud_file else None
-        trial = Trial(name, table.columns["time"], values, conditions, other, start, clouds)
+        trial, table = _read_trial(file, at, entry, channels)
         if trial.label in labels:
-            raise DataError(f"{file}, trial {at}: file {shown(name)} is there twice; list every trial once")
+            raise DataError(f"{file}, trial {at}: file {shown(trial.name)} is there twice; list every trial once")
         labels.add(trial.label)
         tables.append(table)
         if reason := why_unusable(trial, channels):
-            notes.append(f"{name} is left out: {reason}")
+            notes.append(f"{trial.name} is left out: {reason}")
         else:
             trials.append(trial)
     with located(file):
@@ -123,6 +112,22 @@ def _channels(tables: list[dict[str, Any]]) -> tuple[Channel, ...]:
                 channel = Channel(name, role, channel.unit, noise)
         channels.append(channel)
     return tuple(channels)
+
+
+def _read_trial(file: Path, at: int, entry: Mapping[str, object], channels: Sequence[Channel]) -> tuple[Trial, Table]:
+    folder = file.parent
+    with located(f"{file}, trial {at}"):
+        path = _trial_file(folder, entry)
+        cloud_path = inside(folder, entry["cloud"]) if "cloud" in entry else None
+        with located("start"):
+            start = number(entry["start"]) if "start" in entry else None
+        conditions, other = read_conditions(entry)
+    table = read_table(path, ["time", *(channel.name for channel in channels)])
+    check_table(table, channels)
+    values = {channel.name: channel.scale.to_si(table.columns[channel.name]) for channel in channels}
+    clouds = read_clouds(cloud_path) if cloud_path else None
+    name = path.relative_to(folder).as_posix()
+    return Trial(name, table.columns["time"], values, conditions, other, start, clouds), table
 
 
 def _trial_file(folder: Path, entry: Mapping[str, object]) -> Path:

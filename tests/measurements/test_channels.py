@@ -1,0 +1,75 @@
+"""The grammar of channel names, both ways: every name in it is understood, and nothing else is."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from twin.errors import DataError
+from twin.measurements import KINDS, Channel, Meaning, meaning
+
+INDEX = st.integers(1, 9999)
+
+
+@given(st.sampled_from(sorted(KINDS)), INDEX, st.sampled_from("xyz"), st.none() | INDEX)
+def test_names_say_what_they_were_made_of(kind: str, index: int, axis: str, finger: int | None) -> None:
+    pattern, _ = KINDS[kind]
+    name = (f"finger_{finger}_" if finger else "") + pattern.replace("#", str(index)).replace("@", axis)
+    assert meaning(name) == Meaning(kind, index if "#" in pattern else None, axis if "@" in pattern else None, finger)
+
+
+@given(st.text("tendo_1289xyzkispamr", max_size=24) | st.text(max_size=12))
+def test_no_other_text_has_a_meaning(name: str) -> None:
+    with contextlib.suppress(DataError):
+        said = meaning(name)  # drawn by luck: then it is spelled as its meaning spells it
+        pattern, _ = KINDS[said.kind]
+        assert name.endswith(pattern.replace("#", str(said.index)).replace("@", str(said.axis)))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", "time", "tendon_tension", "tendon_01_tension", "tendon_-1_tension", "tendon_1_tensions", "xtip_x", "tip", "tip_w",
+     "disk_1", "disk_x", "TIP_X", "tip_x ", "tip_x\n", "finger_0_tip_x", "finger_1_finger_2_tip_x", "tendon_\u0661_tension",
+     "sensor_1_strain"],
+)  # fmt: skip
+def test_near_misses_are_refused(name: str) -> None:
+    with pytest.raises(DataError, match="allowed: tendon_I_tension"):
+        meaning(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "one"),
+    [
+        ("tendon_1_tension", "lbf", 4.4482216152605),
+        ("tendon_2_displacement", "µm", 1e-6),
+        ("disk_8_z", "cm", 1e-2),
+        ("sma_1_voltage", "mV", 1e-3),
+        ("sma_1_resistance", "kohm", 1e3),
+        ("sensor_1_resistance", "Ω", 1.0),
+        ("joint_1_angle", "deg", 0.017453292519943295),
+        ("joint_1_torque", "N mm", 1e-3),
+        ("finger_2_joint_1_torque", "kg*m²/s²", 1.0),
+        ("ambient_temperature", "degF", 273.15 + (1 - 32) * 5 / 9),
+        ("sma_1_temperature", "K", 1.0),
+    ],
+)
+def test_one_of_a_unit_in_si(name: str, unit: str, one: float) -> None:
+    assert Channel(name, "output", unit).scale.to_si(1.0) == pytest.approx(one, rel=1e-14)
+
+
+@pytest.mark.parametrize("unit", ["1", "count", "percent", "N", "rad/s"])
+def test_an_angle_is_not_just_any_number(unit: str) -> None:
+    with pytest.raises(DataError, match="rad, deg"):
+        Channel("joint_1_angle", "output", unit)
+
+
+NONSENSE = [("tip_x", "result", "m"), ("tip_x", "output", "s"), ("tip_x", "output", "m", 0.0), ("tip_w", "output", "m")]
+
+
+@pytest.mark.parametrize("arguments", NONSENSE)
+def test_a_channel_refuses_nonsense(arguments: tuple) -> None:
+    with pytest.raises(DataError):
+        Channel(*arguments)
