@@ -16,7 +16,7 @@ WALL, POST, MAGNET = 1, 2, 3
 ROUND = 5e-5  # m
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _push(gap, stiffness):
     """Contact force and its slope d(force)/d(gap) for a gap (m, negative = penetration)."""
     d = -gap
@@ -27,7 +27,7 @@ def _push(gap, stiffness):
     return stiffness * (d - ROUND / 2), -stiffness
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def act(fields, disk_r, force, gradient):
     """Add field forces to `force` (N, 3) and their position gradients dF/dr to `gradient` (N, 3, 3); disks 1..N."""
     N = force.shape[0]

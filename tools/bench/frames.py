@@ -41,14 +41,14 @@ def gauss_mesh(nodes: int) -> Mesh:
     return Mesh(weight, before, weight - before, leg, sample)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cross(a, b, out):
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(R, r, u1, u2, H, R_out, r_out):
     """One Magnus step of length H from pose (R, r), curvatures u1, u2 at its two Gauss points."""
     beta = np.sqrt(3.0) / 12.0 * H * H
@@ -89,7 +89,7 @@ def advance(R, r, u1, u2, H, R_out, r_out):
             R_out[i, j] = R[i, 0] * e[0, j] + R[i, 1] * e[1, j] + R[i, 2] * e[2, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def integrate(u, pitch, mesh, node_R, node_r, disk_R, disk_r):
     """Poses of all nodes (N, G) and disks (N+1, base plate first) from the curvature u (N, G, 3)."""
     N, G = u.shape[0], u.shape[1]

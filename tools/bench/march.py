@@ -14,20 +14,22 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from tools.bench.frames import integrate
-from tools.bench.statics import Body, Load, equilibrium, new_pose
-from tools.bench.tendons import lay
+from tools.bench.frames import Mesh, integrate
+from tools.bench.statics import Body, Load, Pose, equilibrium, new_pose
+from tools.bench.tendons import Friction, lay
 
 SMALLEST = 1.0 / 1024  # of a load step; below, the march gives up
+
+
+class NoEquilibrium(RuntimeError):
+    """Newton found no balance, even when the load came in 1024 parts: the rod has buckled or the load is absurd."""
 
 
 class Creep(NamedTuple):
     share: np.ndarray  # (P,) a_n
     time: np.ndarray  # (P,) s, tau_n
     delayed: np.ndarray  # (P, N, G, 3) 1/m, v_n: state, overwritten
-    elastic: np.ndarray  # (N, G, 3) 1/m, e at the last equilibrium: state, overwritten
 
 
 class Path(NamedTuple):
@@ -37,16 +39,6 @@ class Path(NamedTuple):
     weight: np.ndarray  # (n,) factor on the dead loads
     softness: np.ndarray  # (n,) factor on the compliance
     dt: np.ndarray  # (n,) s taken to reach the row
-
-
-@njit(cache=True)
-def distal_lengths(length, out):
-    N, T = length.shape
-    for i in range(T):
-        s = 0.0
-        for k in range(N - 2, -1, -1):
-            s += length[k + 1, i]
-            out[k, i] = s
 
 
 class Record(NamedTuple):
@@ -61,93 +53,77 @@ class Record(NamedTuple):
     moment: np.ndarray  # (m, N, G, 3) N m, carried by the rod, world frame
 
 
-@njit(cache=True)
-def march(mesh, body, load, friction, creep, path, record):
-    """March and fill `record`. Returns the first row that found no balance, or -1.
-
-    The rod starts unloaded at rest: curvature = rest + delayed strain, zero slip.
-    """
-    n, T = path.drive.shape
-    N, G = body.rest.shape[0], body.rest.shape[1]
-    P = creep.time.shape[0]
-    pose = new_pose(N, G, T, friction.stroke.shape[0])
-    u = body.rest.copy()
-    for p in range(P):
-        u += creep.delayed[p]
+def march(mesh: Mesh, body: Body, load: Load, friction: Friction, creep: Creep | None, path: Path, record: Record) -> None:
+    """March and fill `record`, from the unloaded rod at rest: curvature = rest + delayed strain, zero slip."""
+    N, G = body.rest.shape[:2]
+    T = body.holes.shape[1]
+    pose = new_pose(N, G, T, len(friction.stroke))
+    delayed = np.zeros((0, N, G, 3)) if creep is None else creep.delayed
+    share, tau = (np.zeros(0), np.zeros(0)) if creep is None else (creep.share, creep.time)
+    share, tau = share[:, None, None, None], tau[:, None, None, None]
+    u = body.rest + delayed.sum(axis=0)
+    elastic = np.zeros_like(u)
     T_base = np.zeros(T)
-    creep.elastic[:] = 0.0
-    now = Body(body.pitch, body.compliance.copy(), body.rest.copy(), body.holes)
-    step = Load(
-        load.disk_force.copy(),
-        load.line_force.copy(),
-        load.fields,
-        np.zeros(T),
-        load.share,
-        np.zeros(T),
-        load.stretch,
-        load.by_length,
-    )
     integrate(u, body.pitch, mesh, pose.node_R, pose.node_r, pose.disk_R, pose.disk_r)
     lay(pose.disk_R, pose.disk_r, body.holes, pose.hole, pose.toward_base, pose.length)
     friction.z[:] = 0.0
-    distal_lengths(pose.length, friction.distal)
-    last_drive = np.zeros(T)
-    if load.by_length:
-        for i in range(T):
-            last_drive[i] = pose.length[:, i].sum()
-    last_weight, last_soft = 0.0, path.softness[0]
-    early, late, keep = np.empty(P), np.empty(P), np.empty(P)
+    friction.distal[:] = distal_lengths(pose.length)
+    drive = pose.length.sum(axis=0) if load.by_length else np.zeros(T)
+    before = (drive, 0.0, path.softness[0])
     stored = 0
-    for row in range(n):
+    for row in range(len(path.drive)):
+        after = (path.drive[row], path.weight[row], path.softness[row])
         done, part = 0.0, 1.0
         while done < 1.0:
             part = min(part, 1.0 - done)
-            x = done + part
-            weight = last_weight + x * (path.weight[row] - last_weight)
-            soft = last_soft + x * (path.softness[row] - last_soft)
-            step.disk_force[:] = weight * load.disk_force
-            step.line_force[:] = weight * load.line_force
-            for i in range(T):
-                drive = last_drive[i] + x * (path.drive[row, i] - last_drive[i])
-                step.tension[i] = drive
-                step.free_length[i] = drive
-            now.rest[:] = body.rest
-            raised = 1.0
-            for p in range(P):
-                ratio = path.dt[row] * part / creep.time[p]
-                keep[p] = np.exp(-ratio)
-                mean = -np.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
-                late[p], early[p] = 1.0 - mean, mean - keep[p]
-                raised += creep.share[p] * late[p]
-                now.rest[:] += keep[p] * creep.delayed[p] + creep.share[p] * early[p] * creep.elastic
-            now.compliance[:] = body.compliance * (soft * raised)
+            drive, weight, softness = (a + (done + part) * (b - a) for a, b in zip(before, after, strict=True))
+            step = load._replace(
+                disk_force=weight * load.disk_force,
+                line_force=weight * load.line_force,
+                tension=drive,
+                free_length=drive,
+            )
+            keep, early, late = _creep_weights(path.dt[row] * part, tau)
+            raised = 1.0 + float((share * late).sum())
+            rest = body.rest + (keep * delayed + share * early * elastic).sum(axis=0)
+            now = body._replace(compliance=body.compliance * (softness * raised), rest=rest)
             u_old, T_old = u.copy(), T_base.copy()
             if not equilibrium(u, T_base, mesh, now, step, friction, pose):
-                u[:] = u_old
-                T_base[:] = T_old
+                u[:], T_base[:] = u_old, T_old
                 part *= 0.5
                 if part < SMALLEST:
-                    return row
+                    raise NoEquilibrium(f"row {row} of {len(path.drive)}: no balance at drive {drive}, weight {weight}")
                 continue
-            friction.z[:] = pose.z
-            distal_lengths(pose.length, friction.distal)
-            elastic = (u - now.rest) / raised
-            for p in range(P):
-                creep.delayed[p] = keep[p] * creep.delayed[p] + creep.share[p] * (
-                    early[p] * creep.elastic + late[p] * elastic
-                )
-            creep.elastic[:] = elastic
-            done = x
+            _commit(friction, pose)
+            elastic_old, elastic = elastic, (u - rest) / raised
+            delayed[:] = keep * delayed + share * (early * elastic_old + late * elastic)
+            done += part
             part *= 2.0
-        last_drive[:] = path.drive[row]
-        last_weight, last_soft = path.weight[row], path.softness[row]
+        before = after
         if record.keep[row]:
             record.disk_r[stored] = pose.disk_r
             record.disk_R[stored] = pose.disk_R
-            for i in range(T):
-                record.length[stored, i] = pose.length[:, i].sum()
-                record.tension[stored, :, i] = T_base[i] * pose.ratio[:, i]
+            record.length[stored] = pose.length.sum(axis=0)
+            record.tension[stored] = T_base * pose.ratio
             record.curvature[stored] = u
             record.moment[stored] = pose.moment
             stored += 1
-    return -1
+
+
+def _commit(friction: Friction, pose: Pose) -> None:
+    friction.z[:] = pose.z
+    friction.distal[:] = distal_lengths(pose.length)
+
+
+def distal_lengths(length: np.ndarray) -> np.ndarray:
+    """Path length (N-1, T) from the hole of each inner disk to the tip, from the segments' lengths (N, T)."""
+    return np.cumsum(length[:0:-1], axis=0)[::-1]
+
+
+def _creep_weights(dt: float, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """keep, early, late of the module's docstring."""
+    if dt <= 0.0:
+        return np.ones_like(tau), np.zeros_like(tau), np.zeros_like(tau)
+    x = dt / tau
+    keep, mean = np.exp(-x), -np.expm1(-x) / x
+    return keep, mean - keep, 1.0 - mean

@@ -17,15 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tools.bench.frames import gauss_mesh
-from tools.bench.march import Creep, Path, Record, march
+from tools.bench.march import Creep, NoEquilibrium, Path, Record, march
 from tools.bench.statics import Body, Load
 from tools.bench.tendons import IWAN_SPREAD, Friction
 
 NO_FIELDS = np.zeros((0, 10))
-
-
-class NoEquilibrium(RuntimeError):
-    """Newton found no balance, even when the load came in 1024 parts: the rod has buckled or the load is absurd."""
 
 
 @dataclass(frozen=True)
@@ -148,20 +144,12 @@ def follow(
         np.full(T, float(stretch)), by_length,
     )  # fmt: skip
     friction = Friction(float(mu), stroke * IWAN_SPREAD, np.zeros((N - 1, T, len(IWAN_SPREAD))), np.zeros((N - 1, T)))
-    if creep is None:
-        creep = no_creep(N, nodes)
     path = Path(drive, _series(weight, n, 1.0), _series(softness, n, 1.0), _series(dt, n, 0.0))
-    failed = march(gauss_mesh(nodes), body, load, friction, creep, path, record)
-    if failed >= 0:
-        raise NoEquilibrium(f"row {failed} of {n}: no balance at drive {drive[failed]}, payload {payload} kg")
+    march(gauss_mesh(nodes), body, load, friction, creep, path, record)
     disks, rotations = record.disk_r[:, 1:], record.disk_R[:, 1:]
     markers = disks + rod.marker_offset[:, None] * rotations[..., 2]
     slack = straight_lengths(rod) - record.length
     return Shape(disks, rotations, markers, record.length, slack, record.tension, record.curvature, record.moment)
-
-
-def no_creep(disks: int, nodes: int) -> Creep:
-    return Creep(np.zeros(0), np.zeros(0), np.zeros((0, disks, nodes, 3)), np.zeros((disks, nodes, 3)))
 
 
 def _series(value: ArrayLike | None, n: int, default: float) -> np.ndarray:
@@ -192,3 +180,6 @@ def solve(
         fields=fields, share=share, keep=keep, nodes=nodes,
     )  # fmt: skip
     return shape[0]
+
+
+__all__ = ["Creep", "NoEquilibrium", "Rod", "Shape", "follow", "solve", "straight_lengths"]

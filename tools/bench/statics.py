@@ -63,7 +63,7 @@ class Pose(NamedTuple):
     moment: np.ndarray  # (N, G, 3) rod moment at the nodes, world frame
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def new_pose(N, G, T, S):
     return Pose(
         np.zeros((N, G, 3, 3)),
@@ -85,15 +85,13 @@ def new_pose(N, G, T, S):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def balance(u, T_base, mesh, body, load, friction, pose, F):
     """Residual F of the moment balance (3NG,), followed by the tendons' conditions (T,) if driven by length."""
     N, G, T = u.shape[0], u.shape[1], T_base.shape[0]
     integrate(u, body.pitch, mesh, pose.node_R, pose.node_r, pose.disk_R, pose.disk_r)
     lay(pose.disk_R, pose.disk_r, body.holes, pose.hole, pose.toward_base, pose.length)
-    transmit(
-        load.share, friction, pose.toward_base, pose.length, pose.z, pose.ratio, pose.turns, pose.grip, pose.grip_slope
-    )
+    transmit(load.share, friction, pose.toward_base, pose.length, pose.z, pose.ratio, pose.turns, pose.grip, pose.grip_slope)
     pose.force[:] = load.disk_force
     pose.gradient[:] = 0.0
     act(load.fields, pose.disk_r, pose.force, pose.gradient)
@@ -148,7 +146,7 @@ def balance(u, T_base, mesh, body, load, friction, pose, F):
             F[3 * N * G + i] = min(T_base[i], TAUT * gap)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fill(J, col, bent, T_base, dlog, dT, own, mesh, body, load, pose):
     """Column `col` of the Jacobian.
 
@@ -264,7 +262,7 @@ def _fill(J, col, bent, T_base, dlog, dT, own, mesh, body, load, pose):
         J[own, col] += 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _friction_change(kb, turned, p, friction, pose, dlog):
     """Change of every segment's log tension when all beyond an element of interval kb turns; also of segment kb's length."""
     N, T = pose.length.shape
@@ -302,7 +300,7 @@ def _friction_change(kb, turned, p, friction, pose, dlog):
     return dlength
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def jacobian(T_base, mesh, body, load, friction, pose, J):
     N, T = pose.length.shape
     G = mesh.weight.shape[0]
@@ -334,7 +332,7 @@ def jacobian(T_base, mesh, body, load, friction, pose, J):
             J[size + i, size + i] = TAUT * load.stretch[i] if T_base[i] > TAUT * gap else 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def equilibrium(u, T_base, mesh, body, load, friction, pose, most=30):
     """Newton from the start values u (N, G, 3), T_base (T,), both overwritten. Returns whether it balanced."""
     N, G, T = u.shape[0], u.shape[1], T_base.shape[0]

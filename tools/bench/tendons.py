@@ -27,7 +27,7 @@ class Friction(NamedTuple):
     distal: np.ndarray  # (N-1, T) m, path length from the hole to the tip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mobilise(z, slip, stroke, z_new):
     """Advance one hole's sliders z (S,) by `slip` (m); returns the mean z and its slope dz/dslip (1/m)."""
     mean, slope = 0.0, 0.0
@@ -45,7 +45,7 @@ def mobilise(z, slip, stroke, z_new):
     return mean, slope
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def lay(disk_R, disk_r, holes, hole, toward_base, length):
     """Hole positions (N+1, T, 3), unit vectors from disk k+1 to disk k (N, T, 3) and segment lengths (N, T)."""
     N, T = length.shape
@@ -66,7 +66,7 @@ def lay(disk_R, disk_r, holes, hole, toward_base, length):
                 toward_base[k, i, c] /= length[k, i]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def turn(t_base, t_tip):
     """Angle between two unit vectors, accurate for small angles."""
     d = 0.0
@@ -75,7 +75,7 @@ def turn(t_base, t_tip):
     return 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(d)))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def transmit(share, friction, toward_base, length, z_new, ratio, turns, grip, grip_slope):
     """Tension of every segment over the base tension, `ratio` (N, T); fills turns, z and dz/dslip at the holes (N-1, T)."""
     N, T = length.shape

@@ -1,0 +1,19 @@
+"""Out of catalogue: the backbone tires over the session, compliance times 1 + 0.05 strength (clock / 1 h)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from tools.bench.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class Ageing(Effect):
+    id: ClassVar[str] = "ageing"
+    in_catalogue: ClassVar[bool] = False
+
+    def soften(self, clock: np.ndarray, ambient: np.ndarray) -> np.ndarray:
+        return 1 + 0.05 * self.strength * clock / 3600.0
