@@ -24,3 +24,16 @@ def cross(a, b):
 @jit
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jit
+def assign(target, source):
+    """target[:] = source for 1-D arrays of one length, without the shape check (which takes seconds to compile)."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@jit
+def put(target, v):
+    """target[:] = v for three-vectors."""
+    target[0], target[1], target[2] = v[0], v[1], v[2]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from twin.compiled import dot, jit
+from twin.compiled import dot, jit, put
 from twin.effects import Creep, Loads, Route
 from twin.effects.tendon_friction import slip_state, turn
 from twin.equilibrium import DIRECT, Equilibrium, Path
@@ -18,6 +18,7 @@ from twin.equilibrium.chain import Law, Load, lever, wall_force
 from twin.equilibrium.engine import mj_step
 from twin.equilibrium.newton import place
 from twin.equilibrium.trial import creep as advance_creep
+from twin.equilibrium.trial import rested
 from twin.robots import Body
 
 STEP_PER_PRESLIDING = 2.0  # s/m
@@ -33,7 +34,7 @@ def route_tension(chain, tension, law, z, s, ctrl, motor):
             a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
             v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
             length[d] = np.sqrt(dot(v, v))
-            u[d] = (v[0] / length[d], v[1] / length[d], v[2] / length[d])
+            put(u[d], (v[0] / length[d], v[1] / length[d], v[2] / length[d]))
         distal = 0.0
         for d in range(nd - 1, -1, -1):
             distal += length[d]
@@ -66,7 +67,7 @@ def step_through(
             if law.wall[4] > 0.0 or forced:
                 r[:] = 0.0
                 if law.wall[4] > 0.0:
-                    wall_force(chain, law.wall, r, J, False)
+                    wall_force(chain, law.wall, r, J)
                 for k in range(nv):
                     applied[k] = dot(load.force, lever(chain.axis[k], chain.site[tip], chain.anchor[k])) - r[k]
             mj_step(model, data)
@@ -84,9 +85,7 @@ def step_through(
         place(model, data, chain, q)
         if amplitude.size and i > 0:
             advance_creep(delayed, q - spring, amplitude, retardation, time[i] - time[i - 1])
-            spring[:] = fixed
-            for m in range(amplitude.size):
-                spring += delayed[m]
+            rested(fixed, delayed, spring)
 
 
 class Dynamics:

@@ -42,6 +42,42 @@ def si_factor(unit: str, where: str) -> float:
         raise DataError(f"{where}: unknown unit {unit!r} ({error}); write one that pint knows, e.g. 'mm', 'GPa', '1'") from None
 
 
+SI_UNITS = (
+    "1",
+    "m",
+    "kg",
+    "s",
+    "N",
+    "Pa",
+    "K",
+    "A",
+    "V",
+    "ohm",
+    "N*m",
+    "m/s^2",
+    "1/m",
+    "N/m",
+    "N/s",
+    "J/K",
+    "W/K",
+    "kg/m^3",
+    "1/K",
+)
+
+
+@cache
+def si_unit(unit: str, where: str) -> str:
+    """The SI unit a value in `unit` is kept in: "GPa" -> "Pa", "deg" -> "rad". Raises DataError for one the twin does not use."""
+    si_factor(unit, where)
+    if unit.startswith(("deg", "rad")):
+        return "rad"
+    registry = unit_registry()
+    for si in SI_UNITS:
+        if registry.Unit(si).dimensionality == registry.Unit(unit).dimensionality:
+            return si
+    raise DataError(f"{where}: unit {unit!r} is none the twin uses; it must be convertible to one of {', '.join(SI_UNITS)}, rad")
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number of a robot or an effect.

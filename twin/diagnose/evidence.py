@@ -130,7 +130,8 @@ class Evidence:
         self.member = np.array([groups.index(o.group) for o in bench.outputs])
         present = np.isfinite(np.concatenate([bench.measured[k] for k in trials]))
         self.present = present
-        self.gram = np.stack([self.phi.matrix.T @ (self.phi.matrix * present[:, [j]]) for j in range(present.shape[1])])
+        masks, which = np.unique(present, axis=1, return_inverse=True)  # channels of one marker are missing together
+        self.gram = np.stack([self.phi.matrix.T @ (self.phi.matrix * mask[:, None]) for mask in masks.T])[which.ravel()]
 
     def discrepancy(self, z: np.ndarray) -> Discrepancy:
         """The most likely discrepancy of z (n * m,) or (n, m)."""

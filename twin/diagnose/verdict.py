@@ -110,11 +110,11 @@ def diagnose(
         *(f"{n}: unstable start, its shape is one of several" for n in unstable_starts(bench, nominal_traces)),
     ]
     progress("noise")
-    objective, notes = _objective(bench, twin, fitted, settings)
+    start, objective, notes = _objective(bench, twin, fitted, settings)
     notices += notes
     evidence = Evidence(bench, fitted)
     progress("calibration")
-    base = weigh(objective, evidence, fit(objective, Model.base(twin.robot, twin)))
+    base = weigh(objective, evidence, fit(objective, start))
     found = search(objective, evidence, base, progress)
     progress("verdict")
     best, dropped, small = _gate(objective, evidence, found, bench, twin.robot.accuracy, progress)
@@ -181,8 +181,8 @@ def diagnose(
     )
 
 
-def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Objective, list[str]]:
-    """Noise from a first, unweighted calibration; then the objective every later fit uses."""
+def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
+    """A first calibration under a guessed noise, and the objective every later fit uses."""
     measured = [bench.measured[k] for k in fitted]
     rough = np.array([2.5e-4 if o.group == "marker" else 5e-5 for o in bench.outputs])
     first = Noise(rough, 0.0, np.zeros(len(rough)), "start")
@@ -191,7 +191,7 @@ def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) 
     start = fit(objective, Model.base(twin.robot, twin), evaluations=4, tolerance=1e-3)
     sensitivity = _sensitivity(objective, start)
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
-    return Objective(bench, fitted, Whitener(noise, measured, sensitivity), settings.jobs), notes
+    return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity), settings.jobs), notes
 
 
 def _sensitivity(objective: Objective, at: Fit) -> list[np.ndarray]:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiled import cross, dot, jit
+from twin.compiled import cross, dot, jit, put
 from twin.effects.tendon_friction import slip_state, turn
 
 
@@ -59,7 +59,7 @@ def lever(axis, point, anchor):
 
 
 @jit
-def _weight_and_springs(q, rest, chain, load, r, J, tangent):
+def _weight_and_springs(q, rest, chain, load, r, J):
     nv = q.shape[0]
     g, tip = load.gravity, chain.site[chain.disk[-1]]
     n = np.empty((nv, 3))
@@ -67,17 +67,15 @@ def _weight_and_springs(q, rest, chain, load, r, J, tangent):
     for i in range(nv):
         p, c, m = chain.anchor[i], chain.centre[chain.body[i]], chain.mass[i]
         b = (tip[0] - p[0], tip[1] - p[1], tip[2] - p[2])
-        n[i] = cross(
-            chain.axis[i],
-            (
-                m * (c[0] - p[0]) + load.payload * b[0],
-                m * (c[1] - p[1]) + load.payload * b[1],
-                m * (c[2] - p[2]) + load.payload * b[2],
-            ),
+        m_lever = (
+            m * (c[0] - p[0]) + load.payload * b[0],
+            m * (c[1] - p[1]) + load.payload * b[1],
+            m * (c[2] - p[2]) + load.payload * b[2],
         )
-        f[i] = cross(chain.axis[i], b)
+        put(n[i], cross(chain.axis[i], m_lever))
+        put(f[i], cross(chain.axis[i], b))
         r[i] = chain.stiffness[i] * (q[i] - rest[i]) - dot(g, n[i]) - dot(load.force, f[i])
-    if tangent:
+    if J.size:
         for j in range(nv):
             b = cross(chain.axis[j], g)
             c = cross(chain.axis[j], load.force)
@@ -88,9 +86,9 @@ def _weight_and_springs(q, rest, chain, load, r, J, tangent):
 
 
 @jit
-def wall_force(chain, wall, r, J, tangent):
-    """Penalty force k max(0, -gap) along the wall's normal at each disk centre."""
-    normal, stiffness = wall[:3], wall[4]
+def wall_force(chain, wall, r, J):
+    """Penalty force k max(0, -gap) along the wall's normal at each disk centre, added to r and, unless it is empty, J."""
+    normal, stiffness = (wall[0], wall[1], wall[2]), wall[4]
     for k in range(chain.disk.shape[0]):
         x = chain.site[chain.disk[k]]
         gap = dot(normal, x) - wall[3]
@@ -100,9 +98,9 @@ def wall_force(chain, wall, r, J, tangent):
         n = chain.first[k + 1]
         X = np.empty((n, 3))
         for i in range(n):
-            X[i] = lever(chain.axis[i], x, chain.anchor[i])
+            put(X[i], lever(chain.axis[i], x, chain.anchor[i]))
             r[i] -= f * dot(normal, X[i])
-        if tangent:
+        if J.size:
             for j in range(n):
                 b = cross(chain.axis[j], normal)  # normal . (a_j x X_i) = -(a_j x normal) . X_i
                 for i in range(j, n):
@@ -113,17 +111,17 @@ def wall_force(chain, wall, r, J, tangent):
 
 
 @jit
-def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J, tangent):
-    """Residual r (nv,) in N m and, where `tangent`, its derivative J (nv, nv), at angles q already in MuJoCo's data.
+def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
+    """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), at angles q already in MuJoCo's data.
 
     (z0, s0) (n_tendon, n_disk) is the slip state and distal cable length of each hole when last at rest; (z, s) is what they are
     at q; s[:, 0] is the whole path.
     """
     nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
-    nv = q.shape[0]
-    _weight_and_springs(q, rest, chain, load, r, J, tangent)
+    nv, tangent = q.shape[0], J.size > 0
+    _weight_and_springs(q, rest, chain, load, r, J)
     if law.wall[4] > 0.0:
-        wall_force(chain, law.wall, r, J, tangent)
+        wall_force(chain, law.wall, r, J)
     u = np.empty((nd, 3))
     length = np.empty(nd)
     theta = np.empty(nd)
@@ -136,9 +134,9 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J, tangent):
             a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
             v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
             length[d] = np.sqrt(dot(v, v))
-            u[d] = (v[0] / length[d], v[1] / length[d], v[2] / length[d])
+            put(u[d], (v[0] / length[d], v[1] / length[d], v[2] / length[d]))
             for i in range(chain.first[d], chain.first[d + 1]):
-                X[i] = lever(chain.axis[i], b, chain.anchor[i])
+                put(X[i], lever(chain.axis[i], b, chain.anchor[i]))
                 dl[i] = dot(u[d], X[i])
         distal = 0.0
         for d in range(nd - 1, -1, -1):
@@ -164,7 +162,8 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J, tangent):
                             J[i, k] += h
         if not (tangent and law.mu > 0.0 and tension[t] > 0.0):
             continue
-        dlog[:] = 0.0  # derivative of sum_{j<=d} z_j turn(theta_j)
+        for i in range(nv):
+            dlog[i] = 0.0  # derivative of sum_{j<=d} z_j turn(theta_j)
         for d in range(1, nd):
             p, v = u[d - 1], u[d]
             co = dot(p, v)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.compiled import jit
+from twin.compiled import assign, jit
 from twin.equilibrium.chain import balance
 from twin.equilibrium.engine import mj_com_pos, mj_kinematics
 from twin.equilibrium.linear import factorise, substitute
@@ -27,121 +27,133 @@ FLOW_TOLERANCE = 1e-6  # rad, of the steps on the way
 @jit
 def place(model, data, chain, q):
     """MuJoCo's kinematics at q: all of chain's views move."""
-    chain.qpos[:] = q
+    assign(chain.qpos, q)
     mj_kinematics(model, data)
     mj_com_pos(model, data)
 
 
 @jit
-def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flow, anchor, tol, limit, certify):
+def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flow, anchor, tol):
     """Solve r(q) + flow K (q - anchor) = 0 from q. Returns the iterations, negative where it failed.
 
-    On success (z, s) are committed. `fresh[0]` says whether LU holds a usable factorisation. With `certify` a solution with a
-    non-positive pivot (not a minimum of the energy) counts as failed.
+    On success (z, s) are committed. `fresh[0]` says whether LU holds a usable factorisation.
     """
     nv = q.shape[0]
     K = chain.stiffness
-    r, J = np.empty(nv), np.empty((nv, nv))
-    z1, s1 = np.zeros_like(z), np.zeros_like(s)
-    before, step, last, dq = 1e300, 1.0, q.copy(), np.zeros(nv)
-    mix, f0 = False, np.zeros(nv)
+    r, J, none = np.empty(nv), np.empty((nv, nv)), np.empty((0, 0))
+    z1, s1 = np.zeros(z.shape), np.zeros(s.shape)
+    before, step = 1e300, 1.0
+    last, dq, f, f0 = np.empty(nv), np.zeros(nv), np.empty(nv), np.zeros(nv)
+    mix = False
     have = fresh[0]
-    for it in range(1, limit + 1):
+    for it in range(1, NEWTON_STEPS + 1):
         tangent = not have
         place(model, data, chain, q)
-        balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, J, tangent)
-        r += flow * K * (q - anchor)
-        size = np.abs(r / K).max()
+        balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, J if tangent else none)
+        size = 0.0
+        for i in range(nv):
+            r[i] += flow * K[i] * (q[i] - anchor[i])
+            size = max(size, abs(r[i] / K[i]))
+            if not np.isfinite(r[i]):
+                size = np.inf
         if not size < 1e9 or (tangent and size > GROWTH * before):
-            if step < 1e-3:
+            if step < 1e-3 or it == 1:
                 return -it
             step *= 0.5
-            fresh[0] = have = False
-            q[:] = last + step * dq
+            have = False
+            fresh[0] = False
+            for i in range(nv):
+                q[i] = last[i] + step * dq[i]
             continue
         if size < tol:
-            if certify:
-                balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, J, True)
-                LU[:] = J
-                fresh[0] = factorise(LU)
-                if not fresh[0]:
-                    return -it
-            z[:] = z1
-            s[:] = s1
+            for t in range(z.shape[0]):
+                assign(z[t], z1[t])
+                assign(s[t], s1[t])
             return it
         if not tangent and size > CONTRACTION * before and it > 1:
-            balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, J, True)
-            r += flow * K * (q - anchor)
+            balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, J)
+            for i in range(nv):
+                r[i] += flow * K[i] * (q[i] - anchor[i])
             tangent = True
         if tangent:
-            LU[:] = J
             for i in range(nv):
+                assign(LU[i], J[i])
                 LU[i, i] += flow * K[i]
             fresh[0] = factorise(LU)
             if not fresh[0]:
                 return -it
         have = True
         before = size
-        f = -r
+        for i in range(nv):
+            f[i] = -r[i]
         substitute(LU, f)
-        w = f - f0
-        ww = (w * w).sum()
-        theta = (f * w).sum() / ww if mix and not tangent and ww > 0.0 else 0.0
-        f0[:] = f
-        dq[:] = f - theta * (dq + w)
-        last[:] = q
-        step = min(1.0, LONGEST_STEP / np.abs(dq).max())
+        ww, fw, longest = 0.0, 0.0, 0.0
+        for i in range(nv):
+            w = f[i] - f0[i]
+            ww += w * w
+            fw += f[i] * w
+        theta = fw / ww if mix and not tangent and ww > 0.0 else 0.0
+        for i in range(nv):
+            dq[i] = f[i] - theta * (dq[i] + f[i] - f0[i])
+            f0[i] = f[i]
+            last[i] = q[i]
+            longest = max(longest, abs(dq[i]))
+        step = min(1.0, LONGEST_STEP / longest)
         mix = step == 1.0
-        q += step * dq
-    return -limit
+        for i in range(nv):
+            q[i] += step * dq[i]
+    return -NEWTON_STEPS
 
 
 @jit
-def solve(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol, certify):
-    """Equilibrium near q. Returns 1: found directly; 2: found by following the motion (q was no stable start); 0: not found."""
-    start = q.copy()
-    if newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, 0.0, start, tol, NEWTON_STEPS, certify) > 0:
-        return 1
-    q[:] = start
+def is_minimum(model, data, chain, rest, tension, law, load, z, s, q, LU):
+    """Whether the tangent at q is positive, so that q is a stable shape. Leaves its factors in LU."""
+    r, z1, s1 = np.empty(q.size), np.zeros(z.shape), np.zeros(s.shape)
+    place(model, data, chain, q)
+    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, LU)
+    return factorise(LU)
+
+
+@jit
+def follow(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol):
+    """Equilibrium reached by the overdamped motion from q. Returns whether there was one."""
     flow = 1.0
-    z_before, s_before = z.copy(), s.copy()
+    start, z_before, s_before = np.empty(q.size), np.empty(z.shape), np.empty(s.shape)
     for k in range(FLOW_STEPS):
-        start[:] = q
-        z_before[:] = z
-        s_before[:] = s
+        assign(start, q)
+        for t in range(z.shape[0]):
+            assign(z_before[t], z[t])
+            assign(s_before[t], s[t])
         fresh[0] = False
         final = flow == 0.0
-        n = newton(
-            model,
-            data,
-            chain,
-            rest,
-            tension,
-            law,
-            load,
-            z,
-            s,
-            q,
-            LU,
-            fresh,
-            flow,
-            start,
-            tol if final else FLOW_TOLERANCE,
-            15,
-            final,
-        )
+        n = newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flow, start, tol if final else FLOW_TOLERANCE)
         fresh[0] = False
+        if n > 0 and final:
+            if is_minimum(model, data, chain, rest, tension, law, load, z, s, q, LU):
+                return True
+            n = -n
         if n <= 0:
-            q[:] = start
-            z[:] = z_before
-            s[:] = s_before
+            assign(q, start)
+            for t in range(z.shape[0]):
+                assign(z[t], z_before[t])
+                assign(s[t], s_before[t])
             flow = max(4.0 * flow, 0.05)
             continue
-        if final:
-            return 2
-        moved = np.abs(q - start).max()
+        moved = 0.0
+        for i in range(q.size):
+            moved = max(moved, abs(q[i] - start[i]))
         flow = 0.0 if moved * flow < 1e-4 else 0.5 * flow
         if k == 0 and moved < 1e-9:  # exactly on a saddle: leave it
             for i in range(q.size):
                 q[i] += 1e-3 * (1 + 7 * i % 5)
-    return 0
+    return False
+
+
+@jit
+def solve(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol):
+    """Equilibrium near q. Returns 1: found directly; 2: found by following the motion (q was no stable start); 0: not found."""
+    start = q.copy()
+    if newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, 0.0, start, tol) > 0:
+        return 1
+    assign(q, start)
+    return 2 if follow(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol) else 0

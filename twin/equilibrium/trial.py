@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.compiled import jit
+from twin.compiled import assign, jit
 from twin.effects.backbone_creep import retard
 from twin.equilibrium.chain import balance
-from twin.equilibrium.linear import factorise
-from twin.equilibrium.newton import place, solve
+from twin.equilibrium.newton import follow, is_minimum, place, solve
 
 RAMP = 8  # steps from slack to the first tensions; 8 against 64 moves the tip by less than 0.05 mm
+
+RAMP_TOLERANCE = 1e-6  # rad
 
 
 @jit
@@ -24,6 +25,15 @@ def creep(delayed, instant, amplitude, time, dt):
     for m in range(amplitude.size):
         for i in range(instant.size):
             delayed[m, i] = retard(delayed[m, i], instant[i], amplitude[m], time[m], dt)
+
+
+@jit
+def rested(spring, delayed, rest):
+    """Rest angles (nv,) after creep: the springs' own plus all delayed strains."""
+    for i in range(spring.size):
+        rest[i] = spring[i]
+        for m in range(delayed.shape[0]):
+            rest[i] += delayed[m, i]
 
 
 @jit
@@ -40,47 +50,57 @@ def run(
     Returns the status of the start: 1, or 2 where the loaded robot has no stable equilibrium near straight.
     """
     n, nv, nt = tension.shape[0], spring.size, tension.shape[1]
-    q, q1, q2 = spring.copy(), np.empty(nv), np.empty(nv)
-    for m in range(amplitude.size):
-        q += delayed[m]
-    rest = q.copy()
-    z[:] = 0.0
+    q, q1, q2, rest, instant = np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv)
     LU, fresh, T = np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt)
-    r, z1, s1 = np.empty(nv), np.empty_like(z), np.empty_like(s)
+    r, z1, s1, none = np.empty(nv), np.empty(z.shape), np.empty(z.shape), np.empty((0, 0))
+    rested(spring, delayed, rest)
+    assign(q, rest)
     place(model, data, chain, q)
-    balance(q, rest, chain, T, law, load, z, s, z1, s1, r, LU, False)
-    s[:] = s1
-    started = solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol, True)
-    for k in range(1, RAMP + 1):
-        T[:] = tension[0] * (k / RAMP)
-        if solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, 1e-6 if k < RAMP else tol, False) == 0:
-            started = 0
-    q1[:] = q
-    q2[:] = q
+    for t in range(nt):
+        for d in range(z.shape[1]):
+            z[t, d] = 0.0
+    balance(q, rest, chain, T, law, load, z, s, z1, s1, r, none)
+    for t in range(nt):
+        assign(s[t], s1[t])
+    started = 1
+    if law.mu > 0.0 or not guess.size:  # without friction a trial has no memory of its start
+        started = solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol)
+        if started == 1 and not is_minimum(model, data, chain, rest, T, law, load, z, s, q, LU):
+            started = 2 if follow(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol) else 0
+        steps = RAMP if law.mu > 0.0 else 1
+        for k in range(1, steps + 1):
+            for t in range(nt):
+                T[t] = tension[0, t] * (k / steps)
+            if solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, RAMP_TOLERANCE) == 0:
+                started = 0
+    assign(q1, q)
+    assign(q2, q)
     for i in range(n):
         if amplitude.size and i > 0:
-            creep(delayed, q1 - rest, amplitude, retardation, time[i] - time[i - 1])
-            rest[:] = spring
-            for m in range(amplitude.size):
-                rest += delayed[m]
+            for k in range(nv):
+                instant[k] = q1[k] - rest[k]
+            creep(delayed, instant, amplitude, retardation, time[i] - time[i - 1])
+            rested(spring, delayed, rest)
         if guess.size:
-            q[:] = guess[i]
-            LU[:] = guess_LU[i]
+            assign(q, guess[i])
+            for k in range(nv):
+                assign(LU[k], guess_LU[i, k])
             fresh[0] = True
         else:
-            q[:] = 2.0 * q1 - q2
-        q2[:] = q1
-        T[:] = tension[i]
-        status[i] = solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol, False)
+            for k in range(nv):
+                q[k] = 2.0 * q1[k] - q2[k]
+        assign(q2, q1)
+        assign(T, tension[i])
+        status[i] = solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol)
         if status[i] == 0:
-            q[:] = q1
-        if keep:
-            balance(q, rest, chain, T, law, load, z, s, z1, s1, r, LUs[i], True)
-            if not factorise(LUs[i]):
-                LUs[i] = LU
-        q1[:] = q
-        q_out[i] = q
+            assign(q, q1)
+        if keep and not is_minimum(model, data, chain, rest, T, law, load, z, s, q, LUs[i]):
+            for k in range(nv):
+                assign(LUs[i, k], LU[k])
+        assign(q1, q)
+        assign(q_out[i], q)
         for k in range(chain.marker.size):
-            marker[i, k] = chain.site[chain.marker[k]]
-        path[i] = s[:, 0]
+            assign(marker[i, k], chain.site[chain.marker[k]])
+        for t in range(nt):
+            path[i, t] = s[t, 0]
     return started

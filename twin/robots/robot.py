@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import DataError, UnknownNameError
-from twin.quantities import Parameter, Values, overrides, si_factor
+from twin.quantities import Parameter, Values, overrides, si_factor, si_unit
 from twin.robots.body import Body
 
 FORMAT = "twin-robot/1"
@@ -107,6 +107,7 @@ def _parameters(path: Path, name: str, entry: Mapping[str, object]) -> list[Para
     if missing:
         raise DataError(f"{path}: parameter {name!r} lacks {', '.join(sorted(missing))}; every number has a unit and a source")
     factor = si_factor(str(entry["unit"]), f"{path}: parameter {name!r}")
+    unit = si_unit(str(entry["unit"]), f"{path}: parameter {name!r}")
     value = entry["value"]
     many = isinstance(value, list)
     numbers: list[float] = [float(v) for v in value] if isinstance(value, list) else [float(value)]  # type: ignore[arg-type]
@@ -115,7 +116,7 @@ def _parameters(path: Path, name: str, entry: Mapping[str, object]) -> list[Para
         Parameter(
             name=f"{name}_{k}" if many else name,
             value=v * factor,
-            unit=str(entry["unit"]),
+            unit=unit,
             low=float(entry["low"]) * factor if "low" in entry else -np.inf,  # type: ignore[arg-type]
             high=float(entry["high"]) * factor if "high" in entry else np.inf,  # type: ignore[arg-type]
             source=str(entry["source"]),

@@ -1,0 +1,103 @@
+"""`twin.toml`: the robot, the calibrated parameters and the effects in force, everything needed to predict again."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from twin.effects import named
+from twin.errors import DataError, TwinError
+from twin.quantities import Fitted, Parameter, overrides, si_factor
+from twin.robots import available, load
+from twin.twin import Twin
+
+FORMAT = "twin/1"
+
+
+def read_twin(source: str | Path) -> Twin:
+    """A twin from a `twin.toml`, a folder that holds one (a report), or a robot's name alone.
+
+    Raises DataError where the file breaks its contract, UnknownNameError for a robot or effect that does not exist.
+    """
+    path = Path(source)
+    if path.is_dir() and (path / "twin.toml").is_file():
+        path = path / "twin.toml"
+    if path.suffix != ".toml" or not path.is_file():
+        if path.suffix == ".toml" or (os.sep in str(source) and not (path / "robot.toml").is_file()):
+            raise DataError(f"{path}: no such twin; give a twin.toml, a folder with one, or a robot: {', '.join(available())}")
+        return Twin.of(load(str(source)))
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DataError(f"{path}: {error}") from None
+    if table.get("format") != FORMAT:
+        raise DataError(f"{path}: format is {table.get('format')!r}; this program reads {FORMAT!r}")
+    if not isinstance(table.get("robot"), str):
+        raise DataError(f"{path}: `robot` is missing; name one of {', '.join(available())}, or a path to a robot's folder")
+    robot = load(table["robot"], path.parent)
+    try:
+        values = _values(path, table.get("parameters", {}), robot.parameters)
+        overrides(robot.parameters, values)
+        n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
+        effects = []
+        for entry in table.get("effect", []):
+            law = named(str(entry.get("id")))
+            effects.append(law(_values(path, entry.get("parameters", {}), law.declared(n_tendon)), n_tendon))
+    except TwinError as error:
+        raise type(error)(str(error)) if isinstance(error, DataError) else DataError(f"{path}: {error}") from None
+    return Twin(robot, values, tuple(effects))
+
+
+def _values(path: Path, table: Any, declared: tuple[Parameter, ...]) -> dict[str, float]:
+    """Values of a parameter table: plain SI numbers, or {value, unit, std}."""
+    units = {p.name: p.unit for p in declared}
+    out = {}
+    for name, entry in table.items():
+        if name not in units:
+            raise DataError(f"{path}: no parameter named {name!r}; available: {', '.join(sorted(units))}")
+        try:
+            if isinstance(entry, Mapping):
+                unit = str(entry.get("unit", units[name]))
+                out[name] = float(entry["value"]) * si_factor(unit, f"{path}: {name}")
+            else:
+                out[name] = float(entry)
+        except (KeyError, TypeError, ValueError):
+            raise DataError(f"{path}: parameter {name!r} is {entry!r}; write a number, or {{ value = ..., unit = ... }}") from None
+    return out
+
+
+def twin_table(twin: Twin, parameters: Mapping[str, Fitted], effects: Mapping[str, Mapping[str, Fitted]]) -> dict[str, Any]:
+    """A twin as its file's content; standard errors where a fit found them."""
+    units = {p.name: p.unit for p in twin.robot.parameters}
+    table: dict[str, Any] = {"format": FORMAT, "robot": robot_reference(twin)}
+    table["parameters"] = {n: entry(parameters.get(n) or Fitted(v, None, units[n])) for n, v in sorted(twin.values.items())}
+    table["effect"] = []
+    for effect in twin.effects:
+        laws = {p.name: p.unit for p in effect.declared(effect.n_tendon)}
+        found = effects.get(effect.id, {})
+        values = {n: entry(found.get(n) or Fitted(v, None, laws[n])) for n, v in effect.values.items()}
+        table["effect"].append({"id": effect.id, "parameters": values})
+    return table
+
+
+def robot_reference(twin: Twin) -> str:
+    """The robot's name where it ships with the program, else the path to its folder."""
+    return twin.robot.name if twin.robot.name in available() else str(twin.robot.folder)
+
+
+def entry(fitted: Fitted) -> dict[str, Any]:
+    """A value with unit and, where known, standard error, as reports and twins write it."""
+    out: dict[str, Any] = {"value": fitted.value, "unit": fitted.unit}
+    return out if fitted.std is None else {**out, "std": fitted.std}
+
+
+def write_twin(path: Path, table: Mapping[str, Any], provenance: Mapping[str, Any]) -> None:
+    """Writes a twin whole or not at all: to a neighbour first, then renamed."""
+    whole = path.with_name(path.name + ".part")
+    whole.write_text(tomli_w.dumps({**table, "provenance": dict(provenance)}), "utf-8")
+    whole.replace(path)
