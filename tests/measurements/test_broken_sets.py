@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -97,6 +98,11 @@ def bomb() -> bytes:
         archive.writestr("offsets.npy", npy([0, 1]))
         archive.writestr("time.npy", npy([0.0]))
     return stream.getvalue()
+
+
+def understated(data: bytes, size: int, claim: int) -> bytes:
+    """Every place that says a member unpacks to `size` bytes now says `claim`."""
+    return data.replace(struct.pack("<L", size), struct.pack("<L", claim))
 
 
 def two_time_members() -> bytes:
@@ -248,3 +254,17 @@ def test_broken_set_is_refused_with_its_place(name: str, tmp_path: Path) -> None
     assert all(part in message for part in expected), message
     assert "\n" not in message
     assert len(message.removeprefix(str(tmp_path))) < 500
+
+
+def test_a_bomb_that_hides_its_size_is_not_unpacked(tmp_path: Path) -> None:
+    folder = write_set(tmp_path / "set")
+    (folder / "a.clouds.npz").write_bytes(understated(bomb(), 300 * 2**20, 1000))
+    read(write_set(tmp_path / "warm up"))
+    tracemalloc.start()
+    try:
+        with pytest.raises(DataError, match=r"a\.clouds\.npz: cannot be read as NPZ"):
+            read(folder)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 20e6  # bytes; reading a set of this size takes 2 MB

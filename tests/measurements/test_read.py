@@ -205,6 +205,11 @@ def test_the_hash_follows_the_data_and_nothing_else(folder: Path) -> None:
         edit(folder / file, old, new)
         assert read(folder).data_hash() != plain
         edit(folder / file, new, old)
+    (folder / "b.csv").rename(folder / "c.csv")
+    edit(folder / "measurements.toml", '"b.csv"', '"c.csv"')
+    assert read(folder).data_hash() != plain
+    edit(folder / "measurements.toml", '"c.csv"', '"b.csv"')
+    (folder / "c.csv").rename(folder / "b.csv")
     assert read(folder).data_hash() == plain
 
 

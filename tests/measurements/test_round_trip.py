@@ -74,6 +74,16 @@ def test_readings_come_back_bit_for_bit(drawn: tuple, file_format: str) -> None:
     assert back.data_hash() == recording.data_hash()
 
 
+@pytest.mark.parametrize(("name", "unit"), [(name, unit) for name, units in UNITS.items() for unit in units])
+def test_every_reading_has_its_way_back(name: str, unit: str) -> None:
+    scale = Channel(name, "output", unit).scale
+    drawn = np.random.default_rng(0).uniform(-1e3, 1e3, 20_000)
+    si = scale.to_si(drawn)
+    np.testing.assert_array_equal(scale.to_si(scale.from_si(si)), si)
+    short = np.round(drawn, 3)  # as a logger prints them: these come back digit for digit
+    np.testing.assert_array_equal(scale.from_si(scale.to_si(short)), short)
+
+
 @FEW
 @given(
     st.fixed_dictionaries({"robot": TEXT.filter(str.strip), "title": TEXT, "source": TEXT}),

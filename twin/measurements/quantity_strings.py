@@ -53,9 +53,8 @@ class Scale:
         if self == Scale(1.0, 1.0, 0.0):
             return si
         plain = (si - self.offset) * self.denominator / self.numerator
-        tidy = np.array([float(f"{value:.15g}") for value in plain])  # 12.3 rather than 12.300000000000001
-        up, down = np.nextafter(plain, np.inf), np.nextafter(plain, -np.inf)
-        candidates = (tidy, plain, up, down, np.nextafter(up, np.inf), np.nextafter(down, -np.inf))
+        tidy = np.array([float(f"{value:.12g}") for value in plain])  # 12.3 rather than 12.300000000000001
+        candidates = (tidy, plain, np.nextafter(plain, np.inf), np.nextafter(plain, -np.inf))
         result, settled = plain.copy(), np.zeros(plain.shape, bool)
         for candidate in candidates:
             exact = ~settled & (self.to_si(candidate) == si)

@@ -69,9 +69,7 @@ def _check_header(where: str, header: Sequence[str], names: Sequence[str]) -> tu
 
 
 def _fast_columns(data: bytes, header: Sequence[str], names: Sequence[str]) -> dict[str, np.ndarray] | None:
-    """The columns, or None for a table that only the slow reader can read or blame; a quoted cell could hide a line end."""
-    if b'"' in data:
-        return None
+    """The columns, or None for a table that only the slow reader can read or blame, such as one with quoted numbers."""
     try:
         table = pyarrow.csv.read_csv(
             pa.BufferReader(data.rstrip()),
