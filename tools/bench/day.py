@@ -1,0 +1,57 @@
+"""From a seed to a measurement set on disk; the same arguments give the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tools.bench.amplitude import Scale, scaled
+from tools.bench.bench import run
+from tools.bench.design import bench_day
+from tools.bench.effects import Effect, all_effects
+from tools.bench.nuisance import built
+from tools.bench.sensors import Noise
+from tools.bench.write import write_set, write_truth
+
+
+def make_set(
+    folder: Path,
+    effects: Sequence[str],
+    amplitude: float = 3.0,  # sigmas left by each effect
+    seed: int = 0,
+    design: str = "default",
+    *,
+    displacement: bool = False,
+    ambient: bool = False,
+    coloured: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> list[tuple[Effect, float]]:
+    """Write the set; returns each effect as scaled and the sigmas it leaves."""
+    known = all_effects()
+    # Streams of their own, so that adding an effect changes neither robot nor day.
+    robot, motions, instruments, laws = (np.random.default_rng([seed, n]) for n in range(4))
+    rod = built(robot)
+    day = bench_day(design, motions)
+    noise = Noise.draw(instruments, coloured)
+    found = []
+    for name in effects:
+        progress(f"scaling {name}")
+        found.append(scaled(known[name].draw(laws), amplitude, Scale(rod, day, noise)))
+    chosen = [effect for effect, _ in found]
+    logs = run(rod, chosen, day, lambda done: progress(f"trial {done} of {len(day.trials)}"))
+    title = f"Virtual bench day {seed}"
+    write_set(
+        folder,
+        title,
+        day,
+        logs,
+        noise,
+        instruments,
+        displacement=displacement or any(e.seen_in == "displacement" for e in chosen),
+        ambient=ambient or any(e.needs_ambient for e in chosen),
+        exact_input=any(e.logs_command for e in chosen),
+    )
+    write_truth(folder, seed, design, rod, found, noise)
+    return found
