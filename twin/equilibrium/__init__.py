@@ -9,8 +9,9 @@ import numpy as np
 
 from twin.effects import Creep, Loads, Route
 from twin.equilibrium.chain import Chain, Law, Load
+from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.trial import run
-from twin.robots import Body
+from twin.robots import Body, hinge_pairs
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
 
@@ -47,6 +48,16 @@ class Equilibrium:
         self.data = data = mujoco.MjData(model)
         site = np.vectorize(lambda name: model.site(name).id, otypes=[np.int64])
         hole = site(np.array(body.tendons))
+        stiffness = model.jnt_stiffness.reshape(model.nv, -1)[:, 0].copy()
+        partner = np.empty(model.nv, np.int64)
+        for one, other in hinge_pairs(body):
+            a, b = model.joint(one).dofadr[0], model.joint(other).dofadr[0]
+            partner[a], partner[b] = b, a
+        slender = np.zeros(model.nv)
+        for at in body.joints:
+            for hinge in (at.bend_x, at.bend_y):
+                i = model.joint(hinge).dofadr[0]
+                slender[i] = 4.0 * at.length / stiffness[i]
         hinges = np.zeros(model.nbody, np.int64)  # from the base up to and with each body
         for b in range(1, model.nbody):
             hinges[b] = hinges[model.body_parentid[b]] + model.body_dofnum[b]
@@ -57,7 +68,11 @@ class Equilibrium:
             centre=data.subtree_com,
             site=data.site_xpos,
             qpos=data.qpos,
-            stiffness=model.jnt_stiffness.reshape(model.nv, -1)[:, 0].copy(),
+            stiffness=stiffness,
+            slender=slender,
+            partner=partner,
+            coupling=COUPLING * 0.5 * (stiffness + stiffness[partner]),
+            hand=np.linalg.det(model.jnt_axis.reshape(-1, 3, 3)),
             body=moved_by,
             mass=model.body_subtreemass[moved_by].copy(),
             hole=hole,

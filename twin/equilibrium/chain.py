@@ -1,9 +1,8 @@
 """The balance of forces of a hinge chain pulled by tendons, and its exact tangent.
 
-Energy of the chain without friction, with hinge angles q, rest angles q0, stiffness K, tendon segments l_d under tension T_d,
-masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
+Energy of the chain without friction, with elastic energy E_el (elastic.py), tendon segments l_d under tension T_d, masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
 
-    E(q) = 1/2 (q-q0)' K (q-q0) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
+    E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
 
 `balance` returns r = dE/dq with T_d the tensions that friction leaves, and J = dr/dq. A segment's length depends only on
 the hinges of its own disk interval, so its geometric stiffness is a small block; gravity's Hessian follows from one vector a
@@ -19,6 +18,7 @@ import numpy as np
 
 from twin.compiled import cross, dot, jit, put
 from twin.effects.tendon_friction import slip_state, turn
+from twin.equilibrium.elastic import springs
 
 
 class Chain(NamedTuple):
@@ -30,6 +30,10 @@ class Chain(NamedTuple):
     site: np.ndarray  # (nsite, 3) m
     qpos: np.ndarray  # (nv,) rad
     stiffness: np.ndarray  # (nv,) N m/rad
+    slender: np.ndarray  # (nv,) h^2 / EI of the disk interval, 1/N; 0 for twist
+    partner: np.ndarray  # (nv,) the hinge about the same axis in the other set of the disk interval
+    coupling: np.ndarray  # (nv,) N m/rad
+    hand: np.ndarray  # (n_set,) 1 where a set's hinges are right-handed, else -1
     body: np.ndarray  # (nv,) the body each hinge moves
     mass: np.ndarray  # (nv,) of everything distal of the hinge, kg
     hole: np.ndarray  # (n_tendon, n_disk + 1) sites
@@ -59,8 +63,8 @@ def lever(axis, point, anchor):
 
 
 @jit
-def _weight_and_springs(q, rest, chain, load, r, J):
-    nv = q.shape[0]
+def _add_weight(chain, load, r, J):
+    nv = r.shape[0]
     g, tip = load.gravity, chain.site[chain.disk[-1]]
     n = np.empty((nv, 3))
     f = np.empty((nv, 3))
@@ -74,15 +78,16 @@ def _weight_and_springs(q, rest, chain, load, r, J):
         )
         put(n[i], cross(chain.axis[i], m_lever))
         put(f[i], cross(chain.axis[i], b))
-        r[i] = chain.stiffness[i] * (q[i] - rest[i]) - dot(g, n[i]) - dot(load.force, f[i])
+        r[i] -= dot(g, n[i]) + dot(load.force, f[i])
     if J.size:
         for j in range(nv):
             b = cross(chain.axis[j], g)
             c = cross(chain.axis[j], load.force)
             for i in range(j, nv):
-                J[i, j] = b[0] * n[i, 0] + b[1] * n[i, 1] + b[2] * n[i, 2] + c[0] * f[i, 0] + c[1] * f[i, 1] + c[2] * f[i, 2]
-                J[j, i] = J[i, j]
-            J[j, j] += chain.stiffness[j]
+                h = b[0] * n[i, 0] + b[1] * n[i, 1] + b[2] * n[i, 2] + c[0] * f[i, 0] + c[1] * f[i, 1] + c[2] * f[i, 2]
+                J[i, j] += h
+                if i > j:
+                    J[j, i] += h
 
 
 @jit
@@ -119,7 +124,11 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
     """
     nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
     nv, tangent = q.shape[0], J.size > 0
-    _weight_and_springs(q, rest, chain, load, r, J)
+    pressure = 0.0
+    for t in range(nt):
+        pressure += tension[t]
+    springs(q, rest, chain.stiffness, chain.slender, pressure, chain.partner, chain.coupling, chain.hand, r, J)
+    _add_weight(chain, load, r, J)
     if law.wall[4] > 0.0:
         wall_force(chain, law.wall, r, J)
     u = np.empty((nd, 3))

@@ -12,6 +12,7 @@ import numpy as np
 from twin.compiled import assign, jit
 from twin.effects.backbone_creep import retard
 from twin.equilibrium.chain import balance
+from twin.equilibrium.elastic import bendings
 from twin.equilibrium.newton import follow, is_minimum, place, solve
 
 RAMP = 8  # steps from slack to the first tensions; 8 against 64 moves the tip by less than 0.05 mm
@@ -53,6 +54,7 @@ def run(
     q, q1, q2, rest, instant = np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv)
     LU, fresh, T = np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt)
     r, z1, s1, none = np.empty(nv), np.empty(z.shape), np.empty(z.shape), np.empty((0, 0))
+    D = np.empty((chain.hand.size, 3, 3))
     rested(spring, delayed, rest)
     assign(q, rest)
     place(model, data, chain, q)
@@ -77,8 +79,9 @@ def run(
     assign(q2, q)
     for i in range(n):
         if amplitude.size and i > 0:
+            bendings(q1, chain.hand, instant, D)
             for k in range(nv):
-                instant[k] = q1[k] - rest[k]
+                instant[k] -= rest[k]
             creep(delayed, instant, amplitude, retardation, time[i] - time[i - 1])
             rested(spring, delayed, rest)
         if guess.size:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import mujoco
@@ -37,3 +38,9 @@ class Body:
     disks: tuple[str, ...]
     tip: str
     length: float
+
+
+def hinge_pairs(body: Body) -> Iterator[tuple[str, str]]:
+    """Hinges about the same axis in the two joint sets of each disk interval."""
+    for one, other in zip(body.joints[::2], body.joints[1::2], strict=True):
+        yield from ((one.bend_x, other.bend_x), (one.bend_y, other.bend_y), (one.twist, other.twist))
