@@ -1,6 +1,7 @@
 """Dynamic prediction: MuJoCo steps with the tension laws computed between them, in one compiled loop.
 
-Per step: slip states from the tendons' travel, segment tensions to `ctrl`, wall and tip force to `qfrc_applied`, `mj_step`. The
+Per step: slip states from the tendons' travel, segment tensions to `ctrl`, wall, tip force and what the hinges' springs lack of the true
+elastic moment (elastic.py) to `qfrc_applied`, `mj_step`. The
 slip state is explicit here; it is stable while the pre-sliding length in mm is at least half the step in ms, so the step shrinks with
 a short pre-sliding length. `discrete` integrates implicitly and damps: 2 % of critical at 1 ms on the first mode.
 """
@@ -15,13 +16,15 @@ from twin.effects import Creep, Loads, Route
 from twin.effects.tendon_friction import slip_state, turn
 from twin.equilibrium import DIRECT, Equilibrium, Path
 from twin.equilibrium.chain import Law, Load, lever, wall_force
+from twin.equilibrium.elastic import COUPLING, bendings, springs
 from twin.equilibrium.engine import mj_step
 from twin.equilibrium.newton import place
 from twin.equilibrium.trial import creep as advance_creep
 from twin.equilibrium.trial import rested
-from twin.robots import Body
+from twin.robots import Body, hinge_pairs
 
 STEP_PER_PRESLIDING = 2.0  # s/m
+REFRESH = 2  # steps between evaluations of the applied forces, which change by per cents a step
 
 
 @jit
@@ -55,21 +58,27 @@ def step_through(
 ):  # fmt: skip
     """Step from time[0], tensions linear between samples; markers (n, n_marker, 3) and path (n, n_tendon) at the samples."""
     n, nv = time.size, velocity.size
-    now, T, r, J, q = time[0], np.empty(tension.shape[1]), np.zeros(nv), np.empty((0, 0)), np.empty(nv)
-    tip = chain.disk[-1]
-    forced = dot(load.force, load.force) > 0.0
+    now, T, r, q = time[0], np.empty(tension.shape[1]), np.zeros(nv), np.empty(nv)
+    tip, taken = chain.disk[-1], 0
+    none, K, D = np.empty((0, 0)), chain.stiffness, np.empty((chain.hand.size, 3, 3))
     for i in range(n):
         while i > 0 and now + step <= time[i]:
             w = (now + step - time[i - 1]) / (time[i] - time[i - 1])
             for t in range(T.size):
                 T[t] = (1.0 - w) * tension[i - 1, t] + w * tension[i, t]
             route_tension(chain, T, law, z, s, ctrl, motor)
-            if law.wall[4] > 0.0 or forced:
-                r[:] = 0.0
+            if taken % REFRESH == 0:
+                pressure = T.sum()
+                springs(chain.qpos, spring, K, chain.slender, pressure, chain.partner, chain.coupling, chain.hand, r, none)
                 if law.wall[4] > 0.0:
-                    wall_force(chain, law.wall, r, J)
+                    wall_force(chain, law.wall, r, none)
                 for k in range(nv):
-                    applied[k] = dot(load.force, lever(chain.axis[k], chain.site[tip], chain.anchor[k])) - r[k]
+                    p = chain.partner[k]
+                    native = K[k] * (chain.qpos[k] - spring[k]) + chain.coupling[k] * (
+                        chain.qpos[k] - chain.qpos[p] - fixed[k] + fixed[p]
+                    )
+                    applied[k] = native - r[k] + dot(load.force, lever(chain.axis[k], chain.site[tip], chain.anchor[k]))
+            taken += 1
             mj_step(model, data)
             now += step
         q[:] = chain.qpos
@@ -84,7 +93,10 @@ def step_through(
         q_out[i] = chain.qpos
         place(model, data, chain, q)
         if amplitude.size and i > 0:
-            advance_creep(delayed, q - spring, amplitude, retardation, time[i] - time[i - 1])
+            bendings(q, chain.hand, r, D)
+            for k in range(nv):
+                r[k] -= spring[k]
+            advance_creep(delayed, r, amplitude, retardation, time[i] - time[i - 1])
             rested(fixed, delayed, spring)
 
 
@@ -129,10 +141,16 @@ class Dynamics:
 
 
 def _loaded(body: Body, payload: float) -> Body:
-    """A copy of the body with a point mass at its tip."""
+    """A copy of the body with a point mass at its tip and, as fixed tendons, the coupling springs of elastic.py."""
     spec = body.spec.copy()
+    for one, other in hinge_pairs(body):
+        stiffness = 0.5 * COUPLING * (spec.joint(one).stiffness[0] + spec.joint(other).stiffness[0])
+        spring = spec.add_tendon(name=f"{one}-{other}")
+        spring.stiffness = [stiffness, 0, 0]
+        spring.wrap_joint(one, 1.0)
+        spring.wrap_joint(other, -1.0)
     if payload > 0.0:
         site = spec.site(body.tip)
         mass = site.parent.add_body(name="payload", pos=site.pos, mass=payload, inertia=[1e-9, 1e-9, 1e-9])
-        mass.explicitinertial = True
+        mass.ipos, mass.explicitinertial = [0, 0, 0], True
     return Body(spec, body.joints, body.tendons, body.markers, body.disks, body.tip, body.length)
