@@ -16,7 +16,7 @@ from tools.bench.day import make_set
 from tools.bench.design import bench_day
 from tools.bench.effects import all_effects
 from tools.bench.frames import gauss_mesh
-from tools.bench.rod import Creep, Rod, follow, solve, straight_lengths
+from tools.bench.rod import STIFFEST, Creep, Rod, follow, solve, straight_lengths
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 EI = 77.59e9 * np.pi / 4 * 0.4e-3**4
@@ -52,7 +52,7 @@ def test_tip_load_bends_an_elastica():
         return np.array([a[0], b[1], a[2], a[3]])
 
     s = np.linspace(0, length, 50)
-    answer = solve_bvp(slope, ends, s, np.zeros((4, 50)) + [[0.5], [1.0], [0.05], [0.05]], tol=1e-10, max_nodes=100_000)
+    answer = solve_bvp(slope, ends, s, np.tile([[0.5], [1.0], [0.05], [0.05]], 50), tol=1e-10, max_nodes=100_000)
     tip = solve(Rod(), gravity=NO_GRAVITY, tip_force=[force, 0, 0]).disks[-1]
     np.testing.assert_allclose(tip, [answer.y[2, -1], 0.0, answer.y[3, -1]], rtol=0, atol=2e-8)  # m: the mesh's own error
 
@@ -136,11 +136,13 @@ def test_creep_under_a_constant_moment_is_its_prony_series():
 
 
 def test_driving_by_length_inverts_driving_by_tension():
-    tension = np.array([2.0, 0.7, 0.4])
+    tension = np.array([2.0, 0.7, 0.0])
     x = np.linspace(0, 1, 20)[1:, None]
     pulled = follow(Rod(), x * tension, gravity=[9.81, 0, 0], payload=0.01)
-    paid = np.array([[0.0, 0.0, 0.0]])  # all just taut on the straight robot, then pulled in as found
-    back = follow(Rod(), np.vstack([paid, -pulled.displacement[-3:]]), gravity=[9.81, 0, 0], payload=0.01, by_length=True)
+    stretched = STIFFEST * pulled.tension[:, 0]
+    # From all just taut on the straight robot; the third, without tension, is paid out a millimetre further.
+    drive = np.vstack([np.zeros(3), (-pulled.displacement - stretched + [0, 0, 1e-3])[-3:]])
+    back = follow(Rod(), drive, gravity=[9.81, 0, 0], payload=0.01, by_length=True)
     np.testing.assert_allclose(back.tension[-1, 0], tension, rtol=0, atol=1e-6)
     np.testing.assert_allclose(back.disks[-1], pulled.disks[-1], rtol=0, atol=1e-9)
 

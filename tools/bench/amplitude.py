@@ -21,8 +21,8 @@ CLOSE = 0.03  # relative error of the amplitude that is good enough
 
 
 def _stack(logs: Sequence[Log], seen_in: str) -> np.ndarray:
-    values = [log.markers if seen_in == "marker" else log.displacement for log in logs]
-    return np.concatenate([v.ravel() for v in values])
+    field = {"marker": "markers", "displacement": "displacement", "tension": "tension"}[seen_in]
+    return np.concatenate([getattr(log, field).ravel() for log in logs])
 
 
 def _nuisances(rod: Rod) -> list[Rod]:
@@ -62,17 +62,22 @@ class Scale:
         logs = run(self.rod, effects, day)
         residual = _stack(logs, seen_in) - _stack(as_described(self.rod, logs, day), seen_in)
         left = residual - basis @ (basis.T @ residual)
-        sigma = self.noise.marker if seen_in == "marker" else self.noise.displacement
+        sigma = {
+            "marker": self.noise.marker,
+            "displacement": self.noise.displacement,
+            "tension": self.noise.load_cell,
+        }[seen_in]
         return float(np.sqrt(np.mean(left**2)) / sigma)
 
 
 def scaled(effect: Effect, wanted: float, scale: Scale) -> tuple[Effect, float]:
     """The effect at the strength that leaves `wanted` sigma, and what it really leaves; stops at `effect.most`."""
-    basis = scale.basis(effect.seen_in)
+    seen_in = effect.seen_by_length if scale.day.by_length else effect.seen_in
+    basis = scale.basis(seen_in)
 
     def leaves(strength: float) -> float:
         try:
-            return scale.amplitude([replace(effect, strength=strength)], effect.seen_in, basis)
+            return scale.amplitude([replace(effect, strength=strength)], seen_in, basis)
         except NoEquilibrium:
             return np.inf
 

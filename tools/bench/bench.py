@@ -17,7 +17,7 @@ from tools.bench.rod import Creep, Rod, follow
 
 RAMP = 2.0  # s
 NODES = 3  # Gauss nodes per interval: within 3e-4 mm of the converged tip at full load
-STRIDE = 0.25  # N, largest step of tension between two equilibria
+STRIDE = (0.25, 1e-3)  # N or m, largest step of the drive between two equilibria
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Log:
     """One trial, free of noise; SI."""
 
     trial: Trial
-    tension: np.ndarray  # (n, T) N, the logged input
+    tension: np.ndarray  # (n, T) N, by the load cells; the command where an effect says so
     markers: np.ndarray  # (n, N, 3) m
-    displacement: np.ndarray  # (n, T) m
+    displacement: np.ndarray  # (n, T) m, motor side
     ambient: np.ndarray  # (n,) degC
 
 
@@ -62,58 +62,61 @@ def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial:
         return np.stack([np.interp(time, trial.fine, column) for column in delivered.T], axis=1)
 
     seen = np.maximum(trial.time - situation.latency, 0.0)  # the moment a row's outputs show
-    grid = np.union1d(np.union1d(trial.time, seen), _milestones(trial.fine, delivered))
-    tension = at(grid)
-    ramp = max(12, int(np.ceil(tension[0].max() / 0.1)))
-    drive = np.concatenate([np.zeros((4, tension.shape[1])), tension[0] * np.arange(1, ramp + 1)[:, None] / ramp, tension[1:]])
+    grid = np.union1d(np.union1d(trial.time, seen), _milestones(trial.fine, delivered, STRIDE[day.by_length]))
+    drive = at(grid)
+    if day.by_length:
+        for effect in effects:
+            drive = effect.pull(drive)
+    ramp = max(12, int(np.ceil(np.abs(drive[0]).max() / (0.4 * STRIDE[day.by_length]))))
+    path = np.concatenate([np.zeros((4, drive.shape[1])), drive[0] * np.arange(1, ramp + 1)[:, None] / ramp, drive[1:]])
     lead = 4 + ramp - 1
     dt = np.concatenate([np.full(lead + 1, RAMP / (lead + 1)), np.diff(grid)])
     clock = trial.start + np.concatenate([np.zeros(lead), grid])
-    softness = np.ones(len(drive))
+    softness = np.ones(len(path))
     for effect in effects:
         softness = softness * effect.soften(clock, day.ambient(clock))
-    keep = np.concatenate([np.zeros(lead, bool), np.ones(len(grid), bool)])
     shape = follow(
         situation.rod,
-        drive,
+        -path if day.by_length else path,
         gravity=situation.gravity,
         payload=situation.payload,
-        weight=np.minimum(np.arange(1, len(drive) + 1) / 4, 1.0),
+        weight=np.minimum(np.arange(1, len(path) + 1) / 4, 1.0),
         softness=softness,
         dt=dt,
         mu=situation.mu,
         stroke=situation.stroke,
         creep=creep,
         fields=situation.fields,
-        keep=keep,
+        by_length=day.by_length,
+        stretch=situation.stretch if day.by_length else 0.0,
+        keep=np.arange(len(path)) >= lead,
         nodes=NODES,
     )
-    displacement = shape.displacement
-    for effect in effects:
-        displacement = effect.encode(displacement, tension)
-    rows = np.searchsorted(grid, seen)
+    inputs, outputs = np.searchsorted(grid, trial.time), np.searchsorted(grid, seen)
     clock = trial.start + trial.time
     ambient = day.ambient(clock)
-    markers = shape.markers[rows]
+    markers = shape.markers[outputs]
     for effect in effects:
         markers = effect.observe(clock, ambient, markers)
-    reading = _logged_input(effects, trial, clock, tension[np.searchsorted(grid, trial.time)])
-    return Log(trial, reading, markers, displacement[rows], ambient)
-
-
-def _logged_input(effects: Sequence[Effect], trial: Trial, clock: np.ndarray, tension: np.ndarray) -> np.ndarray:
-    if any(effect.logs_command for effect in effects):
-        tension = np.stack([np.interp(trial.time, trial.fine, column) for column in trial.command.T], axis=1)
+    tension, displacement = shape.tension[:, 0], shape.displacement
+    if day.by_length:
+        tension, displacement = tension[outputs], at(trial.time)
+    else:
+        for effect in effects:
+            displacement = effect.encode(displacement, tension)
+        tension, displacement = tension[inputs], displacement[outputs]
+        if any(effect.logs_command for effect in effects):
+            tension = np.stack([np.interp(trial.time, trial.fine, column) for column in trial.command.T], axis=1)
     for effect in effects:
         tension = effect.read(clock, tension)
-    return tension
+    return Log(trial, tension, markers, displacement, ambient)
 
 
-def _milestones(time: np.ndarray, tension: np.ndarray) -> np.ndarray:
-    """Fine times at which some tension has changed by STRIDE since the last one."""
-    marks, last = [], tension[0]
-    for t, now in zip(time, tension, strict=True):
-        if np.abs(now - last).max() > STRIDE:
+def _milestones(time: np.ndarray, drive: np.ndarray, stride: float) -> np.ndarray:
+    """Fine times at which some tendon's drive has changed by `stride` since the last one."""
+    marks, last = [], drive[0]
+    for t, now in zip(time, drive, strict=True):
+        if np.abs(now - last).max() > stride:
             marks.append(t)
             last = now
     return np.array(marks)
@@ -121,5 +124,6 @@ def _milestones(time: np.ndarray, tension: np.ndarray) -> np.ndarray:
 
 def as_described(rod: Rod, logs: Sequence[Log], day: Day) -> list[Log]:
     """What the same built robot would log without any effect, driven by the logged inputs."""
-    trials = tuple(replace(log.trial, fine=log.trial.time, command=np.maximum(log.tension, 0.0)) for log in logs)
+    inputs = [log.displacement if day.by_length else np.maximum(log.tension, 0.0) for log in logs]
+    trials = tuple(replace(log.trial, fine=log.trial.time, command=c) for log, c in zip(logs, inputs, strict=True))
     return run(rod, [], replace(day, trials=trials))

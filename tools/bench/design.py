@@ -2,7 +2,7 @@
 
 The default holds what a diagnosis needs: slow and fast pulls in three directions with inner loops, pulls of two tendons,
 random combined pulls, steps of 0.45 s, holds of more than 60 s, payloads of 0, 10 and 20 g, a circle repeated four times
-through the day, all in random order. The poor designs each leave one of these out.
+through the day, all in random order. The poor designs each leave one of these out; by_length commands displacements.
 """
 
 from __future__ import annotations
@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tools.bench.rod import Rod, follow
+
 POOR = ("no_repeats", "time_ordered", "loading_only", "one_payload", "one_rate", "one_tendon", "tip_only")
-DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR)
+DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR, "by_length")
 TENDONS = 3
 RATE = 50.0  # Hz of the fine command
 STEP = 0.45  # s, the fastest step
@@ -24,7 +26,7 @@ class Trial:
     payload: float  # kg, declared
     time: np.ndarray  # (n,) s, of the log's rows
     fine: np.ndarray  # (m,) s
-    command: np.ndarray  # (m, T) N at the fine times, linear in between
+    command: np.ndarray  # (m, T) at the fine times, linear in between: base tension in N, or displacement in m
     start: float = 0.0  # s on the common clock
     gravity: tuple[float, float, float] | None = None  # overrides the day's
 
@@ -35,6 +37,7 @@ class Day:
     gravity: tuple[float, float, float]
     room: np.ndarray  # (2, k): clock (s) and ambient temperature (degC), linear in between
     tip_only: bool = False
+    by_length: bool = False  # the motors command tendon displacements
 
     def ambient(self, clock: np.ndarray) -> np.ndarray:
         return np.interp(clock, self.room[0], self.room[1])
@@ -161,4 +164,28 @@ def _schedule(
         clock += t.time[-1] + rng.uniform(15.0, 90.0)
     knots = np.linspace(0.0, clock, 9)
     room = np.stack([knots, 23.0 + rng.uniform(-2.0, 2.0) + rng.uniform(-4.0, 4.0, len(knots))])
-    return Day(tuple(timed), gravity, room, design == "tip_only")
+    if design == "by_length":
+        timed = [_in_displacements(t, gravity) for t in timed]
+    return Day(tuple(timed), gravity, room, design == "tip_only", design == "by_length")
+
+
+def _in_displacements(trial: Trial, gravity: tuple[float, float, float]) -> Trial:
+    """The same motion commanded by length, as somebody would plan it with the described robot.
+
+    Three taut inextensible tendons would fight each other over fractions of a millimetre, so the weakest is always left
+    slack by 2 mm and the others are taut as soon as they are to pull.
+    """
+    nodes = np.linspace(trial.fine[0], trial.fine[-1], min(len(trial.fine), 241))
+    tension = np.stack([np.interp(nodes, trial.fine, c) for c in trial.command.T], axis=1)
+    tension -= tension.min(axis=1, keepdims=True)
+    lead = np.arange(1, 17)[:, None] / 16
+    shape = follow(
+        Rod(),
+        np.vstack([lead * tension[0], tension]),
+        gravity=trial.gravity or gravity,
+        payload=trial.payload,
+        weight=np.append(lead, np.ones(len(tension))),
+        nodes=2,
+    )
+    displacement = shape.displacement[len(lead) :] - 2e-3 * np.exp(-tension / 0.15)
+    return replace(trial, fine=nodes, command=displacement)

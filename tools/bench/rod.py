@@ -22,6 +22,7 @@ from tools.bench.statics import Body, Load
 from tools.bench.tendons import IWAN_SPREAD, Friction
 
 NO_FIELDS = np.zeros((0, 10))
+STIFFEST = 1e-7  # m/N: three taut inextensible tendons on a straight rod are redundant; 0.4 um at 4 N decides between them
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ def follow(
     ones = np.ones((N, T)) if share is None else np.array(share, float)
     load = Load(
         disk_force, rod.backbone_mass / rod.length * g, np.array(fields, float), np.zeros(T), ones, np.zeros(T),
-        np.full(T, float(stretch)), by_length,
+        np.full(T, max(float(stretch), STIFFEST)), by_length,
     )  # fmt: skip
     friction = Friction(float(mu), stroke * IWAN_SPREAD, np.zeros((N - 1, T, len(IWAN_SPREAD))), np.zeros((N - 1, T)))
     path = Path(drive, _series(weight, n, 1.0), _series(softness, n, 1.0), _series(dt, n, 0.0))

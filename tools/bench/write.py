@@ -49,13 +49,16 @@ def write_set(
             lines.append(f"noise = {sigma:.4g}")
 
     for i in range(tendons):
-        channel(f"tendon_{i + 1}_tension", "input", "N", None if exact_input else noise.load_cell)
+        role = "output" if day.by_length else "input"
+        channel(f"tendon_{i + 1}_tension", role, "N", None if exact_input else noise.load_cell)
     for k in shown:
         for axis in "xyz":
             channel(f"disk_{k + 1}_{axis}", "output", "mm", 1e3 * noise.marker)
+    displacement = displacement or day.by_length
     if displacement:
         for i in range(tendons):
-            channel(f"tendon_{i + 1}_displacement", "output", "mm", 1e3 * noise.displacement)
+            role = "input" if day.by_length else "output"
+            channel(f"tendon_{i + 1}_displacement", role, "mm", 1e3 * noise.displacement)
     if ambient:
         channel("ambient_temperature", "context", "degC", noise.ambient)
 

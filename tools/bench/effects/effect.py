@@ -23,7 +23,7 @@ class Situation:
     creep: tuple[np.ndarray, np.ndarray] | None = None  # shares, times (s)
     fields: np.ndarray = field(default_factory=NO_FIELDS.copy)
     latency: float = 0.0  # s by which outputs are logged late
-    stretch: float = 0.0  # m/N
+    stretch: float = 0.0  # m/N, felt where the motor drives by length
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Effect:
     in_catalogue: ClassVar[bool] = True
     most: ClassVar[float] = 20.0
     seen_in: ClassVar[str] = "marker"  # the output whose change sets the amplitude: marker | displacement
+    seen_by_length: ClassVar[str] = "marker"  # the same where the motors command displacements: marker | tension
     needs_ambient: ClassVar[bool] = False
     logs_command: ClassVar[bool] = False  # the input logged is the commanded tension, not the load cell
 
@@ -64,7 +65,11 @@ class Effect:
         return markers
 
     def encode(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
-        """Motor-side tendon displacement (n, T) from the path's displacement (m) and the base tension."""
+        """Motor-side tendon displacement (n, T) from the path's displacement (m) and the base tension (N)."""
+        return displacement
+
+    def pull(self, displacement: np.ndarray) -> np.ndarray:
+        """Tendon displacement (n, T) that the motor's displacement (m) causes, where the motor drives by length."""
         return displacement
 
 

@@ -13,6 +13,7 @@ from tools.bench.effects.effect import Effect, unit_vector
 @dataclass(frozen=True)
 class LoadCellCrosstalk(Effect):
     id: ClassVar[str] = "load_cell_crosstalk"
+    seen_by_length: ClassVar[str] = "tension"
 
     share: tuple[float, ...]  # (12, 13, 21, 23, 31, 32)
 

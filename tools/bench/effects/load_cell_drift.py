@@ -13,6 +13,7 @@ from tools.bench.effects.effect import Effect, unit_vector
 @dataclass(frozen=True)
 class LoadCellDrift(Effect):
     id: ClassVar[str] = "load_cell_drift"
+    seen_by_length: ClassVar[str] = "tension"
 
     share: tuple[float, ...]
     bend: float

@@ -13,6 +13,7 @@ from tools.bench.effects.effect import Effect, unit_vector
 @dataclass(frozen=True)
 class LoadCellGain(Effect):
     id: ClassVar[str] = "load_cell_gain"
+    seen_by_length: ClassVar[str] = "tension"
 
     share: tuple[float, ...]
 
