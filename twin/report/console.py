@@ -1,0 +1,46 @@
+"""The verdict in a terminal."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from twin.diagnose import Diagnosis
+from twin.report.contents import KINDS, experiment_words
+from twin.report.numbers import plus_minus
+from twin.report.sections.before_after import rows
+from twin.report.sections.effects import table
+from twin.report.sentence import sentence
+
+
+def console(diagnosis: Diagnosis) -> RenderableType:
+    """The sentence, the error before and after, the effects, and the next experiment."""
+    d = diagnosis
+    parts: list[RenderableType] = [Text(sentence(d), style="bold"), Text("")]
+    for group in d.errors.after:
+        error = _table(f"{KINDS.get(group, group).replace('_', ' ')} error on held-out trials ({d.bench.recording.source})")
+        for name, justify in (("", "left"), ("RMS, mm", "right"), ("95 % confidence", "right")):
+            error.add_column(name, justify=justify)  # type: ignore[arg-type]
+        for row in rows(d, group):
+            error.add_row(row["stage"], row["error"], row["interval"])
+        parts += [error, Text("")]
+    if d.claims:
+        effects = _table("effects in force")
+        for name, justify in (("", "left"), ("parameters", "left"), ("probability", "right"), ("error without, mm", "right")):
+            effects.add_column(name, justify=justify)  # type: ignore[arg-type]
+        for claim, row in zip(d.claims, table(d.claims), strict=True):
+            values = "\n".join(f"{n} = {plus_minus(f)}" for n, f in claim.parameters.items())
+            effects.add_row(str(row["name"]), Text(values), str(row["probability"]), str(row["error"]))
+        parts += [effects, Text("")]
+    if d.verdict in ("partly_explained", "unexplained"):
+        parts.append(Text(d.description))
+    if (words := experiment_words(d)) is not None:
+        parts.append(Text.assemble(("Next experiment: ", "bold"), words))
+    if d.notices:
+        parts.append(Text(f"{len(d.notices)} notice{'s' if len(d.notices) > 1 else ''} about the data, in the report.", style="dim"))
+    return Group(*parts)
+
+
+def _table(title: str) -> Table:
+    return Table(title=Text(title), title_justify="left", title_style="dim", box=None, pad_edge=False, padding=(0, 2, 0, 0))

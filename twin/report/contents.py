@@ -1,0 +1,114 @@
+"""report.json: what other programs read. Its keys and units are a contract (`twin-report/1`); positions are in mm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from twin.diagnose import Claim, Diagnosis
+from twin.quantities import Fitted
+from twin.report.numbers import MM, finite
+from twin.report.sentence import headline, sentence, structure_left
+
+FORMAT = "twin-report/1"
+KINDS = {"marker": "position", "displacement": "tendon_displacement"}  # group of outputs -> kind in the report
+
+
+def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """The report as JSON's own types: plain floats, None where there is no number. Effects' and robot's parameters are SI."""
+    d = diagnosis
+    left = structure_left(d)
+    return {
+        "format": FORMAT,
+        "verdict": d.verdict,
+        "summary": sentence(d),
+        "effects": [
+            {"id": c.effect, "parameters": _parameters(c.parameters), "error_without": finite(c.error, MM), **_weight(c)}
+            for c in d.claims
+        ],
+        "candidates": [
+            {"id": c.effect, "error": finite(c.error, MM), "parameters": _parameters(c.parameters), **_weight(c)}
+            for c in d.runners_up
+        ],
+        "error": _error(d),
+        "residual": {
+            "structure": left or "none",
+            "worst_channel": d.worst_channel,
+            "correlates_with": [name for name, _ in d.strongest] if left else [],
+            "description": d.description,
+            "before": finite(d.structure_before),
+            "after": finite(d.structure_after),
+            "components": {name: finite(size) for name, size in d.structure.items()},
+        },
+        "ambiguous": [list(effects) for effects in d.ambiguous],
+        "next_experiment": experiment_words(d),
+        "below_materiality": [
+            {"id": c.effect, "parameters": _parameters(c.parameters), "contribution": finite(c.contribution)}
+            for c in d.below_materiality
+        ],
+        "parameters": _parameters(d.parameters),
+        "unfixed": list(d.unfixed),
+        "noise": _noise(d),
+        "notices": list(d.notices),
+        "source": d.bench.recording.source,
+        "title": d.bench.recording.title,
+        "provenance": dict(provenance),
+    }
+
+
+def labels(diagnosis: Diagnosis, trials: tuple[int, ...]) -> list[str]:
+    """Names of the bench's trials `trials` as reports print them: without the file's ending."""
+    label = {t.name: t.label for t in diagnosis.bench.recording.trials}
+    return [label[diagnosis.bench.inputs[k].name] for k in trials]
+
+
+def experiment_words(diagnosis: Diagnosis) -> str | None:
+    """The next experiment in words and numbers; None where none is needed or none would settle the doubt."""
+    e = diagnosis.experiment
+    if e is None:
+        return None
+    runs = "one run separates" if e.repeats == 1 else f"{e.repeats} runs together separate"
+    return f"{e.words}: {runs} the two best explanations by {(e.separation * e.repeats) ** 0.5:.0f} standard errors"
+
+
+def _weight(claim: Claim) -> dict[str, float | None]:
+    return {"probability": finite(claim.probability), "contribution": finite(claim.contribution)}
+
+
+def _parameters(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:
+    return {n: {"value": finite(f.value), "std": finite(f.std), "unit": f.unit} for n, f in parameters.items()}
+
+
+def _error(d: Diagnosis) -> dict[str, Any]:
+    out = {"split": "held-out trials", "trials": labels(d, d.held_trials), **_of_group(d, headline(d))}
+    groups = list(d.errors.after)
+    if len(groups) > 1:
+        out["by_kind"] = {KINDS.get(g, g): _of_group(d, g) for g in groups}
+    return out
+
+
+def _of_group(d: Diagnosis, group: str) -> dict[str, Any]:
+    e = d.errors
+    return {
+        "unit": "mm",
+        "nominal": finite(e.nominal[group], MM),
+        "calibrated": finite(e.calibrated[group], MM),
+        "after": finite(e.after[group], MM),
+        "ci95": {
+            "calibrated": [finite(x, MM) for x in e.ci_calibrated[group]],
+            "after": [finite(x, MM) for x in e.ci_after[group]],
+        },
+        "noise_floor": finite(e.floor[group], MM),
+    }
+
+
+def _noise(d: Diagnosis) -> dict[str, Any]:
+    outputs = d.bench.outputs
+    return {
+        "source": d.noise.source,
+        "tension": {"value": finite(d.noise.tension), "unit": "N"},
+        "channels": {
+            o.channel.name: {"sigma": finite(float(s), MM), "unit": "mm", "correlation": finite(float(r))}
+            for o, s, r in zip(outputs, d.noise.sigma, d.noise.rho, strict=True)
+        },
+    }

@@ -1,0 +1,70 @@
+"""Numbers as people read them: as many digits as their error allows, in units of everyday size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from twin.quantities import Fitted
+
+MM = 1e3  # m -> mm
+FRIENDLY = {  # SI unit -> (shown unit, factor)
+    "m": ("mm", 1e3),
+    "kg": ("g", 1e3),
+    "Pa": ("GPa", 1e-9),
+    "rad": ("°", 180.0 / math.pi),
+    "1": ("", 1.0),
+}
+
+
+def finite(value: float | None, factor: float = 1.0) -> float | None:
+    """A plain float for JSON, times `factor`; None where there is no number."""
+    return None if value is None or not math.isfinite(value) else float(value) * factor
+
+
+def digits(value: float, std: float | None) -> int:
+    """Decimals at which a value is written: down to the second digit of its standard error, else four significant ones."""
+    size = std if std is not None and math.isfinite(std) and std > 0 else abs(value) * 1e-2
+    if not math.isfinite(size) or size == 0:
+        return 3
+    return min(9, max(0, 1 - math.floor(math.log10(size))))
+
+
+def number(value: float | None, decimals: int = 2) -> str:
+    """`value` with this many decimals; an en dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", "−") if float(text) else text.lstrip("-")  # noqa: RUF001
+
+
+def friendly(fitted: Fitted) -> Fitted:
+    """The same quantity in a unit of everyday size (mm, g, GPa, degrees); others stay SI."""
+    unit, factor = FRIENDLY.get(fitted.unit, (fitted.unit, 1.0))
+    return Fitted(fitted.value * factor, None if fitted.std is None else fitted.std * factor, unit)
+
+
+def plus_minus(fitted: Fitted) -> str:
+    """"0.1030 ± 0.0013 mm": value, standard error if there is one, and unit, in a unit of everyday size."""
+    shown = friendly(fitted)
+    places = digits(shown.value, shown.std)
+    text = number(shown.value, places)
+    if finite(shown.std) is not None:
+        text += f" ± {number(shown.std, places)}"
+    return text + (shown.unit if shown.unit == "°" else f" {shown.unit}" if shown.unit else "")
+
+
+def column(values: Sequence[float | None], significant: int = 3) -> list[str]:
+    """Numbers of one table column, all with the same decimals, so that they line up; the largest gets `significant` digits."""
+    known = [abs(v) for v in values if v is not None and math.isfinite(v) and v != 0]
+    places = 2 if not known else min(6, max(0, significant - 1 - math.floor(math.log10(max(known)))))
+    return [number(v, places) for v in values]
+
+
+def percent(share: float) -> str:
+    """"97 %"; never a rounded 0 or 100 for what is neither."""
+    if 0.0 < share < 0.005:
+        return "less than 1 %"
+    if 0.995 <= share < 1.0:
+        return "more than 99 %"
+    return f"{100 * share:.0f} %"

@@ -1,0 +1,38 @@
+"""The sections of report.html, in order: one function `section(story)` a file, each with its template."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from twin.report.sections import (
+    attribution,
+    before_after,
+    effects,
+    leftover,
+    made_with,
+    next_experiment,
+    noise,
+    notices,
+    parameters,
+    residual,
+    shapes,
+    tip,
+)
+from twin.report.sections.section import Section, Story
+
+SECTIONS: tuple[Callable[[Story], Section], ...] = (
+    before_after.section,
+    effects.section,
+    residual.section,
+    shapes.section,
+    tip.section,
+    leftover.section,
+    attribution.section,
+    next_experiment.section,
+    parameters.section,
+    noise.section,
+    notices.section,
+    made_with.section,
+)
+
+__all__ = ["SECTIONS", "Section", "Story"]

@@ -1,0 +1,39 @@
+"""How sure the attribution is: runners-up, what these data cannot tell apart, and what was too small to claim."""
+
+from __future__ import annotations
+
+from twin.diagnose import Claim
+from twin.report.numbers import MM, column, percent, plus_minus
+from twin.report.sections.section import Section, Story
+from twin.report.sentence import effect_words
+
+
+def section(story: Story) -> Section:
+    d = story.diagnosis
+    claimed = " and ".join(effect_words(c.effect) for c in d.claims) or "no effect"
+    return Section(
+        "attribution",
+        "What else it could have been",
+        "attribution.html",
+        {
+            "claimed": claimed,
+            "runners_up": _table(d.runners_up),
+            "ambiguous": [" with ".join(effect_words(e) for e in effects) for effects in d.ambiguous],
+            "small": _table(d.below_materiality),
+        },
+    )
+
+
+def _table(claims: tuple[Claim, ...]) -> list[dict[str, str]]:
+    errors = column([MM * c.error for c in claims])
+    moved = column([c.contribution for c in claims], 2)
+    return [
+        {
+            "name": effect_words(c.effect),
+            "error": error,
+            "moved": sigma,
+            "probability": percent(c.probability),
+            "parameters": ", ".join(f"{n} = {plus_minus(f)}" for n, f in c.parameters.items()),
+        }
+        for c, error, sigma in zip(claims, errors, moved, strict=True)
+    ]

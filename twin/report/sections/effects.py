@@ -1,0 +1,42 @@
+"""The effects found missing: parameters, how sure, and what each is worth on its own."""
+
+from __future__ import annotations
+
+from twin.diagnose import Claim
+from twin.effects import named
+from twin.report.numbers import MM, column, percent, plus_minus
+from twin.report.sections.section import Section, Story
+from twin.report.sentence import effect_words, explained_share
+
+
+def section(story: Story) -> Section:
+    d = story.diagnosis
+    share = explained_share(d)
+    return Section(
+        "effects",
+        "Missing effects" if len(d.claims) != 1 else "Missing effect",
+        "effects.html",
+        {
+            "effects": table(d.claims),
+            "before": f"{d.structure_before:.2f}",
+            "after": f"{d.structure_after:.2f}",
+            "share": percent(share) if share is not None and d.claims else None,
+        },
+    )
+
+
+def table(claims: tuple[Claim, ...]) -> list[dict[str, object]]:
+    """Rows of effects in words; errors (mm) with common decimals."""
+    errors = column([MM * c.error for c in claims])
+    moved = column([c.contribution for c in claims])
+    return [
+        {
+            "name": effect_words(c.effect),
+            "law": (named(c.effect).__doc__ or "").strip().splitlines()[0],
+            "parameters": [{"name": n, "value": plus_minus(f)} for n, f in c.parameters.items()],
+            "probability": percent(c.probability),
+            "error": error,
+            "moved": sigma,
+        }
+        for c, error, sigma in zip(claims, errors, moved, strict=True)
+    ]

@@ -1,0 +1,29 @@
+"""What is left after the verdict: how much of it is smooth, what it moves with, and whether it has a line in its spectrum."""
+
+from __future__ import annotations
+
+from twin.diagnose.evidence import IN_WORDS
+from twin.diagnose.verdict import LINE
+from twin.report.numbers import column
+from twin.report.sections.section import Section, Story
+from twin.report.sentence import structure_left
+
+
+def section(story: Story) -> Section:
+    d = story.diagnosis
+    parts = sorted(d.structure.items(), key=lambda item: -item[1])
+    sizes = column([size for _, size in parts], 2)
+    strongest = column([size for _, size in d.strongest], 2)
+    return Section(
+        "left",
+        "What is left",
+        "leftover.html",
+        {
+            "left": structure_left(d),
+            "description": d.description,
+            "worst": d.worst_channel,
+            "components": [{"name": IN_WORDS.get(c, c), "size": s} for (c, _), s in zip(parts, sizes, strict=True)],
+            "strongest": [{"name": n, "size": s} for (n, _), s in zip(d.strongest, strongest, strict=True)],
+            "line": f"{d.line[1]:.2f}" if d.line[0] > LINE else None,
+        },
+    )

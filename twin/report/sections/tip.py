@@ -1,0 +1,66 @@
+"""One held-out trial in time: where the tip was, where the twins put it, and how far off they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from twin.diagnose import Diagnosis
+from twin.report.contents import labels
+from twin.report.plots import MEASURED, MOST_POINTS, Plot, figure, numbers, plain, thin
+from twin.report.sections.section import Section, Story
+from twin.report.stages import before_and_after, markers, residuals
+
+ROW = 170
+
+
+def section(story: Story) -> Section:
+    d = story.diagnosis
+    whole = markers(d.bench)
+    name, columns = whole[-1] if whole else _first_group(d)
+    k = _telling(d, columns)
+    content = {"trial": labels(d, (k,))[0], "name": name, "plot": _plot(d, k, columns), "distance": bool(whole)}
+    return Section("tip", "One trial in time", "tip.html", content)
+
+
+def _first_group(d: Diagnosis) -> tuple[str, list[int]]:
+    group = d.bench.outputs[0].group
+    return group, [j for j, o in enumerate(d.bench.outputs) if o.group == group][:3]
+
+
+def _telling(d: Diagnosis, columns: list[int]) -> int:
+    """The held-out trial in which the two predictions differ most."""
+    first, second = (d.predictions[s.key] for s in before_and_after(d))
+    return max(d.held_trials, key=lambda k: float(np.nan_to_num(np.mean((first[k][:, columns] - second[k][:, columns]) ** 2))))
+
+
+def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
+    time = d.bench.inputs[k].time
+    stages = before_and_after(d)
+    n_row = len(columns) + 1
+    keep = thin(len(time), MOST_POINTS // (3 * n_row))
+    grid = make_subplots(rows=n_row, cols=1, shared_xaxes=True, vertical_spacing=0.03)
+    for row, j in enumerate(columns, 1):
+        for s in stages:
+            y = numbers(1e3 * d.predictions[s.key][k][keep, j])
+            grid.add_trace(_line(time[keep], y, s.words, s.color, row == 1), row=row, col=1)
+        dots = {"size": 4, "color": MEASURED}
+        grid.add_trace(go.Scatter(x=numbers(time[keep]), y=numbers(1e3 * d.bench.measured[k][keep, j]), mode="markers", marker=dots,
+                                  name="measured", showlegend=row == 1), row=row, col=1)  # fmt: skip
+    for s in stages:
+        off = 1e3 * np.sqrt((residuals(d, s)[k][:, columns] ** 2).sum(axis=1))[keep]
+        grid.add_trace(_line(time[keep], numbers(off), s.words, s.color, False), row=n_row, col=1)
+    height = ROW * n_row + 60
+    out = figure(list(grid.data), height, **{a: grid.layout[a] for a in grid.layout if a.startswith(("xaxis", "yaxis"))})
+    for row, j in enumerate(columns, 1):
+        out.update_yaxes(title=f"{d.bench.outputs[j].channel.name} (mm)", selector={"anchor": "x" if row == 1 else f"x{row}"})
+    out.update_yaxes(title="error (mm)", rangemode="tozero", selector={"anchor": f"x{n_row}"})
+    out.update_xaxes(title="time (s)", selector={"anchor": f"y{n_row}"})
+    out.update_layout(hovermode="x")
+    return Plot(f"Time series of {plain(labels(d, (k,))[0])}", height, out)
+
+
+def _line(x: np.ndarray, y: np.ndarray, name: str, color: str, legend: bool) -> go.Scatter:
+    return go.Scatter(x=numbers(x), y=y, mode="lines", name=name, line={"color": color, "width": 2}, showlegend=legend,
+                      hovertemplate="%{y:.3f} mm")  # fmt: skip
