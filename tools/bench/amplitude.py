@@ -1,7 +1,8 @@
 """How large an effect is: what it leaves, in sensor sigmas, after the robot's own parameters are refitted.
 
 The residual is the logged output minus the output of the same built robot without effects, driven by the logged inputs.
-Refitting is linear: the residual's projection on the change of the outputs with each nuisance parameter is taken out.
+Refitting is linear within plausible bounds: a minimises |e - B a|, |a_p| <= PLAUSIBLE, e = residual in sigmas, B = change
+of the outputs in sigmas per prior standard deviation of each nuisance parameter; what is left is e - B a.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from tools.bench.bench import Log, as_described, run
 from tools.bench.design import Day
@@ -18,6 +20,7 @@ from tools.bench.rod import NoEquilibrium, Rod
 from tools.bench.sensors import Noise
 
 CLOSE = 0.03  # relative error of the amplitude that is good enough
+PLAUSIBLE = 2.0  # prior standard deviations that a refit may use
 
 
 def _stack(logs: Sequence[Log], seen_in: str) -> np.ndarray:
@@ -25,16 +28,16 @@ def _stack(logs: Sequence[Log], seen_in: str) -> np.ndarray:
     return np.concatenate([getattr(log, field).ravel() for log in logs])
 
 
-def _nuisances(rod: Rod) -> list[Rod]:
-    """The built robot with one parameter moved at a time; the first two pitches stand for all."""
-    bump = np.eye(len(rod.pitch))
+def _nuisances(rod: Rod) -> list[tuple[Rod, float]]:
+    """The built robot with one parameter moved at a time, and the move as a share of the parameter's prior deviation."""
+    first = np.eye(len(rod.pitch))[0]
     return [
-        replace(rod, youngs_modulus=1.02 * rod.youngs_modulus),
-        replace(rod, hole_radius=1.01 * rod.hole_radius),
-        replace(rod, disk_mass=1.03 * rod.disk_mass),
-        replace(rod, radius_taper=rod.radius_taper + 0.005),
-        replace(rod, pitch=rod.pitch * (1 + 0.01 * bump[0])),
-        replace(rod, pitch=rod.pitch * (1 + 0.01 * bump[-1])),
+        (replace(rod, youngs_modulus=1.02 * rod.youngs_modulus), 0.02 / 0.06),
+        (replace(rod, hole_radius=1.01 * rod.hole_radius), 0.01 / 0.015),
+        (replace(rod, disk_mass=1.03 * rod.disk_mass), 1.0),
+        (replace(rod, radius_taper=rod.radius_taper + 0.005), 1.0),
+        (replace(rod, pitch=rod.pitch * (1 + 0.01 * first)), 1.0),
+        (replace(rod, pitch=rod.pitch * (1 + 0.01 * first[::-1])), 1.0),
     ]
 
 
@@ -49,35 +52,35 @@ class Scale:
     def thinned(self) -> Day:
         return replace(self.day, trials=self.day.trials[::3])
 
-    def basis(self, seen_in: str) -> np.ndarray:
-        """Orthonormal directions (n, p) of the nuisance parameters in the output."""
+    def sigma(self, seen_in: str) -> float:
+        n = self.noise
+        return {"marker": n.marker, "displacement": n.displacement, "tension": n.load_cell}[seen_in]
+
+    def moves(self, seen_in: str) -> np.ndarray:
+        """Change (n, p) of the output, in sigmas, per prior deviation of each nuisance parameter."""
         day = self.thinned()
         at = _stack(run(self.rod, [], day), seen_in)
-        moved = np.stack([_stack(run(rod, [], day), seen_in) - at for rod in _nuisances(self.rod)], axis=1)
-        return np.linalg.qr(moved)[0]
+        moved = [(_stack(run(rod, [], day), seen_in) - at) / part for rod, part in _nuisances(self.rod)]
+        return np.stack(moved, axis=1) / self.sigma(seen_in)
 
-    def amplitude(self, effects: Sequence[Effect], seen_in: str, basis: np.ndarray) -> float:
+    def amplitude(self, effects: Sequence[Effect], seen_in: str, moves: np.ndarray) -> float:
         """RMS residual over sigma after the linear refit."""
         day = self.thinned()
         logs = run(self.rod, effects, day)
         residual = _stack(logs, seen_in) - _stack(as_described(self.rod, logs, day), seen_in)
-        left = residual - basis @ (basis.T @ residual)
-        sigma = {
-            "marker": self.noise.marker,
-            "displacement": self.noise.displacement,
-            "tension": self.noise.load_cell,
-        }[seen_in]
-        return float(np.sqrt(np.mean(left**2)) / sigma)
+        residual /= self.sigma(seen_in)
+        refit = lsq_linear(moves, residual, bounds=(-PLAUSIBLE, PLAUSIBLE)).x
+        return float(np.sqrt(np.mean((residual - moves @ refit) ** 2)))
 
 
 def scaled(effect: Effect, wanted: float, scale: Scale) -> tuple[Effect, float]:
     """The effect at the strength that leaves `wanted` sigma, and what it really leaves; stops at `effect.most`."""
     seen_in = effect.seen_by_length if scale.day.by_length else effect.seen_in
-    basis = scale.basis(seen_in)
+    moves = scale.moves(seen_in)
 
     def leaves(strength: float) -> float:
         try:
-            return scale.amplitude([replace(effect, strength=strength)], seen_in, basis)
+            return scale.amplitude([replace(effect, strength=strength)], seen_in, moves)
         except NoEquilibrium:
             return np.inf
 
