@@ -16,7 +16,7 @@ from tools.bench.effects import Effect, Situation
 from tools.bench.rod import Creep, Rod, follow
 
 RAMP = 2.0  # s
-NODES = 3  # Gauss nodes per interval: within 3e-4 mm of the converged tip at full load
+NODES = 3  # Gauss nodes per interval: the tip is within 2e-3 mm of the converged one at the fullest loads
 STRIDE = (0.25, 1e-3)  # N or m, largest step of the drive between two equilibria
 
 
