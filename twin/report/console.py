@@ -38,7 +38,8 @@ def console(diagnosis: Diagnosis) -> RenderableType:
     if (words := experiment_words(d)) is not None:
         parts.append(Text.assemble(("Next experiment: ", "bold"), words))
     if d.notices:
-        parts.append(Text(f"{len(d.notices)} notice{'s' if len(d.notices) > 1 else ''} about the data, in the report.", style="dim"))
+        count = f"{len(d.notices)} notice{'s' if len(d.notices) > 1 else ''}"
+        parts.append(Text(f"{count} about the data in the report.", style="dim"))
     return Group(*parts)
 
 

@@ -7,45 +7,32 @@ curve carries most of the difference between the two predictions, in sigmas.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from twin.bench import Bench
 from twin.diagnose import Diagnosis
 from twin.effects import named
-from twin.report.stages import before_and_after, markers, residuals
+from twin.report.sentence import effect_words
+from twin.report.stages import before_and_after, residuals
+from twin.report.variables import Variable, variables
 
 BINS = 14
-WORDS = (  # words of a law or a regressor -> kind of variable; the first that occurs counts
-    ("direction of pull", "loop"),
-    ("direction of t", "loop"),
-    ("direction of bending", "azimuth"),
-    ("rate", "rate"),
-    ("time held", "elapsed"),
-    ("over the last", "elapsed"),
-    ("time", "clock"),
-    ("temperature", "temperature"),
-    ("trial", "clock"),
-    ("payload", "payload"),
-    ("position", "position"),
-    ("place along", "reach"),
-    ("bending", "reach"),
-    ("load", "tension"),
-    ("pull", "tension"),
-    ("tension", "tension"),
-    ("t1", "tension"),
+FEWEST = 4  # samples in a bin whose mean is drawn
+WORDS = (  # words of a law or of a regressor -> kind of variable; the first that matches counts
+    (r"^trial ", "clock"),
+    (r"\bdirection of (pull|t\d)", "loop"),
+    (r"\bdirection of bending", "azimuth"),
+    (r"\brate\b", "rate"),
+    (r"\btime held|over the last", "elapsed"),
+    (r"\btime\b|\bsession\b", "clock"),
+    (r"\btemperature\b", "temperature"),
+    (r"\bpayload\b", "payload"),
+    (r"\bposition\b", "position"),
+    (r"\bbending\b|\balong the body\b", "reach"),
+    (r"\btension|\bpull\b|\bload|^t\d", "tension"),
 )
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A quantity of every sample, (n_k,) per trial, with its axis title; `side` (-1, 0, 1) splits a loop's two branches."""
-
-    words: str
-    values: list[np.ndarray]
-    side: list[np.ndarray] | None = None
 
 
 @dataclass(frozen=True)
@@ -59,35 +46,32 @@ class Giveaway:
 
 def giveaways(diagnosis: Diagnosis) -> list[Giveaway]:
     """One per effect in force; without any, one for the strongest regressor of what is left. Those that coincide are shown once."""
-    first, second = before_and_after(diagnosis)
-    before, after = residuals(diagnosis, first), residuals(diagnosis, second)
-    if diagnosis.claims:
+    d = diagnosis
+    first, second = before_and_after(d)
+    before, after = residuals(d, first), residuals(d, second)
+    if d.claims:
         changed = [a - b for a, b in zip(before, after, strict=True)]
-        wanted = [(c.effect.replace("_", " "), named(c.effect).moves_with) for c in diagnosis.claims]
+        laws = [(effect_words(c.effect), named(c.effect).moves_with) for c in d.claims]
+        wanted = [(kind_of(moves), f"{name} moves with {moves}") for name, moves in laws]
+    elif d.verdict == "unexplained" and d.strongest:
+        changed, name = after, d.strongest[0][0]
+        wanted = [(kind_of(name), f"what is left moves most with {name!r}")]
     else:
-        changed = after
-        strongest = diagnosis.strongest[0][0] if diagnosis.verdict == "unexplained" and diagnosis.strongest else "tension"
-        wanted = [("what is left", strongest)]
-    found = [_choose(diagnosis, changed, kind_of(words), f"{name} moves with {words}") for name, words in wanted]
-    unique = {(g.column, g.variable.words): g for g in found if g is not None}
-    return list(unique.values())
+        changed, wanted = after, [("tension", "for comparison, the residual against the strongest pull")]
+    found = [_choose(d, changed, kind, why) for kind, why in wanted]
+    return list({(g.column, g.variable.words): g for g in found if g is not None}.values())
 
 
 def kind_of(words: str) -> str | None:
     """The kind of variable that words name; None where they name none."""
-    low = words.lower()
-    return next((kind for word, kind in WORDS if word in low), None)
+    return next((kind for pattern, kind in WORDS if re.search(pattern, words.lower())), None)
 
 
 def _choose(diagnosis: Diagnosis, changed: list[np.ndarray], kind: str | None, why: str) -> Giveaway | None:
-    bench = diagnosis.bench
-    every = list(variables(bench))
-    fitting = [v for k, v in every if k == kind and _varies(v)] or [v for _, v in every if _varies(v)]
-    if not fitting:
-        return None
+    every = [(k, v) for k, v in variables(diagnosis.bench) if _varies(v)]
+    fitting = [v for k, v in every if k == kind] or [v for _, v in every]
     z = np.concatenate(changed) / diagnosis.noise.sigma
-    columns = range(z.shape[1])
-    score = {(i, j): _carried(v, z[:, j]) for i, v in enumerate(fitting) for j in columns}
+    score = {(i, j): _carried(v, z[:, j]) for i, v in enumerate(fitting) for j in range(z.shape[1])}
     if not score:
         return None
     i, j = max(score, key=lambda key: score[key])
@@ -95,81 +79,45 @@ def _choose(diagnosis: Diagnosis, changed: list[np.ndarray], kind: str | None, w
 
 
 def _varies(variable: Variable) -> bool:
-    values = np.concatenate(variable.values)
-    return bool(np.nanmax(values) - np.nanmin(values) > 1e-9) if np.isfinite(values).any() else False
+    x = variable.values[np.isfinite(variable.values) & variable.shown]
+    return x.size > 3 and float(np.ptp(x)) > 1e-9
 
 
 def _carried(variable: Variable, z: np.ndarray) -> float:
     """How much of z (n,) a binned curve over the variable carries: sum of n (mean of bin - overall mean)^2.
 
-    For a loop, the difference of its two branches instead.
+    For a loop, the difference of its two branches instead: sum of n_1 n_2 / (n_1 + n_2) (mean_1 - mean_2)^2.
     """
-    x = np.concatenate(variable.values)
-    side = None if variable.side is None else np.concatenate(variable.side)
-    ok = np.isfinite(x) & np.isfinite(z)
-    place, count = bins(x[ok])
-    z = z[ok]
-    if side is None:
-        n = np.bincount(place, minlength=count)
-        mean = np.bincount(place, z, minlength=count) / np.maximum(n, 1)
-        return float((n * (mean - z.mean()) ** 2).sum()) if len(z) else 0.0
-    total, half = 0.0, []
-    for sign in (-1, 1):
-        mine = side[ok] == sign
-        n = np.bincount(place[mine], minlength=count)
-        half.append((n, np.bincount(place[mine], z[mine], minlength=count) / np.maximum(n, 1)))
-    (n0, m0), (n1, m1) = half
-    total = n0 * n1 / np.maximum(n0 + n1, 1) * (m1 - m0) ** 2
-    return float(total.sum())
+    ok = variable.shown & np.isfinite(variable.values) & np.isfinite(z)
+    if not ok.any():
+        return 0.0
+    place, z, side = bins(variable.values[ok]), z[ok], variable.side[ok]
+    count = place.max() + 1
+    if not variable.loop:
+        n, mean = _tally(place, z, count)
+        return float((n * (mean - z.mean()) ** 2).sum())
+    (n1, m1), (n2, m2) = (_tally(place[side == s], z[side == s], count) for s in (-1, 1))
+    return float((n1 * n2 / np.maximum(n1 + n2, 1) * (m1 - m2) ** 2).sum())
 
 
-def bins(x: np.ndarray) -> tuple[np.ndarray, int]:
-    """The bin (n,) of each value and their number: few different values are their own bins, many share `BINS` of equal counts."""
+def _tally(place: np.ndarray, z: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Number and mean of z in every bin."""
+    n = np.bincount(place, minlength=count)
+    return n, np.bincount(place, z, minlength=count) / np.maximum(n, 1)
+
+
+def bins(x: np.ndarray) -> np.ndarray:
+    """The bin (n,) of each finite value: few different values are their own bins, many share `BINS` of equal width."""
     levels = np.unique(x)
     if len(levels) <= BINS:
-        return np.searchsorted(levels, x), len(levels)
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:-1]))
-    return np.searchsorted(edges, x, side="right"), len(edges) + 1
+        return np.searchsorted(levels, x)
+    return np.minimum((BINS * (x - x.min()) / np.ptp(x)).astype(int), BINS - 1)
 
 
-def variables(bench: Bench) -> Iterator[tuple[str, Variable]]:
-    """Everything a residual of this recording can be plotted against: (kind, variable)."""
-    inputs = bench.inputs
-    for t in range(bench.n_tendon):
-        tension = [i.tension[:, t] for i in inputs]
-        slope = [_slope(i.time, i.tension[:, t]) for i in inputs]
-        still = 0.1 * max(float(np.median(np.abs(np.concatenate(slope)))), 1e-9)
-        side = [np.where(np.abs(s) > still, np.sign(s), 0.0) for s in slope]
-        title = f"tension of tendon {t + 1} (N)"
-        yield "loop", Variable(title, tension, side)
-        yield "tension", Variable(title, tension)
-        yield "rate", Variable(f"rate of tendon {t + 1}'s tension (N/s)", slope)
-    yield "elapsed", Variable("time in the trial (s)", [i.time - i.time[0] for i in inputs])
-    yield "clock", Variable("time since the first trial (min)", [i.clock / 60.0 for i in inputs])
-    yield "payload", Variable("tip payload (g)", [np.full(len(i.time), 1e3 * i.loads.payload) for i in inputs])
-    yield "temperature", Variable("ambient temperature (K)", [i.temperature for i in inputs])
-    yield from _of_the_tip(bench)
-
-
-def _of_the_tip(bench: Bench) -> Iterator[tuple[str, Variable]]:
-    whole = markers(bench)
-    if not whole:
-        return
-    name, columns = whole[-1]
-    at = [1e3 * y[:, columns] for y in bench.measured]
-    for a, axis in enumerate("xyz"):
-        yield "position", Variable(f"measured {axis} of {name} (mm)", [p[:, a] for p in at])
-    for angle in range(15, 360, 15):
-        if angle % 90:
-            c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-            yield "position", Variable(f"reach of {name} towards {angle}° (mm)", [c * p[:, 0] + s * p[:, 1] for p in at])
-    yield "azimuth", Variable(f"direction {name} is bent to (°)", [np.degrees(np.arctan2(p[:, 1], p[:, 0])) for p in at])
-    yield "reach", Variable(f"distance of {name} from the straight axis (mm)", [np.hypot(p[:, 0], p[:, 1]) for p in at])
-
-
-def _slope(time: np.ndarray, tension: np.ndarray) -> np.ndarray:
-    """dT/dt (n,) in N/s, smoothed over five samples so that noise alone makes no direction."""
-    if len(time) < 2:
-        return np.zeros_like(tension)
-    wide = np.convolve(np.pad(tension, 2, mode="edge"), np.ones(5) / 5.0, "valid")
-    return np.gradient(wide, time)
+def means(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of x and of y in every bin of x with enough samples, from left to right."""
+    place = bins(x)
+    count = int(place.max()) + 1
+    n, mean_x = _tally(place, x, count)
+    full = n >= FEWEST
+    return mean_x[full], _tally(place, y, count)[1][full]

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from twin.quantities import Fitted
 
 MM = 1e3  # m -> mm
+NONE = "\N{EN DASH}"  # where there is no number
+MINUS = "\N{MINUS SIGN}"
 FRIENDLY = {  # SI unit -> (shown unit, factor)
     "m": ("mm", 1e3),
     "kg": ("g", 1e3),
@@ -33,9 +35,9 @@ def digits(value: float, std: float | None) -> int:
 def number(value: float | None, decimals: int = 2) -> str:
     """`value` with this many decimals; an en dash where there is none."""
     if value is None or not math.isfinite(value):
-        return "–"
+        return NONE
     text = f"{value:.{decimals}f}"
-    return text.replace("-", "−") if float(text) else text.lstrip("-")  # noqa: RUF001
+    return text.replace("-", MINUS) if float(text) else text.lstrip("-")
 
 
 def friendly(fitted: Fitted) -> Fitted:
@@ -45,26 +47,33 @@ def friendly(fitted: Fitted) -> Fitted:
 
 
 def plus_minus(fitted: Fitted) -> str:
-    """"0.1030 ± 0.0013 mm": value, standard error if there is one, and unit, in a unit of everyday size."""
+    """As in "0.1030 ± 0.0013 mm": value, standard error if there is one, and unit, in a unit of everyday size."""
     shown = friendly(fitted)
-    places = digits(shown.value, shown.std)
-    text = number(shown.value, places)
+    decimals = digits(shown.value, shown.std)
+    text = number(shown.value, decimals)
     if finite(shown.std) is not None:
-        text += f" ± {number(shown.std, places)}"
+        text += f" ± {number(shown.std, decimals)}"
     return text + (shown.unit if shown.unit == "°" else f" {shown.unit}" if shown.unit else "")
 
 
 def column(values: Sequence[float | None], significant: int = 3) -> list[str]:
     """Numbers of one table column, all with the same decimals, so that they line up; the largest gets `significant` digits."""
+    return [number(v, places(values, significant)) for v in values]
+
+
+def places(values: Sequence[float | None], significant: int) -> int:
+    """Decimals that give the largest of the values this many significant digits."""
     known = [abs(v) for v in values if v is not None and math.isfinite(v) and v != 0]
-    places = 2 if not known else min(6, max(0, significant - 1 - math.floor(math.log10(max(known)))))
-    return [number(v, places) for v in values]
+    return 2 if not known else min(6, max(0, significant - 1 - math.floor(math.log10(max(known)))))
 
 
 def percent(share: float) -> str:
-    """"97 %"; never a rounded 0 or 100 for what is neither."""
-    if 0.0 < share < 0.005:
+    """A share of one in whole percent, "97 %"; what rounds to none or all is "less than 1 %" or "more than 99 %"."""
+    if share < 0.005:
         return "less than 1 %"
-    if 0.995 <= share < 1.0:
-        return "more than 99 %"
-    return f"{100 * share:.0f} %"
+    return "more than 99 %" if share >= 0.995 else f"{100 * share:.0f} %"
+
+
+def upper_first(text: str) -> str:
+    """The text as a sentence begins."""
+    return text[:1].upper() + text[1:]

@@ -1,4 +1,4 @@
-"""report.html: one self-contained file. It loads nothing: scripts, styles and figures are inside, and its policy forbids the rest."""
+"""report.html: one self-contained file. It loads nothing: scripts, styles and figures are inside, and a policy forbids the rest."""
 
 from __future__ import annotations
 
@@ -36,12 +36,16 @@ def page(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> str:
         section = make(story)
         body = environment().get_template(section.template).render({**common, **section.content})
         sections.append({"id": section.id, "title": section.title, "body": Markup(body)})
-    return environment().get_template("page.html").render(
-        **common,
-        robot=diagnosis.bench.robot,
-        sentence=sentence(diagnosis),
-        verdict=diagnosis.verdict,
-        date=provenance.get("date", ""),
-        sections=sections,
-        plotly=Markup(get_plotlyjs()),
+    return (
+        environment()
+        .get_template("page.html")
+        .render(
+            **common,
+            robot=diagnosis.bench.robot,
+            sentence=sentence(diagnosis),
+            verdict=diagnosis.verdict,
+            date=provenance.get("date", ""),
+            sections=sections,
+            plotly=Markup(get_plotlyjs()),
+        )
     )

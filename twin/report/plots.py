@@ -62,8 +62,10 @@ def figure(traces: list[Any], height: int, **layout: Any) -> go.Figure:
         "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "font": {"size": 13}},
     }
     out = go.Figure(traces, layout={**style, **layout})
-    quiet = {"gridcolor": GRID, "zerolinecolor": "#c3c9cd", "linecolor": "#c3c9cd", "ticks": "outside", "tickcolor": "#c3c9cd"}
-    out.update_xaxes(**quiet)
-    out.update_yaxes(**quiet)
+    line = "#c3c9cd"
+    quiet: dict[str, Any] = {"gridcolor": GRID, "zerolinecolor": line, "linecolor": line, "ticks": "outside", "tickcolor": line}
+    quiet["title"] = {"font": {"size": 13}, "standoff": 8}
+    out.update_xaxes(quiet)
+    out.update_yaxes(quiet)
     out.layout.template = None  # type: ignore[attr-defined]
     return out

@@ -6,13 +6,13 @@ from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.diagnose.verdict import LINE
 from twin.effects import named
-from twin.report.numbers import MM, number, percent, plus_minus
+from twin.report.numbers import MM, number, percent, plus_minus, upper_first
 
 MOST = 3  # parameters of an effect named in a sentence
 
 
 def effect_words(identifier: str) -> str:
-    """"tendon_friction" -> "tendon friction"."""
+    """An effect's identifier as people say it: tendon_friction -> tendon friction."""
     return identifier.replace("_", " ")
 
 
@@ -39,33 +39,43 @@ def explained_share(diagnosis: Diagnosis) -> float | None:
 
 
 def claim_words(claim: Claim) -> str:
-    """"tendon friction, mu = 0.1030 ± 0.0013": the parameters that make the effect, those of its shape left out."""
+    """As in "tendon friction, mu = 0.1030 ± 0.0013": the parameters that make the effect, those of its shape left out."""
     main = [n for n in claim.parameters if n not in named(claim.effect).shape] or list(claim.parameters)
     shown = [f"{n.replace('_', ' ')} = {plus_minus(claim.parameters[n])}" for n in main[:MOST]]
     return ", ".join([effect_words(claim.effect), *shown, *(["…"] if len(main) > MOST else [])])
 
 
+def rivals(diagnosis: Diagnosis) -> list[str]:
+    """Other explanations within the accuracy of the evidence, in words: sets that do not contain what is claimed."""
+    claimed = {c.effect for c in diagnosis.claims}
+    others = [effects for effects in diagnosis.ambiguous if not claimed <= set(effects)]
+    return [" with ".join(effect_words(e) for e in effects) for effects in others]
+
+
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, what it rests on, and the error on trials no fit has seen."""
-    group, e = headline(diagnosis), diagnosis.errors
+    d, group, e = diagnosis, headline(diagnosis), diagnosis.errors
     nominal, before, after, floor = (number(x[group] * MM) for x in (e.nominal, e.calibrated, e.after, e.floor))
-    count = len(diagnosis.held_trials)
+    count = len(d.held_trials)
     unseen = f"on {count} trial{'s' if count != 1 else ''} no fit has seen"
-    noise = f"noise floor {floor} mm"
-    if diagnosis.verdict == "noise":
-        return f"No missing effect: after calibration only noise is left; {unseen} the error is {after} mm, from {nominal} mm ({noise})."
-    left = structure_left(diagnosis)
-    if diagnosis.verdict == "unexplained":
+    error = f"error is {after} mm, from {nominal} mm as described (noise floor {floor} mm)"
+    if d.verdict == "noise":
+        return f"No missing effect: after calibration only noise is left; {unseen} the {error}."
+    left = structure_left(d)
+    if d.verdict == "unexplained":
         return (
-            f"Unexplained: after calibration a structured error of {diagnosis.structure_before:.2f} sigma is left that no known "
-            f"effect may claim; it moves mostly with {left}, and {unseen} the error is {after} mm ({noise})."
+            f"Unexplained: after calibration a structured error of {d.structure_before:.2f} sigma is left that no known "
+            f"effect may claim; it moves mostly with {left}. {upper_first(unseen)} the {error}."
         )
-    many = len(diagnosis.claims) > 1
-    share = explained_share(diagnosis)
-    names = " and ".join(claim_words(c) for c in diagnosis.claims)
-    does = f"{'Together they explain' if many else 'It explains'} {percent(share)} of the structured error; " if share is not None else ""
-    change = f"falls from {before} to {after} mm" if e.after[group] < e.calibrated[group] else f"goes from {before} to {after} mm"
-    start = "Partly explained" if diagnosis.verdict == "partly_explained" else f"Missing effect{'s' if many else ''}"
+    many = len(d.claims) > 1
+    start = "Partly explained" if d.verdict == "partly_explained" else f"Missing effect{'s' if many else ''}"
+    names = " and ".join(claim_words(c) for c in d.claims)
+    share = explained_share(d)
+    they = "Together they explain" if many else "It explains"
+    explains = "" if share is None else f"{they} {percent(share)} of the structured error; "
+    verb = "falls" if e.after[group] < e.calibrated[group] else "goes"
+    change = f"the error {verb} from {before} to {after} mm (noise floor {floor} mm)"
+    others = rivals(d)
+    doubt = f" These data cannot tell {'them' if many else 'it'} from {' or '.join(others[:2])}." if others else ""
     rest = f" What is left moves mostly with {left}." if left else ""
-    what = f"{does}{unseen}"
-    return f"{start}: {names}. {what[0].upper()}{what[1:]} the error {change} ({noise}).{rest}"
+    return f"{start}: {names}. {upper_first(explains + unseen)} {change}.{doubt}{rest}"

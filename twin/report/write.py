@@ -38,7 +38,8 @@ def write(diagnosis: Diagnosis, folder: Path | str, provenance: Mapping[str, Any
         for name, part in parts.items():
             part.replace(folder / name)
     except OSError as error:
-        raise DataError(f"{folder}: the report cannot be written ({error.strerror or error}); give a folder you may write to") from None
+        words = f"{folder}: the report cannot be written ({error.strerror or error}); give a folder you may write to"
+        raise DataError(words) from None
     finally:
         for part in parts.values():
             part.unlink(missing_ok=True)

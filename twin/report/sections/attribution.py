@@ -24,7 +24,7 @@ def section(story: Story) -> Section:
     )
 
 
-def _table(claims: tuple[Claim, ...]) -> list[dict[str, str]]:
+def _table(claims: tuple[Claim, ...]) -> list[dict[str, object]]:
     errors = column([MM * c.error for c in claims])
     moved = column([c.contribution for c in claims], 2)
     return [
@@ -33,7 +33,7 @@ def _table(claims: tuple[Claim, ...]) -> list[dict[str, str]]:
             "error": error,
             "moved": sigma,
             "probability": percent(c.probability),
-            "parameters": ", ".join(f"{n} = {plus_minus(f)}" for n, f in c.parameters.items()),
+            "parameters": [f"{n} = {plus_minus(f)}" for n, f in c.parameters.items()],
         }
         for c, error, sigma in zip(claims, errors, moved, strict=True)
     ]

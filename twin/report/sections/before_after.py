@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
 from twin.report.contents import KINDS, labels
-from twin.report.numbers import MM, column
+from twin.report.numbers import MM, number, places, upper_first
 from twin.report.plots import ACCENT, BEFORE, MEASURED, Plot, figure
 from twin.report.sections.section import Section, Story
 
@@ -16,24 +16,20 @@ ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with th
 def section(story: Story) -> Section:
     d = story.diagnosis
     groups = list(d.errors.after)
-    tables = [{"kind": KINDS.get(g, g).replace("_", " "), "rows": rows(d, g), "plot": _plot(d, g)} for g in groups]
+    tables = [{"kind": upper_first(KINDS.get(g, g).replace("_", " ")), "rows": rows(d, g), "plot": _plot(d, g)} for g in groups]
     return Section("before-after", "Before and after", "before_after.html", {"tables": tables, "trials": labels(d, d.held_trials)})
 
 
 def rows(d: Diagnosis, group: str) -> list[dict[str, str]]:
     """The table: stage, error, 95 % interval, all in mm with the same decimals; the noise floor last."""
-    e = d.errors
-    low = {"nominal": None, "calibrated": e.ci_calibrated[group][0], "after": e.ci_after[group][0]}
-    high = {"nominal": None, "calibrated": e.ci_calibrated[group][1], "after": e.ci_after[group][1]}
-    shown = list(stages(d))
-    value = [{"nominal": e.nominal, "calibrated": e.calibrated, "after": e.after}[s][group] for s in shown]
-    cells = column([MM * v for v in (*value, e.floor[group])], 3)
+    floor = MM * d.errors.floor[group]
+    decimals = places([floor], 3)
     out = []
-    for stage, text in zip(shown, cells[:-1], strict=True):
-        ends = [low[stage], high[stage]]
-        interval = column([None if x is None else MM * x for x in ends], 3)
-        out.append({"stage": ROWS[stage], "error": text, "interval": "" if ends[0] is None else " to ".join(interval)})
-    return [*out, {"stage": "noise floor", "error": cells[-1], "interval": ""}]
+    for stage in stages(d):
+        value, interval = _of(d, stage, group)
+        ends = "" if interval is None else " to ".join(number(x, decimals) for x in interval)
+        out.append({"stage": ROWS[stage], "error": number(value, decimals), "interval": ends})
+    return [*out, {"stage": "noise floor", "error": number(floor, decimals), "interval": ""}]
 
 
 def stages(d: Diagnosis) -> tuple[str, ...]:
@@ -41,22 +37,41 @@ def stages(d: Diagnosis) -> tuple[str, ...]:
     return ("nominal", "calibrated", "after") if d.claims else ("nominal", "calibrated")
 
 
-def _plot(d: Diagnosis, group: str) -> Plot:
+def _of(d: Diagnosis, stage: str, group: str) -> tuple[float, tuple[float, float] | None]:
+    """Error and its interval (mm) at a stage; nominal has none."""
     e = d.errors
-    shown = list(stages(d))
-    value = {"nominal": e.nominal[group], "calibrated": e.calibrated[group], "after": e.after[group]}
-    ends = {"calibrated": e.ci_calibrated[group], "after": e.ci_after[group]}
-    names = [ROWS[s] for s in shown]
-    x = [MM * value[s] for s in shown]
-    up = [MM * (ends[s][1] - value[s]) if s in ends else 0.0 for s in shown]
-    down = [MM * (value[s] - ends[s][0]) if s in ends else 0.0 for s in shown]
-    colors = [BEFORE] * (len(shown) - 1) + [ACCENT]
-    bars = go.Bar(x=x, y=names, orientation="h", marker={"color": colors}, width=0.5, hovertemplate="%{y}: %{x:.3f} mm<extra></extra>",
-                  error_x={"type": "data", "array": up, "arrayminus": down, "color": MEASURED, "thickness": 1.3, "width": 5})  # fmt: skip
-    floor = MM * e.floor[group]
-    out = figure([bars], 90 + 44 * len(shown), showlegend=False, margin={"l": 120, "r": 14, "t": 26, "b": 44})
+    value = {"nominal": e.nominal, "calibrated": e.calibrated, "after": e.after}[stage][group]
+    interval = {"calibrated": e.ci_calibrated, "after": e.ci_after}.get(stage, {}).get(group)
+    return MM * value, None if interval is None else (MM * interval[0], MM * interval[1])
+
+
+def _plot(d: Diagnosis, group: str) -> Plot:
+    shown = stages(d)
+    found = [_of(d, s, group) for s in shown]
+    ends = [interval or (value, value) for value, interval in found]
+    values = [value for value, _ in found]
+    spread = {
+        "type": "data",
+        "array": [high - value for (_, high), value in zip(ends, values, strict=True)],
+        "arrayminus": [value - low for (low, _), value in zip(ends, values, strict=True)],
+        "color": MEASURED,
+        "thickness": 1.3,
+        "width": 5,
+    }
+    bars = go.Bar(
+        x=values,
+        y=[ROWS[s] for s in shown],
+        orientation="h",
+        width=0.5,
+        marker={"color": [BEFORE] * (len(shown) - 1) + [ACCENT]},
+        error_x=spread,
+        hovertemplate="%{y}: %{x:.3f} mm<extra></extra>",
+    )
+    height = 100 + 44 * len(shown)
+    out = figure([bars], height, showlegend=False, margin={"l": 120, "r": 14, "t": 28, "b": 50})
     out.update_yaxes(autorange="reversed", ticks="", showgrid=False)
-    out.update_xaxes(title="root-mean-square error (mm)", rangemode="tozero")
+    out.update_xaxes(title_text="root-mean-square error (mm)", rangemode="tozero")
+    floor = MM * d.errors.floor[group]
     out.add_vline(x=floor, line={"color": MEASURED, "width": 1.2, "dash": "dot"})
-    out.add_annotation(x=floor, y=1, yref="paper", yanchor="bottom", text=f"noise floor {floor:.2f}", showarrow=False, font={"size": 12})
-    return Plot("Error before and after, with the noise floor", 90 + 44 * len(shown), out)
+    out.add_annotation(x=floor, y=1, yref="paper", yanchor="bottom", text="noise floor", showarrow=False, font={"size": 12})
+    return Plot("Error before and after, with the noise floor", height, out)

@@ -13,7 +13,8 @@ def section(story: Story) -> Section:
     d = story.diagnosis
     parts = sorted(d.structure.items(), key=lambda item: -item[1])
     sizes = column([size for _, size in parts], 2)
-    strongest = column([size for _, size in d.strongest], 2)
+    strongest = d.strongest if structure_left(d) else ()
+    weights = column([size for _, size in strongest], 2)
     return Section(
         "left",
         "What is left",
@@ -23,7 +24,7 @@ def section(story: Story) -> Section:
             "description": d.description,
             "worst": d.worst_channel,
             "components": [{"name": IN_WORDS.get(c, c), "size": s} for (c, _), s in zip(parts, sizes, strict=True)],
-            "strongest": [{"name": n, "size": s} for (n, _), s in zip(d.strongest, strongest, strict=True)],
+            "strongest": [{"name": n, "size": s} for (n, _), s in zip(strongest, weights, strict=True)],
             "line": f"{d.line[1]:.2f}" if d.line[0] > LINE else None,
         },
     )

@@ -26,4 +26,5 @@ def section(story: Story) -> Section:
                 "floor": column([MM * d.errors.floor[g]])[0],
             }
         )
-    return Section("noise", "The noise", "noise.html", {"rows": rows, "tension": f"{1e3 * d.noise.tension:.1f}", "origin": d.noise.source})
+    content = {"rows": rows, "tension": f"{1e3 * d.noise.tension:.1f}", "origin": d.noise.source}
+    return Section("noise", "The noise", "noise.html", content)

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from twin.quantities import Fitted
-from twin.report.numbers import digits, friendly, number
+from twin.report.numbers import NONE, digits, friendly, number
 from twin.report.sections.section import Section, Story
 
 
 def section(story: Story) -> Section:
     d = story.diagnosis
     declared = {p.name: p for p in d.bench.robot.parameters}
+    shown = {name: friendly(fitted) for name, fitted in d.parameters.items()}
+    decimals: dict[str, int] = {}
+    for name, f in shown.items():
+        decimals[_family(name)] = max(decimals.get(_family(name), 0), digits(f.value, f.std))
     rows = []
-    for name, fitted in d.parameters.items():
-        shown = friendly(fitted)
-        places = digits(shown.value, shown.std)
-        p = declared.get(name)
+    for name, f in shown.items():
+        places, p = decimals[_family(name)], declared.get(name)
         before = None if p is None else friendly(Fitted(p.value, p.std, p.unit))
         rows.append(
             {
                 "name": name,
-                "unit": shown.unit or "1",
-                "value": number(shown.value, places),
-                "std": number(shown.std, places),
-                "nominal": "–" if before is None else number(before.value, places),
-                "belief": "–" if before is None else number(before.std, places),
+                "unit": f.unit or "1",
+                "value": number(f.value, places),
+                "std": number(f.std, places),
+                "nominal": NONE if before is None else number(before.value, places),
+                "belief": NONE if before is None else number(before.std, places),
                 "unfixed": name in d.unfixed,
             }
         )
-    known = set(d.parameters)
-    return Section("parameters", "The calibrated robot", "parameters.html", {"rows": rows, "others": [n for n in d.unfixed if n not in known]})
+    others = [name for name in d.unfixed if name not in d.parameters]
+    return Section("parameters", "The calibrated robot", "parameters.html", {"rows": rows, "others": others})
+
+
+def _family(name: str) -> str:
+    """What many parameters of one list share: "disks.pitch_3" -> "disks.pitch"."""
+    return name.rstrip("0123456789").rstrip("_")

@@ -7,9 +7,10 @@ import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
 from twin.report.contents import labels
-from twin.report.plots import MEASURED, Plot, figure, numbers
+from twin.report.numbers import MM
+from twin.report.plots import BEFORE, MEASURED, Plot, figure, numbers
 from twin.report.sections.section import Section, Story
-from twin.report.stages import Stage, before_and_after, markers
+from twin.report.stages import before_and_after, markers
 
 POSES = 4
 HEIGHT = 560
@@ -20,7 +21,7 @@ def section(story: Story) -> Section:
     d = story.diagnosis
     whole = markers(d.bench)
     chosen = poses(d) if len(whole) > 1 else []
-    content = {"plot": _plot(d, chosen) if chosen else None, "poses": _words(d, chosen), "larger": f"{LARGER:g}"}
+    content = {"plot": _plot(d, chosen) if chosen else None, "poses": _words(d, chosen)}
     return Section("shapes", "Shapes", "shapes.html", content)
 
 
@@ -45,31 +46,43 @@ def _words(d: Diagnosis, chosen: list[tuple[int, int]]) -> list[str]:
 
 
 def _plot(d: Diagnosis, chosen: list[tuple[int, int]]) -> Plot:
-    first, second = before_and_after(d)
     columns = [three for _, three in markers(d.bench)]
-    measured = [1e3 * d.bench.measured[k][n][columns] for k, n in chosen]  # (n_marker, 3) mm each
-    traces: list[go.Scatter3d] = [_trace(measured, "measured", "markers", marker={"size": 4, "color": MEASURED})]
+    measured = [MM * d.bench.measured[k][n][columns] for k, n in chosen]  # (n_marker, 3) mm each
+    traces = [_trace(measured, "measured", "markers", marker={"size": 4, "color": MEASURED})]
     for times, visible in ((1.0, True), (LARGER, False)):
-        for stage in (first, second):
-            traces.append(_predicted(d, chosen, measured, stage, times, visible, columns))
-    shown = [[True, True, True, False, False], [True, False, False, True, True]]
-    buttons = [
-        {"label": label, "method": "restyle", "args": [{"visible": mask}]}
-        for label, mask in zip(("true to scale", f"differences × {LARGER:g}"), shown, strict=True)  # noqa: RUF001
-    ]
-    axes = {a + "axis": {"title": f"{a} (mm)", "backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "#dfe3e6", "showspikes": False} for a in "xyz"}
-    scene = {**axes, "aspectmode": "data", "camera": {"eye": {"x": 1.5, "y": 1.3, "z": 0.5}, "up": {"x": 0, "y": 0, "z": -1}}}
-    menu = {"type": "buttons", "direction": "right", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "buttons": buttons,
-            "bgcolor": "#ffffff", "bordercolor": "#c3c9cd", "font": {"size": 13}, "pad": {"t": 4}}  # fmt: skip
-    out = figure(traces, HEIGHT, scene=scene, updatemenus=[menu], margin={"l": 0, "r": 0, "t": 34, "b": 44})
+        for stage in before_and_after(d):
+            predicted = [MM * d.predictions[stage.key][k][n][columns] for k, n in chosen]
+            shapes = [m + times * (p - m) for m, p in zip(measured, predicted, strict=True)]
+            traces.append(_trace(shapes, stage.words, "lines", line={"width": 4, "color": stage.color}, visible=visible))
+    origin = {"size": 5, "color": BEFORE, "symbol": "square"}
+    traces.append(go.Scatter3d(x=[0], y=[0], z=[0], name="origin of the base frame", mode="markers", marker=origin))
+    gravity = d.bench.inputs[chosen[0][0]].loads.gravity
+    axis = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "#dfe3e6", "showspikes": False}
+    axes = {f"{a}axis": {"title": {"text": f"{a} (mm)"}, **axis} for a in "xyz"}
+    scene = {**axes, "aspectmode": "data", "dragmode": "orbit", "camera": _camera(gravity)}
+    out = figure(traces, HEIGHT, scene=scene, updatemenus=[_buttons()], margin={"l": 0, "r": 0, "t": 44, "b": 44})
     return Plot("Measured and predicted shapes", HEIGHT, out)
 
 
-def _predicted(
-    d: Diagnosis, chosen: list[tuple[int, int]], measured: list[np.ndarray], stage: Stage, times: float, visible: bool, columns: list[list[int]]
-) -> go.Scatter3d:
-    shapes = [m + times * (1e3 * d.predictions[stage.key][k][n][columns] - m) for m, (k, n) in zip(measured, chosen, strict=True)]
-    return _trace(shapes, stage.words, "lines", line={"width": 4, "color": stage.color}, visible=visible)
+def _camera(gravity: np.ndarray) -> dict[str, dict[str, float]]:
+    """A view from the side and a little above, with gravity pointing down the page."""
+    size = float(np.linalg.norm(gravity))
+    up = -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    across = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
+    along = np.cross(across, up)
+    eye = 1.1 * across + 0.9 * along + 0.35 * up
+    return {name: dict(zip("xyz", map(float, v), strict=True)) for name, v in (("up", up), ("eye", eye))}
+
+
+def _buttons() -> dict[str, object]:
+    """Two views: true to scale, and with every prediction drawn further from the measured shape."""
+    views = {
+        "true to scale": [True, True, True, False, False, True],
+        f"differences \N{MULTIPLICATION SIGN} {LARGER:g}": [True, False, False, True, True, True],
+    }
+    buttons = [{"label": label, "method": "restyle", "args": [{"visible": shown}]} for label, shown in views.items()]
+    place = {"direction": "right", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "pad": {"t": 4}}
+    return {"type": "buttons", "buttons": buttons, "bgcolor": "#ffffff", "bordercolor": "#c3c9cd", "font": {"size": 13}, **place}
 
 
 def _trace(shapes: list[np.ndarray], name: str, mode: str, **style: object) -> go.Scatter3d:

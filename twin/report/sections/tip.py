@@ -54,9 +54,9 @@ def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
     height = ROW * n_row + 60
     out = figure(list(grid.data), height, **{a: grid.layout[a] for a in grid.layout if a.startswith(("xaxis", "yaxis"))})
     for row, j in enumerate(columns, 1):
-        out.update_yaxes(title=f"{d.bench.outputs[j].channel.name} (mm)", selector={"anchor": "x" if row == 1 else f"x{row}"})
-    out.update_yaxes(title="error (mm)", rangemode="tozero", selector={"anchor": f"x{n_row}"})
-    out.update_xaxes(title="time (s)", selector={"anchor": f"y{n_row}"})
+        out.update_yaxes(title_text=f"{d.bench.outputs[j].channel.name} (mm)", selector={"anchor": "x" if row == 1 else f"x{row}"})
+    out.update_yaxes(title_text="error (mm)", rangemode="tozero", selector={"anchor": f"x{n_row}"})
+    out.update_xaxes(title_text="time (s)", selector={"anchor": f"y{n_row}"})
     out.update_layout(hovermode="x")
     return Plot(f"Time series of {plain(labels(d, (k,))[0])}", height, out)
 
