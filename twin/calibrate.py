@@ -1,28 +1,31 @@
 """The robot's own uncertain parameters, and those of effects in force, fitted to the trials set aside for fitting.
 
 Minimises  sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2  over x, the parameters in units of their `step`, within bounds:
-Gauss-Newton (SciPy's trust region) on derivatives by finite differences. A difference costs a fraction of a prediction, because a
+Gauss-Newton on derivatives by finite differences. A difference costs a fraction of a prediction, because a
 changed twin is solved from the equilibria and tangents of the unchanged one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
 
 from twin.bench import Bench
 from twin.effects import Effect, named
+from twin.equilibrium import TOLERANCE
 from twin.errors import SolveError
 from twin.quantities import Fitted, Parameter
 from twin.residual import Whitener
 from twin.robots import Robot
 from twin.twin import Trace, Twin, readings, report, simulate
 
+ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
+STEPS = 12  # at most, of a fit
 UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
 
 
@@ -99,7 +102,7 @@ class Objective:
         self.n = int(sum(np.isfinite(bench.measured[k]).sum() for k in trials))
 
     def predict(self, twin: Twin, near: list[Trace] | None = None, keep: bool = False) -> tuple[list[Trace], list[np.ndarray]]:
-        traces = simulate(twin, self.bench, trials=self.trials, near=near, keep=keep)
+        traces = simulate(twin, self.bench, trials=self.trials, near=near, keep=keep, tolerance=TOLERANCE if keep else ROUGH)
         own = traces[-len(self.trials) :] if len(traces) == len(self.trials) else [traces[k] for k in self.trials]
         return traces, [readings(self.bench, report(twin.effects, t.true)) for t in own]
 
@@ -204,48 +207,68 @@ def prior_weight(model: Model) -> np.ndarray:
 
 
 def fit(
-    objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, evaluations: int = 12,
+    objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, refresh: bool = False,
     tolerance: float = 1e-5,
 ) -> Fit:  # fmt: skip
-    """Fit a model's free parameters.
+    """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
-    With `J`, whitened derivatives (n, m) for the first m free parameters from a neighbouring fit, those columns are kept and
-    only the rest is differentiated anew: enough to rank effects, at a fraction of the cost.
-    Raises SolveError where the model cannot be solved at its start.
+    Derivatives for the robot's own parameters, nearly linear, are taken once, or come as `J`, the whitened columns (n, m) of the
+    first m free parameters from a neighbouring fit; those for effects are taken anew at every step. `refresh` takes them all again
+    at the solution, for standard errors and screening. Raises SolveError where the model cannot be solved at its start.
     """
-    frozen = 0 if J is None else J.shape[1]
-    prior = np.array([f.parameter.value / f.parameter.step for f in model.free])
-    weight = prior_weight(model)
-    active = np.flatnonzero(weight)
-    state = {"at": objective.evaluate(model, near.traces if near else None), "J": np.zeros((0, 0))}
-
-    def at(x: np.ndarray) -> Evaluation | None:
-        if not np.allclose(x, state["at"].model.vector(), rtol=0, atol=1e-12):
-            try:
-                state["at"] = objective.evaluate(model.at(x), state["at"].traces)
-            except SolveError:
-                return None
-        return state["at"]
-
-    def residual(x: np.ndarray) -> np.ndarray:
-        found = at(x)
-        z = found.z if found is not None else np.full(state["at"].z.size, 1e3)
-        return np.concatenate([z, (weight * (x - prior))[active]])
-
-    def derivative(x: np.ndarray) -> np.ndarray:
-        found = at(x)
-        assert found is not None  # SciPy differentiates at accepted points only
-        new = objective.jacobian(found, range(frozen, len(model.free)))
-        state["J"] = np.concatenate([J, new], axis=1) if J is not None else new
-        return np.concatenate([state["J"], np.diag(weight)[active]])
-
     steps = np.array([f.parameter.step for f in model.free])
     low = np.array([f.parameter.low for f in model.free]) / steps
     high = np.array([f.parameter.high for f in model.free]) / steps
-    x0 = np.clip(model.vector(), low + 1e-9, high - 1e-9)
-    found = least_squares(
-        residual, x0, derivative, bounds=(low, high), method="trf", x_scale=1.0, ftol=tolerance, xtol=1e-4, gtol=1e-8, max_nfev=evaluations
-    )  # fmt: skip
-    final = at(found.x)
-    assert final is not None
-    return Fit(final, state["J"], float(2 * found.cost))
+    prior = np.array([f.parameter.value for f in model.free]) / steps
+    weight = prior_weight(model) ** 2
+
+    def cost(e: Evaluation) -> float:
+        return float(e.z @ e.z + weight @ (e.model.vector() - prior) ** 2)
+
+    at = objective.evaluate(model, near.traces if near else None)
+    fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
+    moving = [i for i, f in enumerate(model.free) if f.effect is not None]
+    columns = np.zeros((at.z.size, len(model.free)))
+    if J is not None:
+        columns[:, : J.shape[1]] = J
+    columns[:, fixed] = objective.jacobian(at, fixed)
+    now, damping = cost(at), 1e-4
+    for _ in range(STEPS):
+        columns[:, moving] = objective.jacobian(at, moving)
+        x = at.model.vector()
+        H = columns.T @ columns + np.diag(weight)
+        g = columns.T @ at.z + weight * (x - prior)
+        better = None
+        while better is None and damping < 1e4:
+            d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
+            better = _improved(objective, at, x + d, now, cost)
+            damping = max(0.1 * damping, 1e-6) if better else 10.0 * damping
+        if better is None:
+            break
+        fall, at, now = now - cost(better), better, cost(better)
+        if fall < tolerance * now:
+            break
+    if refresh:
+        columns = objective.jacobian(at, range(len(model.free)))
+    return Fit(at, columns, now)
+
+
+def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """argmin 1/2 d'Hd + g'd within low <= d <= high."""
+    L = np.linalg.cholesky(H + 1e-12 * np.trace(H) * np.eye(len(g)))
+    d = -np.linalg.solve(H, g)
+    if np.all((d >= low) & (d <= high)):
+        return d
+    room = np.maximum(high - low, 1e-9)
+    return lsq_linear(L.T, -np.linalg.solve(L, g), bounds=(low, low + room), method="bvls").x
+
+
+def _improved(
+    objective: Objective, at: Evaluation, x: np.ndarray, now: float, cost: Callable[[Evaluation], float]
+) -> Evaluation | None:
+    """The evaluation at x if it is better than `now`, else None; a model without equilibrium is not better."""
+    try:
+        moved = objective.evaluate(at.model.at(x), at.traces)
+    except SolveError:
+        return None
+    return moved if cost(moved) < now else None

@@ -109,11 +109,11 @@ class Dynamics:
 
     def solve(
         self, time: np.ndarray, tension: np.ndarray, loads: Loads, route: Route, creep: Creep, delayed: np.ndarray,
-        near: Path | None = None, keep: bool = False,
+        near: Path | None = None, keep: bool = False, tolerance: float = 0.0,
     ) -> Path:  # fmt: skip
         """The motion under base tensions (n, n_tendon) N at times (n,) s, from rest in equilibrium under the first ones.
 
-        `near` and `keep` have no use here and are ignored: a motion has no neighbour to start from.
+        `near`, `keep` and `tolerance` are of the static solve only: a motion has no neighbour to start from.
         """
         start = self.statics.solve(time[:1], tension[:1], loads, route, creep, delayed)
         moving = Equilibrium(_loaded(self._body, loads.payload))

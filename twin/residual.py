@@ -28,12 +28,14 @@ class Noise:
     rho: np.ndarray
     source: str
 
-    def floor(self, bench: Bench) -> dict[str, float]:
-        """RMS error of a perfect twin without tension noise, by group: Euclidean per marker (m), per channel otherwise."""
+    def floor(self, bench: Bench, sensitivity: Sequence[np.ndarray]) -> dict[str, float]:
+        """RMS error a perfect twin would still show, by group (m; Euclidean per marker): the sensors' noise, and that of the tension
+        readings it is driven by, through the sensitivities (n_k, n_output, n_tendon) m/N."""
+        driven = self.tension**2 * np.mean([(G**2).sum(axis=2).mean(axis=0) for G in sensitivity], axis=0)  # (n_output,)
         floors = {}
         for group in dict.fromkeys(o.group for o in bench.outputs):
-            square = float(np.mean([self.sigma[j] ** 2 for j, o in enumerate(bench.outputs) if o.group == group]))
-            floors[group] = np.sqrt(square * (3.0 if group == "marker" else 1.0))
+            square = float(np.mean([self.sigma[j] ** 2 + driven[j] for j, o in enumerate(bench.outputs) if o.group == group]))
+            floors[group] = float(np.sqrt(square * (3.0 if group == "marker" else 1.0)))
         return floors
 
 
@@ -41,7 +43,7 @@ class Whitener:
     """Makes residuals and derivatives of them white under a Noise and the tension sensitivities G, a list of (n_k, n_output, n_tendon)."""
 
     def __init__(self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> None:
-        self.noise = noise
+        self.noise, self.sensitivity = noise, sensitivity
         self.present = [np.isfinite(y) for y in measured]
         self._mix = [self._across(p, g) for p, g in zip(self.present, sensitivity, strict=True)]
 

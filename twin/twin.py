@@ -11,7 +11,7 @@ import numpy as np
 from twin.bench import Bench, Inputs, prepare
 from twin.dynamics import Dynamics
 from twin.effects import Creep, Effect, Loads, Route, Signals, named
-from twin.equilibrium import Equilibrium, Path
+from twin.equilibrium import TOLERANCE, Equilibrium, Path
 from twin.errors import SolveError
 from twin.measurements import Recording
 from twin.quantities import Values
@@ -80,7 +80,7 @@ def is_dynamic(bench: Bench) -> bool:
 
 def simulate(
     twin: Twin, bench: Bench, *, trials: Sequence[int] | None = None, near: Sequence[Trace] | None = None, keep: bool = False,
-    dynamic: bool = False,
+    dynamic: bool = False, tolerance: float = TOLERANCE,
 ) -> list[Trace]:  # fmt: skip
     """The true signals of the bench's trials (all, or those listed) in order of their clock.
 
@@ -105,13 +105,13 @@ def simulate(
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
         close = near[position].path if near is not None and len(near) == len(run) else None
-        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep)
+        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep, tolerance)
     return [traces[k] for k in (run if keep else wanted)]
 
 
 def _trial(
     twin: Twin, solver: Equilibrium | Dynamics, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray, near: Path | None,
-    keep: bool,
+    keep: bool, tolerance: float,
 ) -> Trace:  # fmt: skip
     n = len(inputs.time)
     seen = Signals(
@@ -123,7 +123,7 @@ def _trial(
     loads: Loads = inputs.loads
     for effect in twin.effects:
         loads = effect.surround(loads)
-    path = solver.solve(inputs.time, tension, loads, route, creep, delayed, near, keep)
+    path = solver.solve(inputs.time, tension, loads, route, creep, delayed, near, keep, tolerance)
     if not path.status.all():
         bad = int(np.flatnonzero(path.status == 0)[0])
         raise SolveError(

@@ -66,7 +66,7 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
 
 
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
-    """The trial of the menu with the largest symmetrised separation; None where no trial separates the two at all."""
+    """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial separates the two at all."""
     best: Experiment | None = None
     for words, inputs in menu(bench):
         n = len(inputs.time)
@@ -75,7 +75,7 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         whitener = Whitener(replace(noise, tension=0.0), [empty], [np.zeros((n, len(bench.outputs), bench.n_tendon))])
         objective = Objective(imagined, [0], whitener, jobs)
         try:
-            T = 0.5 * (_separation(objective, a, b) + _separation(objective, b, a))
+            T = _separation(objective, a, b)
         except SolveError:
             continue
         if best is None or best.separation < T:

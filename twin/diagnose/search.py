@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.calibrate import Fit, Model, Objective, fit
+from twin.calibrate import Fit, Objective, fit
 from twin.diagnose.evidence import Discrepancy, Evidence
 from twin.diagnose.screen import screen
 from twin.effects import catalogue
@@ -66,12 +66,12 @@ def search(objective: Objective, evidence: Evidence, base: Weighed, progress: Pr
                 found = _extended(objective, evidence, member, candidate.effect, dict(candidate.start.values), candidate.start.free)
                 if found is not None and (found.effects not in fresh or found.score > fresh[found.effects].score):
                     fresh[found.effects] = found
+        fresh = {k: _fuller(objective, evidence, w, k, progress) if w.score > best_before else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
         if not beam or beam[0].score < best_before + ACCEPT:
             break
     best = max(known.values(), key=lambda w: w.score - ACCEPT * len(w.effects))
-    best = _fuller(objective, evidence, best, progress)
     best = _leaner(objective, evidence, best, known, progress)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
@@ -87,25 +87,34 @@ def _extended(
         return None
 
 
-def _fuller(objective: Objective, evidence: Evidence, best: Weighed, progress: Progress) -> Weighed:
-    """The fuller law of an effect (a second creep time), where the data ask for it."""
-    for effect in best.effects:
+def _fuller(objective: Objective, evidence: Evidence, found: Weighed, effects: tuple[str, ...], progress: Progress) -> Weighed:
+    """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it.
+
+    Before other effects are added: what the plain law leaves would be taken for them.
+    """
+    n_tendon = objective.bench.n_tendon
+    for effect in effects:
         richer = catalogue()[effect].richer
-        if not richer:
+        free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
+        if not richer or set(richer) <= set(free):
             continue
         progress(f"fuller law of {effect}")
-        table = {p.name: p for p in catalogue()[effect].declared(objective.bench.n_tendon)}
-        current = next(e for e in best.fit.model.twin.effects if e.id == effect)
-        values = {**current.values, **{n: table[n].value + (0.0 if n in current.shape else table[n].step) for n in richer}}
-        free = tuple(f.parameter.name for f in best.fit.model.free if f.effect == effect) + richer
-        bare = best.fit.model.without_effect(effect)
+        table = {p.name: p for p in catalogue()[effect].declared(n_tendon)}
+        law = next(e for e in found.fit.model.twin.effects if e.id == effect)
+        values = {**law.values, **{n: table[n].value + (0.0 if n in law.shape else table[n].step) for n in richer}}
+        model = found.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
         try:
-            found = weigh(objective, evidence, fit(objective, bare.with_effect(effect, values, free, objective.bench.n_tendon)))
+            fuller = weigh(objective, evidence, fit(objective, model, J=_own(found.fit)))
         except SolveError:
             continue
-        if found.score > best.score + ACCEPT:
-            best = found
-    return best
+        if fuller.score > found.score + ACCEPT:
+            found = fuller
+    return found
+
+
+def _own(fitted: Fit) -> np.ndarray:
+    """Derivatives for the robot's own parameters, which come first."""
+    return fitted.J[:, [i for i, f in enumerate(fitted.model.free) if f.effect is None]]
 
 
 def _leaner(
@@ -129,5 +138,6 @@ def _leaner(
 
 def refit_without(objective: Objective, evidence: Evidence, best: Weighed, effect: str) -> Weighed:
     """The best set less one effect, everything else fitted again."""
-    model: Model = best.fit.model.without_effect(effect)
-    return weigh(objective, evidence, fit(objective, model))
+    keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
+    model = best.fit.model.without_effect(effect)
+    return weigh(objective, evidence, fit(objective, model, J=best.fit.J[:, keep]))

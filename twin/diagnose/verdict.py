@@ -114,7 +114,7 @@ def diagnose(
     notices += notes
     evidence = Evidence(bench, fitted)
     progress("calibration")
-    base = weigh(objective, evidence, fit(objective, start))
+    base = weigh(objective, evidence, fit(objective, start, refresh=True))
     found = search(objective, evidence, base, progress)
     progress("verdict")
     best, dropped, small = _gate(objective, evidence, found, bench, twin.robot.accuracy, progress)
@@ -125,18 +125,19 @@ def diagnose(
     verdict = _verdict(added, before, after, line[0])
     final = base if verdict in ("noise", "unexplained") else best
     held_out = _HeldOut(bench, held)
+    too_small = {c.effect for c in small}
     claims = tuple(
         Claim(
             e,
             final.fit.fitted(e),
             held_out.rms(dropped[e].fit.model.twin),
-            _probability(found, e),
+            _probability(found, e, too_small),
             _contribution(final, dropped[e], objective),
         )
         for e in added
         if final is best
     )
-    runners = _runners_up(found, set() if verdict == "unexplained" else set(added), own, held_out)
+    runners = _runners_up(found, set() if verdict == "unexplained" else set(added), own, too_small, held_out)
     ambiguous = _ambiguous(found, final)
     experiment = None
     if ambiguous or (verdict not in ("noise",) and runners):
@@ -160,7 +161,7 @@ def diagnose(
         below_materiality=small,
         parameters=final.fit.fitted(None),
         unfixed=tuple(final.fit.unfixed()),
-        errors=_errors(bench, held, predictions, objective.whitener.noise, settings.seed),
+        errors=_errors(bench, held, predictions, objective.whitener, settings.seed),
         noise=objective.whitener.noise,
         structure_before=before,
         structure_after=after,
@@ -188,7 +189,7 @@ def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) 
     first = Noise(rough, 0.0, np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
     objective = Objective(bench, fitted, Whitener(first, measured, none), settings.jobs)
-    start = fit(objective, Model.base(twin.robot, twin), evaluations=4, tolerance=1e-3)
+    start = fit(objective, Model.base(twin.robot, twin), tolerance=1e-3)
     sensitivity = _sensitivity(objective, start)
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
     return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity), settings.jobs), notes
@@ -250,11 +251,12 @@ def _verdict(added: tuple[str, ...], before: float, after: float, line: float) -
     return "unexplained" if after > HALF * before else "partly_explained"
 
 
-def _probability(found: Search, effect: str) -> float:
-    """Share of the tempered weight exp(score / 20) of all weighed sets that contain the effect."""
-    top = max(w.score for w in found.all)
-    weights = np.array([np.exp((w.score - top) / TEMPER) for w in found.all])
-    inside = np.array([effect in w.effects for w in found.all])
+def _probability(found: Search, effect: str, small: set[str]) -> float:
+    """Share of the tempered weight exp(score / 20) that goes to sets with the effect; sets with a `small`, immaterial one do not count."""
+    material = [w for w in found.all if not small & set(w.effects)]
+    top = max(w.score for w in material)
+    weights = np.array([np.exp((w.score - top) / TEMPER) for w in material])
+    inside = np.array([effect in w.effects for w in material])
     return float(weights[inside].sum() / weights.sum())
 
 
@@ -297,12 +299,12 @@ def _squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.nda
     return out
 
 
-def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], noise: Noise, seed: int) -> Errors:
+def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], whitener: Whitener, seed: int) -> Errors:
     groups = list(dict.fromkeys(o.group for o in bench.outputs))
     raw = {name: [bench.measured[k] - y[k] for k in held] for name, y in predictions.items()}
     return Errors(
         *({g: group_rms(bench, raw[name], g) for g in groups} for name in ("nominal", "calibrated", "after")),
-        noise.floor(bench),
+        whitener.noise.floor(bench, whitener.sensitivity),
         *({g: _interval(_squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")),
     )
 
@@ -321,19 +323,21 @@ def _predict_all(twin: Twin, bench: Bench) -> list[np.ndarray]:
     return [readings(bench, report(twin.effects, t.true)) for t in simulate(twin, bench)]
 
 
-def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], held_out: _HeldOut) -> tuple[Claim, ...]:
+def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], small: set[str], held_out: _HeldOut) -> tuple[Claim, ...]:
     """Effects weighed and not claimed, each in its best set, best first; `error` is that set's on the held-out trials."""
     out: dict[str, Claim] = {}
     for w in found.all:
         for e in w.effects:
-            if e not in claimed and e not in own and e not in out:
-                out[e] = Claim(e, w.fit.fitted(e), held_out.rms(w.fit.model.twin), _probability(found, e))
+            if e not in claimed and e not in own and e not in out and e not in small:
+                out[e] = Claim(e, w.fit.fitted(e), held_out.rms(w.fit.model.twin), _probability(found, e, small))
     return tuple(list(out.values())[:6])
 
 
 def _ambiguous(found: Search, final: Weighed) -> tuple[tuple[str, ...], ...]:
-    """Sets of other effects whose evidence is within `ACCEPT` of what is claimed."""
-    return tuple(w.effects for w in found.all if w.effects != final.effects and w.effects and abs(w.score - final.score) < ACCEPT)
+    """Other sets, not just the claimed one with something added, whose evidence comes within `ACCEPT` of it."""
+    return tuple(
+        w.effects for w in found.all if w.effects and not set(final.effects) <= set(w.effects) and w.score > final.score - ACCEPT
+    )
 
 
 def _rival(found: Search, final: Weighed, own: tuple[str, ...]) -> Weighed | None:

@@ -10,7 +10,7 @@ import numpy as np
 from twin.effects.effect import Effect, Loads, Signals, Start
 from twin.quantities import Parameter
 
-AZIMUTHS = 12
+AZIMUTHS = 8
 TOUCHED = (0.95, 0.8)  # quantiles of how far the robot reaches, at which a wall may stand
 
 

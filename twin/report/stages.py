@@ -23,7 +23,7 @@ class Stage:
 def before_and_after(diagnosis: Diagnosis) -> tuple[Stage, Stage]:
     """The two stages whose difference a report shows: calibrated and with effects; without any, as described and calibrated."""
     if diagnosis.claims:
-        return Stage("calibrated", "calibrated, no effect added", BEFORE), Stage("after", "with what was missing", ACCENT)
+        return Stage("calibrated", "calibrated, no effect added", BEFORE), Stage("after", "with the effects", ACCENT)
     return Stage("nominal", "as described", BEFORE), Stage("calibrated", "calibrated", ACCENT)
 
 

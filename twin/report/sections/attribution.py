@@ -13,11 +13,12 @@ def section(story: Story) -> Section:
     claimed = " and ".join(effect_words(c.effect) for c in d.claims) or "no effect"
     return Section(
         "attribution",
-        "What else it could have been",
+        "Runners-up",
         "attribution.html",
         {
             "claimed": claimed,
             "runners_up": _table(d.runners_up),
+            "too_small": [effect_words(c.effect) for c in d.below_materiality],
             "ambiguous": [" with ".join(effect_words(e) for e in effects) for effects in d.ambiguous],
             "small": _table(d.below_materiality),
         },

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+
 from twin.diagnose import Claim
 from twin.effects import named
-from twin.report.numbers import MM, column, percent, plus_minus
+from twin.report.numbers import MM, column, percent, plus_minus, upper_first
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import effect_words, explained_share
 
@@ -18,6 +20,7 @@ def section(story: Story) -> Section:
         "effects.html",
         {
             "effects": table(d.claims),
+            "verdict": d.verdict,
             "before": f"{d.structure_before:.2f}",
             "after": f"{d.structure_after:.2f}",
             "share": percent(share) if share is not None and d.claims else None,
@@ -32,7 +35,7 @@ def table(claims: tuple[Claim, ...]) -> list[dict[str, object]]:
     return [
         {
             "name": effect_words(c.effect),
-            "law": (named(c.effect).__doc__ or "").strip().splitlines()[0],
+            "law": _in_words(c.effect),
             "parameters": [{"name": n, "value": plus_minus(f)} for n, f in c.parameters.items()],
             "probability": percent(c.probability),
             "error": error,
@@ -40,3 +43,9 @@ def table(claims: tuple[Claim, ...]) -> list[dict[str, object]]:
         }
         for c, error, sigma in zip(claims, errors, moved, strict=True)
     ]
+
+
+def _in_words(identifier: str) -> str:
+    """What the law is, as the first line of its file says it: "Name: what happens." """
+    first = (sys.modules[named(identifier).__module__].__doc__ or "").strip().partition("\n")[0]
+    return upper_first(first.partition(": ")[2] or first)
