@@ -70,7 +70,7 @@ def _camera(gravity: np.ndarray) -> dict[str, dict[str, float]]:
     up = -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
     across = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
     along = np.cross(across, up)
-    eye, center = 1.45 * across + 1.2 * along + 0.4 * up, -0.12 * up
+    eye, center = 1.5 * across + 1.25 * along + 0.4 * up, -0.2 * up
     vectors = {"up": up, "eye": eye, "center": center}
     return {name: dict(zip("xyz", map(float, v), strict=True)) for name, v in vectors.items()}
 

@@ -1,0 +1,158 @@
+"""report.html: complete, self-contained, and deaf to what file names and titles try to say."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from plotly.offline import get_plotlyjs
+from small_diagnosis import SETTINGS, diagnosis, recording
+
+from twin.effects import catalogue
+from twin.report import provenance, sentence
+from twin.report.giveaway import giveaways, kind_of
+from twin.report.page import page
+from twin.report.plots import MOST_POINTS
+
+SECTIONS = (
+    "before-after",
+    "effects",
+    "residual",
+    "shapes",
+    "tip",
+    "left",
+    "attribution",
+    "next",
+    "parameters",
+    "noise",
+    "notices",
+    "made",
+)
+VERDICTS = ("noise", "explained", "partly_explained", "unexplained")
+
+
+class Scripts(HTMLParser):
+    """Script elements and their text, as a browser would cut them; and every attribute that could load something."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.scripts: list[tuple[dict, str]] = []
+        self.tags: set[str] = set()
+        self.loads: list[str] = []
+        self._inside = False
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        self.loads += [
+            f"{tag} {k}={v}" for k, v in attrs if k in ("src", "srcset", "data") or (k == "href" and not v.startswith("#"))
+        ]
+        self.loads += [f"{tag} {k}" for k, _ in attrs if k.startswith("on")]
+        if tag == "script":
+            self.scripts.append((dict(attrs), ""))
+            self._inside = True
+
+    def handle_endtag(self, tag):
+        self._inside = self._inside and tag != "script"
+
+    def handle_data(self, data):
+        if self._inside:
+            kind, text = self.scripts[-1]
+            self.scripts[-1] = (kind, text + data)
+
+
+def render(d) -> str:
+    return page(d, provenance(d.bench.recording, SETTINGS, "twin diagnose here"))
+
+
+def figures(html: str) -> list[dict]:
+    return [
+        json.loads(text)
+        for kind, text in Scripts(html.replace(get_plotlyjs(), "")).scripts
+        if kind.get("type") == "application/json"
+    ]
+
+
+def points(trace: dict) -> int:
+    x = trace.get("x", [])
+    return len(np.frombuffer(base64.b64decode(x["bdata"]), x["dtype"])) if isinstance(x, dict) else len(x)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_its_sentence_sections_source_and_figures(verdict):
+    d = diagnosis(verdict)
+    html = render(d)
+    assert sentence(d) in unescape(html)
+    for name in SECTIONS:
+        assert f'<section id="{name}">' in html
+    assert html.count("hardware: by hand") >= 6
+    drawn = figures(html)
+    assert len(drawn) == 5  # error, residual twice, shapes, tip
+    assert all(sum(map(points, f["data"])) > 0 for f in drawn)
+
+
+def test_it_loads_nothing():
+    html = render(diagnosis())
+    rest = html.replace(get_plotlyjs(), "")
+    assert len(rest) < 400_000
+    assert not re.search(r"https?://|//cdn|@import|url\(", rest)
+    found = Scripts(rest)
+    assert not found.loads
+    assert not found.tags & {"link", "iframe", "img", "object", "embed"}
+    assert "default-src 'none'" in rest
+
+
+@pytest.mark.parametrize(
+    "attack", ["<script>alert(1)</script>", "</script><img src=x onerror=alert(1)>", "<!--<script>", '"><b>&amp;']
+)
+def test_text_of_the_data_stays_text(attack):
+    words = attack.replace("/", "\N{DIVISION SLASH}") if "/" in attack else attack
+    plain = render(diagnosis(of=recording()))
+    r = replace(recording(trial=words), title=attack, source=f"hardware: {attack}")
+    d = diagnosis(of=r, notices=(attack,), description=attack)
+    html = page(d, provenance(r, SETTINGS, attack))
+    before, after = Scripts(plain.replace(get_plotlyjs(), "")), Scripts(html.replace(get_plotlyjs(), ""))
+    assert len(after.scripts) == len(before.scripts)
+    assert after.tags == before.tags
+    assert not after.loads
+    assert not any("alert" in text for kind, text in after.scripts if kind.get("type") != "application/json")
+    assert attack in unescape(html)
+    figures(html)
+
+
+def test_figures_stay_small_however_long_the_recording():
+    html = render(diagnosis(of=recording(n=6000)))
+    assert all(sum(map(points, f["data"])) <= MOST_POINTS + 200 for f in figures(html))
+    assert len(html) < len(get_plotlyjs()) + 400_000
+
+
+def test_missing_values_and_few_channels_are_no_obstacle():
+    r = recording()
+    holes = []
+    for k, t in enumerate(r.trials):
+        x = np.array(t.values["disk_8_x"])
+        x[:: 2 if k else 1] = np.nan
+        holes.append({"disk_8_x": x})
+    render(diagnosis(of=r.with_values(holes, r.source)))
+    html = render(diagnosis(of=recording(displacement=True, markers=False)))
+    assert "too few complete markers" in html
+
+
+def test_the_loop_is_found_where_it_is():
+    d = diagnosis()
+    (g,) = giveaways(d)
+    assert d.bench.outputs[g.column].channel.name == "disk_8_x"
+    assert g.variable.words == "tension of tendon 2 (N)"
+    assert g.variable.loop
+    (left,) = giveaways(diagnosis("unexplained"))
+    assert left.variable.loop
+    assert left.variable.words == g.variable.words
+
+
+@pytest.mark.parametrize("law", sorted(catalogue()))
+def test_every_law_names_something_to_plot_against(law):
+    assert kind_of(catalogue()[law].moves_with) is not None

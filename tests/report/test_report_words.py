@@ -1,0 +1,77 @@
+"""The verdict's sentence, its numbers, and the console."""
+
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+from small_diagnosis import diagnosis, recording
+
+from twin.quantities import Fitted
+from twin.report import console, sentence
+from twin.report.numbers import column, number, percent, plus_minus
+
+
+def test_explained_says_what_how_much_and_where_it_was_measured():
+    words = sentence(diagnosis())
+    assert words.startswith(
+        "Missing effect: tendon friction, mu = 0.1030 ± 0.0013. It explains 95 % of the structured error; on 2 trials "
+    )
+    assert "falls from 0.78 to 0.49 mm (noise floor 0.44 mm)" in words
+    assert words.endswith("These data cannot tell it from tendon routing with time delay.")
+
+
+def test_other_explanations_that_contain_the_claim_are_no_rivals():
+    assert "cannot tell" not in sentence(diagnosis(ambiguous=(("tendon_friction", "time_delay"),)))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "start", "end"),
+    [
+        ("noise", "No missing effect: after calibration only noise is left", "(noise floor 0.44 mm)."),
+        ("partly_explained", "Partly explained: tendon friction", "What is left moves mostly with the direction of pull."),
+        (
+            "unexplained",
+            "Unexplained: after calibration a structured error of 0.42 sigma is left that no known effect may claim",
+            ".",
+        ),
+    ],
+)
+def test_the_other_verdicts(verdict, start, end):
+    words = sentence(diagnosis(verdict))
+    assert words.startswith(start)
+    assert words.endswith(end)
+
+
+def test_a_spectral_line_alone_is_named():
+    words = sentence(diagnosis("unexplained", structure={"static": 0.01}, line=(50.0, 3.2)))
+    assert "moves mostly with a line at 3.20 Hz" in words
+
+
+def test_two_effects_share_a_sentence():
+    d = diagnosis()
+    other = replace(d.claims[0], effect="base_tilt", parameters={"about_y": Fitted(0.05, 0.001, "rad")})
+    words = sentence(replace(d, claims=(*d.claims, other)))
+    assert words.startswith(
+        "Missing effects: tendon friction, mu = 0.1030 ± 0.0013 and base tilt, about y = 2.865 ± 0.057°. Together they"
+    )
+
+
+def test_numbers_follow_their_error():
+    assert plus_minus(Fitted(0.10312, 0.0011, "1")) == "0.1031 ± 0.0011"
+    assert plus_minus(Fitted(6.4e-4, None, "m")) == "0.6400 mm"
+    assert plus_minus(Fitted(7.333e10, 2e8, "Pa")) == "73.33 ± 0.20 GPa"
+    assert number(float("nan")) == "\N{EN DASH}"
+    assert number(-0.001) == "0.00"
+    assert column([0.0123, 1.5, None]) == ["0.01", "1.50", "\N{EN DASH}"]
+    assert [percent(p) for p in (0.0, 0.5, 1.0)] == ["less than 1 %", "50 %", "more than 99 %"]
+
+
+@pytest.mark.parametrize("verdict", ["noise", "explained", "partly_explained", "unexplained"])
+def test_console_prints_the_sentence_and_reads_no_markup_in_data(verdict):
+    d = diagnosis(verdict, of=replace(recording(), source="hardware: [red]desk[/red]"))
+    out = Console(width=400, record=True, quiet=False, file=open("/dev/null", "w"))  # noqa: SIM115
+    out.print(console(d))
+    text = out.export_text()
+    assert sentence(d) in text
+    assert "[red]desk[/red]" in text
+    assert ("Next experiment" in text) == (verdict != "noise")

@@ -1,0 +1,63 @@
+"""The three files appear together or not at all."""
+
+import json
+
+import pytest
+from small_diagnosis import SETTINGS, diagnosis
+
+from twin.errors import DataError
+from twin.report import provenance, write
+from twin.storage import read_twin
+
+FILES = {"report.json", "report.html", "twin.toml"}
+
+
+@pytest.fixture(scope="module")
+def found():
+    d = diagnosis()
+    return d, provenance(d.bench.recording, SETTINGS, "twin diagnose here")
+
+
+def test_all_three_are_written_and_the_twin_reads_back(tmp_path, found):
+    d, made = found
+    write(d, tmp_path / "a" / "report", made)
+    folder = tmp_path / "a" / "report"
+    assert {p.name for p in folder.iterdir()} == FILES
+    assert json.loads((folder / "report.json").read_text())["provenance"] == made
+    twin = read_twin(folder)
+    assert twin.values == d.twin.values
+    assert twin.effects == d.twin.effects
+    assert f'data_hash = "{made["data_hash"]}"' in (folder / "twin.toml").read_text()
+
+
+def test_an_earlier_report_is_replaced_and_other_files_stay(tmp_path, found):
+    d, made = found
+    (tmp_path / "report.json").write_text("old")
+    (tmp_path / "notes.txt").write_text("mine")
+    write(d, tmp_path, made)
+    assert json.loads((tmp_path / "report.json").read_text())["format"] == "twin-report/1"
+    assert {p.name for p in tmp_path.iterdir()} == FILES | {"notes.txt"}
+
+
+@pytest.mark.parametrize("where", ["page", "write_twin"])
+def test_a_failure_leaves_the_folder_as_it_was(tmp_path, found, monkeypatch, where):
+    d, made = found
+    (tmp_path / "report.json").write_text("old")
+
+    def fail(*arguments):
+        raise OSError("no space left") if where == "write_twin" else RuntimeError("a template broke")
+
+    monkeypatch.setattr(f"twin.report.write.{where}", fail)
+    with pytest.raises(DataError if where == "write_twin" else RuntimeError):
+        write(d, tmp_path, made)
+    assert (tmp_path / "report.json").read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
+
+
+def test_a_file_in_the_way_is_refused(tmp_path, found):
+    d, made = found
+    (tmp_path / "report").write_text("a file")
+    for folder in (tmp_path / "report", tmp_path / "report" / "inside"):
+        with pytest.raises(DataError, match="is a file"):
+            write(d, folder, made)
+    assert (tmp_path / "report").read_text() == "a file"
