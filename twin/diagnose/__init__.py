@@ -8,6 +8,6 @@ verdict.py     gates, the verdict, and its numbers
 experiment.py  the trial that would settle a doubt
 """
 
-from twin.diagnose.verdict import Claim, Diagnosis, Errors, Settings, diagnose
+from twin.diagnose.verdict import Claim, Diagnosis, Errors, Settings, calibration, diagnose
 
-__all__ = ["Claim", "Diagnosis", "Errors", "Settings", "diagnose"]
+__all__ = ["Claim", "Diagnosis", "Errors", "Settings", "calibration", "diagnose"]

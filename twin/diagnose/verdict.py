@@ -15,6 +15,7 @@ from twin.diagnose.search import ACCEPT, Progress, Search, Weighed, refit_withou
 from twin.diagnose.split import split
 from twin.effects import Effect
 from twin.errors import DataError
+from twin.evaluate import rms, squares
 from twin.measurements import Recording
 from twin.quantities import Fitted
 from twin.residual import Noise, Whitener, estimate_noise
@@ -130,7 +131,7 @@ def diagnose(
         Claim(
             e,
             final.fit.fitted(e),
-            held_out.rms(dropped[e].fit.model.twin),
+            held_out.error(dropped[e].fit.model.twin),
             _probability(found, e, too_small),
             _contribution(final, dropped[e], objective),
         )
@@ -180,6 +181,16 @@ def diagnose(
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.all),
     )
+
+
+def calibration(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str]:
+    """The robot's own uncertain parameters fitted, no effect sought; and the RMS error on held-out trials in words."""
+    settings = settings or Settings()
+    bench = prepare(recording, twin.robot)
+    fitted, held = split(bench, settings.seed)
+    start, objective, _ = _objective(bench, twin, fitted, settings)
+    found = fit(objective, start, refresh=True)
+    return found, f"{1e3 * _HeldOut(bench, held).error(found.model.twin):.3f} mm"
 
 
 def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
@@ -266,7 +277,7 @@ class _HeldOut:
     def __init__(self, bench: Bench, held: Sequence[int]) -> None:
         self.bench, self.held = bench, list(held)
 
-    def rms(self, twin: Twin) -> float:
+    def error(self, twin: Twin) -> float:
         """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group."""
         traces: list[Trace] = simulate(twin, self.bench, trials=self.held)
         raw = [
@@ -274,38 +285,16 @@ class _HeldOut:
             for k, t in zip(self.held, traces, strict=True)
         ]
         groups = list(dict.fromkeys(o.group for o in self.bench.outputs))
-        return group_rms(self.bench, raw, "marker" if "marker" in groups else groups[0])
-
-
-def group_rms(bench: Bench, raw: Sequence[np.ndarray], group: str) -> float:
-    """RMS of residuals (n_k, n_output) of one group; markers as Euclidean distances of complete markers."""
-    errors = _squares(bench, raw, group)
-    return float(np.sqrt(np.mean(np.concatenate(errors)))) if sum(map(len, errors)) else float("nan")
-
-
-def _squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
-    """Squared errors of a group, one array a trial: per marker and sample (Euclidean) or per channel and sample."""
-    out = []
-    for r in raw:
-        if group == "marker":
-            parts = []
-            for index in dict.fromkeys(o.index for o in bench.outputs if o.group == "marker"):
-                columns = [j for j, o in enumerate(bench.outputs) if o.group == "marker" and o.index == index]
-                parts.append((r[:, columns] ** 2).sum(axis=1))
-            squares = np.concatenate(parts)
-        else:
-            squares = r[:, [j for j, o in enumerate(bench.outputs) if o.group == group]].ravel() ** 2
-        out.append(squares[np.isfinite(squares)])
-    return out
+        return rms(self.bench, raw, "marker" if "marker" in groups else groups[0])
 
 
 def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], whitener: Whitener, seed: int) -> Errors:
     groups = list(dict.fromkeys(o.group for o in bench.outputs))
     raw = {name: [bench.measured[k] - y[k] for k in held] for name, y in predictions.items()}
     return Errors(
-        *({g: group_rms(bench, raw[name], g) for g in groups} for name in ("nominal", "calibrated", "after")),
+        *({g: rms(bench, raw[name], g) for g in groups} for name in ("nominal", "calibrated", "after")),
         whitener.noise.floor(bench, whitener.sensitivity),
-        *({g: _interval(_squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")),
+        *({g: _interval(squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")),
     )
 
 
@@ -329,7 +318,7 @@ def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], small: s
     for w in found.all:
         for e in w.effects:
             if e not in claimed and e not in own and e not in out and e not in small:
-                out[e] = Claim(e, w.fit.fitted(e), held_out.rms(w.fit.model.twin), _probability(found, e, small))
+                out[e] = Claim(e, w.fit.fitted(e), held_out.error(w.fit.model.twin), _probability(found, e, small))
     return tuple(list(out.values())[:6])
 
 

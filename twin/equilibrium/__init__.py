@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path as File
 
 import mujoco
 import numpy as np
@@ -11,13 +12,13 @@ from twin.effects import Creep, Loads, Route
 from twin.equilibrium.chain import Chain, Law, Load
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.trial import run
-from twin.robots import Body, hinge_pairs
+from twin.robots import Body, available, hinge_pairs, load
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
 
 NOT_FOUND, DIRECT, FOLLOWED = 0, 1, 2  # status of a solve
 
-__all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Path"]
+__all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Path", "compile_solver", "is_compiled"]
 
 
 @dataclass(frozen=True)
@@ -136,3 +137,14 @@ class Equilibrium:
             out.status,
         )
         return replace(out, started=int(started))
+
+
+def is_compiled() -> bool:
+    """Whether the compiled solver lies in numba's disk cache, so that a first solve takes no seconds."""
+    return bool(run.stats.cache_path) and any(File(run.stats.cache_path).glob("trial.run*.nbi"))
+
+
+def compile_solver() -> None:
+    """Compile the static solve (or load it from disk) by solving nothing."""
+    solver = Equilibrium(load(available()[0]).build())
+    solver.solve(np.zeros(1), np.zeros((1, len(solver.chain.hole))), Loads(np.zeros(3)))

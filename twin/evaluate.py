@@ -1,0 +1,61 @@
+"""The error of a given twin on given data; fits nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from twin.bench import Bench, prepare
+from twin.measurements import Recording
+from twin.twin import Twin, is_dynamic, readings, report, simulate
+
+UNIT = {"marker": ("mm", 1e3), "displacement": ("mm", 1e3)}
+KIND = {"marker": "position", "displacement": "tendon_displacement"}
+
+
+def squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
+    """Squared errors of a group, one array a trial: per marker and sample (Euclidean, complete markers) or per channel and sample."""
+    out = []
+    for r in raw:
+        if group == "marker":
+            markers = dict.fromkeys(o.index for o in bench.outputs if o.group == "marker")
+            columns = [[j for j, o in enumerate(bench.outputs) if o.group == "marker" and o.index == m] for m in markers]
+            found = np.concatenate([(r[:, c] ** 2).sum(axis=1) for c in columns])
+        else:
+            found = r[:, [j for j, o in enumerate(bench.outputs) if o.group == group]].ravel() ** 2
+        out.append(found[np.isfinite(found)])
+    return out
+
+
+def rms(bench: Bench, raw: Sequence[np.ndarray], group: str) -> float:
+    """Root-mean-square of residuals (n_k, n_output) of one group, SI; NaN where nothing was measured."""
+    found = np.concatenate(squares(bench, raw, group))
+    return float(np.sqrt(found.mean())) if found.size else float("nan")
+
+
+def evaluate(twin: Twin, recording: Recording) -> dict[str, Any]:
+    """The `error` block of the report contract for one twin: unit, trials, rmse (of positions where there are any), by_kind,
+    by_channel (root-mean-square of the channel alone). Raises TwinError for data the twin cannot be compared with."""
+    bench = prepare(recording, twin.robot)
+    traces = simulate(twin, bench, dynamic=is_dynamic(bench))
+    raw = [y - readings(bench, report(twin.effects, t.true)) for y, t in zip(bench.measured, traces, strict=True)]
+    groups = list(dict.fromkeys(o.group for o in bench.outputs))
+    by_kind = {KIND[g]: {"unit": UNIT[g][0], "rmse": _or_none(UNIT[g][1] * rms(bench, raw, g))} for g in groups}
+    everything = np.concatenate(raw)
+    by_channel = {
+        o.channel.name: {"unit": UNIT[o.group][0], "rmse": _or_none(UNIT[o.group][1] * _channel_rms(everything[:, j]))}
+        for j, o in enumerate(bench.outputs)
+    }
+    headline = by_kind["position"] if "position" in by_kind else next(iter(by_kind.values()))
+    return {"trials": [t.label for t in recording.trials], **headline, "by_kind": by_kind, "by_channel": by_channel}
+
+
+def _channel_rms(r: np.ndarray) -> float:
+    r = r[np.isfinite(r)]
+    return float(np.sqrt(np.mean(r**2))) if r.size else float("nan")
+
+
+def _or_none(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None
