@@ -1,6 +1,7 @@
 """The three files appear together or not at all."""
 
 import json
+from importlib import import_module
 
 import pytest
 from small_diagnosis import SETTINGS, diagnosis
@@ -47,7 +48,7 @@ def test_a_failure_leaves_the_folder_as_it_was(tmp_path, found, monkeypatch, whe
     def fail(*arguments):
         raise OSError("no space left") if where == "write_twin" else RuntimeError("a template broke")
 
-    monkeypatch.setattr(f"twin.report.write.{where}", fail)
+    monkeypatch.setattr(import_module("twin.report.write"), where, fail)
     with pytest.raises(DataError if where == "write_twin" else RuntimeError):
         write(d, tmp_path, made)
     assert (tmp_path / "report.json").read_text() == "old"

@@ -14,7 +14,6 @@ from twin.report.stages import before_and_after, markers
 
 POSES = 4
 HEIGHT = 560
-LARGER = 10.0  # times: the second view draws predictions this much further from the measured shape
 
 
 def section(story: Story) -> Section:
@@ -47,21 +46,42 @@ def _words(d: Diagnosis, chosen: list[tuple[int, int]]) -> list[str]:
 
 def _plot(d: Diagnosis, chosen: list[tuple[int, int]]) -> Plot:
     columns = [three for _, three in markers(d.bench)]
-    measured = [MM * d.bench.measured[k][n][columns] for k, n in chosen]  # (n_marker, 3) mm each
+    measured = np.array([MM * d.bench.measured[k][n][columns] for k, n in chosen])  # (n_pose, n_marker, 3) mm
+    stages = before_and_after(d)
+    predicted = [np.array([MM * d.predictions[s.key][k][n][columns] for k, n in chosen]) for s in stages]
+    times = _magnification(measured, predicted)
+    larger = [measured + times * (p - measured) for p in predicted]
     traces = [_trace(measured, "measured", "markers", marker={"size": 4, "color": MEASURED})]
-    for times, visible in ((1.0, True), (LARGER, False)):
-        for stage in before_and_after(d):
-            predicted = [MM * d.predictions[stage.key][k][n][columns] for k, n in chosen]
-            shapes = [m + times * (p - m) for m, p in zip(measured, predicted, strict=True)]
-            traces.append(_trace(shapes, stage.words, "lines", line={"width": 4, "color": stage.color}, visible=visible))
+    for shapes, visible in ((predicted, True), (larger, False)):
+        for s, shape in zip(stages, shapes, strict=True):
+            traces.append(_trace(shape, s.words, "lines", line={"width": 4, "color": s.color}, visible=visible))
     origin = {"size": 5, "color": BEFORE, "symbol": "square"}
     traces.append(go.Scatter3d(x=[0], y=[0], z=[0], name="origin of the base frame", mode="markers", marker=origin))
-    gravity = d.bench.inputs[chosen[0][0]].loads.gravity
-    axis = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "#dfe3e6", "showspikes": False}
-    axes = {f"{a}axis": {"title": {"text": f"{a} (mm)"}, **axis} for a in "xyz"}
-    scene = {**axes, "aspectmode": "data", "dragmode": "orbit", "camera": _camera(gravity)}
-    out = figure(traces, HEIGHT, scene=scene, updatemenus=[_buttons()], margin={"l": 0, "r": 0, "t": 44, "b": 44})
+    every = np.concatenate([measured, *predicted, *larger]).reshape(-1, 3)
+    scene = {**_box(np.vstack([every, np.zeros(3)])), "camera": _camera(d.bench.inputs[chosen[0][0]].loads.gravity)}
+    out = figure(traces, HEIGHT, scene=scene, updatemenus=[_buttons(times)], margin={"l": 0, "r": 0, "t": 44, "b": 44})
     return Plot("Measured and predicted shapes", HEIGHT, out)
+
+
+def _magnification(measured: np.ndarray, predicted: list[np.ndarray]) -> float:
+    """How many times larger the second view draws differences: a round number that makes the largest a sixth of the picture."""
+    largest = max(float(np.abs(p - measured).max()) for p in predicted)
+    wanted = float(np.ptp(measured.reshape(-1, 3), axis=0).max()) / (6.0 * max(largest, 1e-9))
+    return max([n for n in (2.0, 5.0, 10.0, 20.0, 50.0, 100.0) if n <= wanted], default=2.0)
+
+
+def _box(points: np.ndarray) -> dict[str, object]:
+    """Axes of equal scale around points (n, 3) mm, none shorter than a third of the longest."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = np.maximum(1.1 * (high - low), 0.33 * (high - low).max() + 1e-9)
+    middle = 0.5 * (low + high)
+    axis = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "#dfe3e6", "showspikes": False, "nticks": 7}
+    axes = {
+        f"{a}axis": {"title": {"text": f"{a} (mm)"}, "range": [float(m - s / 2), float(m + s / 2)], **axis}
+        for a, m, s in zip("xyz", middle, span, strict=True)
+    }
+    ratio = dict(zip("xyz", map(float, 1.25 * span / span.max()), strict=True))
+    return {**axes, "aspectmode": "manual", "aspectratio": ratio, "dragmode": "orbit"}
 
 
 def _camera(gravity: np.ndarray) -> dict[str, dict[str, float]]:
@@ -70,23 +90,23 @@ def _camera(gravity: np.ndarray) -> dict[str, dict[str, float]]:
     up = -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
     across = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
     along = np.cross(across, up)
-    eye, center = 1.5 * across + 1.25 * along + 0.4 * up, -0.2 * up
+    eye, center = 1.6 * across + 1.35 * along + 0.45 * up, -0.12 * up
     vectors = {"up": up, "eye": eye, "center": center}
     return {name: dict(zip("xyz", map(float, v), strict=True)) for name, v in vectors.items()}
 
 
-def _buttons() -> dict[str, object]:
+def _buttons(times: float) -> dict[str, object]:
     """Two views: true to scale, and with every prediction drawn further from the measured shape."""
     views = {
         "true to scale": [True, True, True, False, False, True],
-        f"differences \N{MULTIPLICATION SIGN} {LARGER:g}": [True, False, False, True, True, True],
+        f"differences \N{MULTIPLICATION SIGN} {times:g}": [True, False, False, True, True, True],
     }
     buttons = [{"label": label, "method": "restyle", "args": [{"visible": shown}]} for label, shown in views.items()]
     place = {"direction": "right", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "pad": {"t": 4}}
     return {"type": "buttons", "buttons": buttons, "bgcolor": "#ffffff", "bordercolor": "#c3c9cd", "font": {"size": 13}, **place}
 
 
-def _trace(shapes: list[np.ndarray], name: str, mode: str, **style: object) -> go.Scatter3d:
+def _trace(shapes: np.ndarray, name: str, mode: str, **style: object) -> go.Scatter3d:
     """Several shapes as one trace, with a gap between."""
     gap = np.full((1, 3), np.nan)
     xyz = np.concatenate([part for shape in shapes for part in (shape, gap)])

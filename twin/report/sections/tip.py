@@ -57,7 +57,7 @@ def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
         out.update_yaxes(title_text=f"{d.bench.outputs[j].channel.name} (mm)", selector={"anchor": "x" if row == 1 else f"x{row}"})
     out.update_yaxes(title_text="error (mm)", rangemode="tozero", selector={"anchor": f"x{n_row}"})
     out.update_xaxes(title_text="time (s)", selector={"anchor": f"y{n_row}"})
-    out.update_layout(hovermode="x")
+    out.update_layout(hovermode="x", margin_l=72)
     return Plot(f"Time series of {plain(labels(d, (k,))[0])}", height, out)
 
 
