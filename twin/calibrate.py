@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -127,7 +128,7 @@ class Objective:
             return self.white(raw) / size
 
         with Parallel(n_jobs=self.jobs, backend="threading") as parallel:
-            done = parallel(delayed(column)(m, s) for m, s in models)
+            done: Any = parallel(delayed(column)(m, s) for m, s in models)
         return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:

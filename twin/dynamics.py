@@ -1,9 +1,8 @@
 """Dynamic prediction: MuJoCo steps with the tension laws computed between them, in one compiled loop.
 
-Per step: slip states from the tendons' travel, segment tensions to `ctrl`, wall, tip force and what the hinges' springs lack of the true
-elastic moment (elastic.py) to `qfrc_applied`, `mj_step`. The
-slip state is explicit here; it is stable while the pre-sliding length in mm is at least half the step in ms, so the step shrinks with
-a short pre-sliding length. `discrete` integrates implicitly and damps: 2 % of critical at 1 ms on the first mode.
+Per step: slip states from the tendons' travel, segment tensions to `ctrl`; wall, tip force and what the hinges' springs lack of the
+true elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. The slip state is explicit here. It is stable while the pre-sliding
+length in mm is at least half the step in ms, so the step shrinks with a short pre-sliding length. `discrete` integrates implicitly and damps: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations
@@ -130,9 +129,10 @@ class Dynamics:
         motor = np.array([[model.actuator(f"tendon_{t}_segment_{d}").id for d in range(1, nd + 1)] for t in range(1, nt + 1)])
         marker, path, q = np.empty((n, moving.chain.marker.size, 3)), np.empty((n, nt)), np.empty((n, model.nv))
         slip, distal = start.slip.copy(), start.distal.copy()
+        law = Law(float(route.mu), float(route.presliding), np.array(loads.wall, float))
+        load = Load(np.array(loads.gravity, float), float(loads.payload), np.array(loads.force, float))
         step_through(
-            model._address, data._address, moving.chain, float(step), Law(float(route.mu), float(route.presliding), np.array(loads.wall, float)),
-            Load(np.array(loads.gravity, float), float(loads.payload), np.array(loads.force, float)), amplitude, retardation, delayed,
+            model._address, data._address, moving.chain, float(step), law, load, amplitude, retardation, delayed,
             fixed, model.qpos_spring, data.qvel, data.ctrl, data.qfrc_applied, motor, slip, distal, np.array(time, float),
             np.maximum(tension, 0.0, order="C"), marker, path, q,
         )  # fmt: skip

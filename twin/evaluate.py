@@ -16,7 +16,7 @@ KIND = {"marker": "position", "displacement": "tendon_displacement"}
 
 
 def squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
-    """Squared errors of a group, one array a trial: per marker and sample (Euclidean, complete markers) or per channel and sample."""
+    """Squared errors of a group, one array a trial: per sample and complete marker (Euclidean), or per sample and channel."""
     out = []
     for r in raw:
         if group == "marker":

@@ -21,7 +21,7 @@ SAME = 0.03  # two trials repeat each other if their tensions differ by less tha
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: sigma (n_output,) SI per channel; tension (N) of a tension reading; rho (n_output,) lag-1 correlation."""
+    """Standard deviations: sigma (n_output,) SI per channel; tension (N) of a tension reading; rho (n_output,) lag-1."""
 
     sigma: np.ndarray
     tension: float
@@ -29,8 +29,11 @@ class Noise:
     source: str
 
     def floor(self, bench: Bench, sensitivity: Sequence[np.ndarray]) -> dict[str, float]:
-        """RMS error a perfect twin would still show, by group (m; Euclidean per marker): the sensors' noise, and that of the tension
-        readings it is driven by, through the sensitivities (n_k, n_output, n_tendon) m/N."""
+        """RMS error a perfect twin would still show, by group (m; Euclidean per marker).
+
+        The sensors' noise, and that of the tension readings it is driven by, through the sensitivities
+        (n_k, n_output, n_tendon) m/N.
+        """
         driven = self.tension**2 * np.mean([(G**2).sum(axis=2).mean(axis=0) for G in sensitivity], axis=0)  # (n_output,)
         floors = {}
         for group in dict.fromkeys(o.group for o in bench.outputs):
@@ -40,7 +43,7 @@ class Noise:
 
 
 class Whitener:
-    """Makes residuals and derivatives of them white under a Noise and the tension sensitivities G, a list of (n_k, n_output, n_tendon)."""
+    """Makes residuals and their derivatives white under a Noise and the trials' tension sensitivities G (n_k, n_output, n_tendon)."""
 
     def __init__(self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> None:
         self.noise, self.sensitivity = noise, sensitivity

@@ -42,12 +42,14 @@ class Twin:
         bench = prepare(recording, self.robot)
         traces = simulate(self, bench, dynamic=is_dynamic(bench) if dynamic is None else dynamic)
         values = {
-            inputs.name: {
-                o.channel.name: column for o, column in zip(bench.outputs, readings(bench, report(self.effects, trace.true)).T)
-            }
+            inputs.name: _by_channel(bench, readings(bench, report(self.effects, trace.true)))
             for inputs, trace in zip(bench.inputs, traces, strict=True)
         }
         return recording.with_values([values[t.name] for t in recording.trials], f"simulation: twin of {self.robot.name}")
+
+
+def _by_channel(bench: Bench, y: np.ndarray) -> dict[str, np.ndarray]:
+    return {o.channel.name: column for o, column in zip(bench.outputs, y.T, strict=True)}
 
 
 @dataclass(frozen=True)

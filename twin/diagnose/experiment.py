@@ -29,7 +29,7 @@ class Experiment:
 
 
 def menu(bench: Bench) -> list[tuple[str, Inputs]]:
-    """Trials this robot could run, within the tensions and loads already used (payload up to three times as much, at most 30 g)."""
+    """Trials this robot could run, within the tensions already used; payload up to three times as much, at most 30 g."""
     n = bench.n_tendon
     top = max(float(i.tension.max()) for i in bench.inputs)
     heaviest = max(i.loads.payload for i in bench.inputs)
@@ -66,7 +66,7 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
 
 
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
-    """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial separates the two at all."""
+    """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
     best: Experiment | None = None
     for words, inputs in menu(bench):
         n = len(inputs.time)

@@ -224,7 +224,7 @@ def _sensitivity(objective: Objective, at: Fit) -> list[np.ndarray]:
 def _gate(
     objective: Objective, evidence: Evidence, found: Search, bench: Bench, accuracy: float, progress: Progress
 ) -> tuple[Weighed, dict[str, Weighed], tuple[Claim, ...]]:
-    """Drop effects below materiality, smallest first; returns what stays, each survivor's drop-one refit, and what was too small."""
+    """Drop effects below materiality, smallest first: what stays, each survivor's drop-one refit, and what was too small."""
     best, small = found.best, []
     own = set(found.base.effects)
     sigma = np.array([s for s, o in zip(objective.whitener.noise.sigma, bench.outputs, strict=True) if o.group == "marker"])
@@ -263,7 +263,7 @@ def _verdict(added: tuple[str, ...], before: float, after: float, line: float) -
 
 
 def _probability(found: Search, effect: str, small: set[str]) -> float:
-    """Share of the tempered weight exp(score / 20) that goes to sets with the effect; sets with a `small`, immaterial one do not count."""
+    """Share of the tempered weight exp(score / 20) of sets with the effect; sets with a `small`, immaterial one do not count."""
     material = [w for w in found.all if not small & set(w.effects)]
     top = max(w.score for w in material)
     weights = np.array([np.exp((w.score - top) / TEMPER) for w in material])
@@ -291,11 +291,10 @@ class _HeldOut:
 def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], whitener: Whitener, seed: int) -> Errors:
     groups = list(dict.fromkeys(o.group for o in bench.outputs))
     raw = {name: [bench.measured[k] - y[k] for k in held] for name, y in predictions.items()}
-    return Errors(
-        *({g: rms(bench, raw[name], g) for g in groups} for name in ("nominal", "calibrated", "after")),
-        whitener.noise.floor(bench, whitener.sensitivity),
-        *({g: _interval(squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")),
-    )
+    error = {name: {g: rms(bench, raw[name], g) for g in groups} for name in raw}
+    interval = {name: {g: _interval(squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")}
+    floor = whitener.noise.floor(bench, whitener.sensitivity)
+    return Errors(error["nominal"], error["calibrated"], error["after"], floor, interval["calibrated"], interval["after"])
 
 
 def _interval(squares: list[np.ndarray], seed: int) -> tuple[float, float]:

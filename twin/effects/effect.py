@@ -84,8 +84,8 @@ class Effect(ABC):
     """Base of all laws. A subclass states its data and overrides the places it acts in; the base's places change nothing.
 
     `per_tendon` parameters exist once per tendon, as name_1, name_2, ... `shape` names parameters that mean nothing while
-    the effect is OFF (a time constant of no creep). `richer` names parameters of a second, fuller law that stay OFF until the plain one has
-    been accepted. `moves_with` says in words what gives the effect away in a plot.
+    the effect is OFF (a time constant of no creep). `richer` names parameters of a second, fuller law that stay OFF
+    until the plain one has been accepted. `moves_with` says in words what gives the effect away in a plot.
     """
 
     id: ClassVar[str]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from twin.effects.effect import Effect, Signals
 from twin.quantities import Parameter
 
 
 class TimeDelay(Effect):
-    """Outputs logged late: reported(t) = true(t - delay), linear between samples, the first value before the log starts.
+    """Outputs logged late: reported(t) = true(t - delay), by monotone cubics between samples.
+
+    Before the log starts the first value holds.
 
     Source: two loggers without a common clock; a camera's exposure and transfer (20-200 ms).
 
@@ -28,6 +31,6 @@ class TimeDelay(Effect):
     def sense(self, true: Signals) -> Signals:
         t = true.time - self["delay"]
         flat = np.concatenate([true.displacement, true.markers.reshape(len(t), -1)], axis=1)
-        late = np.stack([np.interp(t, true.time, column) for column in flat.T], axis=1)
+        late = PchipInterpolator(true.time, flat)(np.clip(t, true.time[0], true.time[-1])) if len(t) > 1 else flat
         n = true.displacement.shape[1]
         return true.with_(displacement=late[:, :n], markers=late[:, n:].reshape(true.markers.shape))

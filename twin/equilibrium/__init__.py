@@ -1,4 +1,9 @@
-"""The static solve that quasi-static prediction and kinematics stand on: one MuJoCo hinge chain, its tendons, friction and loads."""
+"""The static solve that quasi-static prediction and kinematics stand on.
+
+engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic energy
+chain.py    balance of forces and its tangent          newton.py   one equilibrium
+linear.py   factorisation                              trial.py    a trial, sample by sample
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """The balance of forces of a hinge chain pulled by tendons, and its exact tangent.
 
-Energy of the chain without friction, with elastic energy E_el (elastic.py), tendon segments l_d under tension T_d, masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
+Energy of the chain without friction, with elastic energy E_el (elastic.py), tendon segments l_d under tension T_d,
+masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
 
     E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
 

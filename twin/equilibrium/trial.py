@@ -47,7 +47,8 @@ def run(
     `spring` (nv,) rest angles; `delayed` (n_element, nv) creep strains, advanced in place; `time` (n,), `tension` (n, n_tendon).
     `guess` (n, nv) and `guess_LU` (n, nv, nv), empty or from a neighbouring solution, replace extrapolation as first guess.
     With `keep` a tangent factorised at each solution goes to LUs (n, nv, nv).
-    Out: slip states z and distal lengths s (n_tendon, n_disk) at the end, angles q_out (n, nv), markers (n, n_marker, 3), path lengths (n, n_tendon), status (n,) as `solve` returns it.
+    Out: slip states z and distal lengths s (n_tendon, n_disk) at the end, angles q_out (n, nv), markers
+    (n, n_marker, 3), path lengths (n, n_tendon), status (n,) as `solve` returns it.
     Returns the status of the start: 1, or 2 where the loaded robot has no stable equilibrium near straight.
     """
     n, nv, nt = tension.shape[0], spring.size, tension.shape[1]
