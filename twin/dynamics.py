@@ -1,8 +1,9 @@
 """Dynamic prediction: MuJoCo steps with the tension laws computed between them, in one compiled loop.
 
 Per step: slip states from the tendons' travel, segment tensions to `ctrl`; wall, tip force and what the hinges' springs lack of the
-true elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. The slip state is explicit here. It is stable while the pre-sliding
-length in mm is at least half the step in ms, so the step shrinks with a short pre-sliding length. `discrete` integrates implicitly and damps: 2 % of critical at 1 ms on the first mode.
+true elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. The slip state is explicit here: it is stable while the pre-sliding
+length in mm is at least half the step in ms, so the step shrinks with a short pre-sliding length. `discrete` integrates implicitly
+and damps: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class Noise:
 
 
 class Whitener:
-    """Makes residuals and their derivatives white under a Noise and the trials' tension sensitivities G (n_k, n_output, n_tendon)."""
+    """Makes residuals and their derivatives white, given a Noise and the tension sensitivities G (n_k, n_output, n_tendon)."""
 
     def __init__(self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> None:
         self.noise, self.sensitivity = noise, sensitivity

@@ -26,6 +26,9 @@ class Twin:
     values: Values = field(default_factory=dict)
     effects: tuple[Effect, ...] = ()
 
+    def __hash__(self) -> int:
+        return hash((self.robot.name, tuple(sorted(self.values.items())), self.effects))
+
     @staticmethod
     def of(robot: Robot | str) -> Twin:
         """The robot as described: nominal parameters, and the effects its `robot.toml` declares."""

@@ -21,11 +21,12 @@ RATE = 2.0  # samples a second
 
 @dataclass(frozen=True)
 class Experiment:
-    """A trial in words, the separation T of one run of it, and how many runs reach T = 25."""
+    """A trial in words, the separation T of one run of it, how many runs reach T = 25, and the sets of effects it separates."""
 
     words: str
     separation: float
     repeats: int
+    between: tuple[tuple[str, ...], tuple[str, ...]]
 
 
 def menu(bench: Bench) -> list[tuple[str, Inputs]]:
@@ -68,6 +69,7 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
     """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
     best: Experiment | None = None
+    rivals = tuple(e.id for e in a.model.twin.effects), tuple(e.id for e in b.model.twin.effects)
     for words, inputs in menu(bench):
         n = len(inputs.time)
         empty = np.zeros((n, len(bench.outputs)))
@@ -79,7 +81,7 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         except SolveError:
             continue
         if best is None or best.separation < T:
-            best = Experiment(words, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))))
+            best = Experiment(words, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))), rivals)
     return best if best is not None and best.repeats <= 50 else None
 
 

@@ -11,7 +11,7 @@ from twin.calibrate import Fit, Model, Objective, prior_weight
 from twin.diagnose.evidence import Discrepancy, Evidence
 from twin.effects import Start, catalogue
 from twin.errors import SolveError, TwinError
-from twin.twin import report
+from twin.twin import Twin, report
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,9 @@ def screen(objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Disc
     present = {e.id for e in fit.model.twin.effects}
     traces = fit.evaluation.traces
     predicted = [report(fit.model.twin.effects, t.true) for t in traces]
-    patterns: list[tuple[str, Start, list[str], slice]] = []
-    neighbours: list[tuple[Model, float]] = []
+    patterns: list[tuple[str, Start, list[str], list[int]]] = []
+    neighbours: dict[Twin, tuple[Model, float]] = {}
+    index: dict[Twin, int] = {}  # several starts may share a pattern
     for identifier, law in catalogue().items():
         if identifier in present:
             continue
@@ -49,9 +50,9 @@ def screen(objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Disc
                 models, names = _patterns(fit.model, bench, identifier, start)
             except TwinError:
                 continue
-            patterns.append((identifier, start, names, slice(len(neighbours), len(neighbours) + len(models))))
-            neighbours += models
-    columns = _solvable_columns(objective, fit, neighbours)
+            patterns.append((identifier, start, names, [index.setdefault(m.twin, len(index)) for m, _ in models]))
+            neighbours |= {m.twin: (m, size) for m, size in models}
+    columns = _solvable_columns(objective, fit, list(neighbours.values()))
     both = np.concatenate([fit.J, columns, fit.z[:, None]], axis=1)
     gains = []
     for X in (both, evidence.whiten(discrepancy, both)):
@@ -99,7 +100,7 @@ def _solvable_columns(objective: Objective, fit: Fit, neighbours: list[tuple[Mod
 
 
 def _gains(
-    X: np.ndarray, VX: np.ndarray, fit: Fit, patterns: list[tuple[str, Start, list[str], slice]], n_tendon: int, n: int
+    X: np.ndarray, VX: np.ndarray, fit: Fit, patterns: list[tuple[str, Start, list[str], list[int]]], n_tendon: int, n: int
 ) -> list[float]:
     """Gain of every pattern; X = [J, columns, z] and VX = V^-1 X."""
     k = fit.J.shape[1]
@@ -110,7 +111,7 @@ def _gains(
     projected = S - S[:, :k] @ np.linalg.solve(JJ, S[:k, :])
     out = []
     for identifier, _, names, where in patterns:
-        index = np.arange(k + where.start, k + where.stop)
+        index = k + np.array(where)
         A, u = projected[np.ix_(index, index)], projected[index, -1]
         keep = np.diag(A) > 1e-6 * np.maximum(np.diag(S)[index], 1e-12)
         if not keep.any():

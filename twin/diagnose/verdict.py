@@ -49,6 +49,7 @@ class Claim:
     error: float
     probability: float
     contribution: float = 0.0  # sigma: how far dropping it moves the fitted trials
+    beside: tuple[str, ...] = ()  # the other effects of the set a runner-up was fitted in
 
 
 @dataclass(frozen=True)
@@ -150,9 +151,11 @@ def diagnose(
         name: _predict_all(t, bench)
         for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin), ("after", final.fit.model.twin))
     }
-    components = _components(best)
-    worst = _worst_channel(bench, fitted, best)
-    strongest = tuple(evidence.strongest(best.discrepancy))
+    moved = _sensitivity(bench, held, final.fit.model.twin, [predictions["after"][k] for k in held])
+    floor = objective.whitener.noise.floor(bench, moved)
+    components = _components(final)
+    worst = _worst_channel(bench, fitted, final)
+    strongest = tuple(evidence.strongest(final.discrepancy))
     return Diagnosis(
         verdict=verdict,
         twin=final.fit.model.twin,
@@ -162,15 +165,15 @@ def diagnose(
         below_materiality=small,
         parameters=final.fit.fitted(None),
         unfixed=tuple(final.fit.unfixed()),
-        errors=_errors(bench, held, predictions, objective.whitener, settings.seed),
+        errors=_errors(bench, held, predictions, floor, settings.seed),
         noise=objective.whitener.noise,
         structure_before=before,
-        structure_after=after,
+        structure_after=final.discrepancy.size,
         structure=components,
         strongest=strongest,
         line=line,
         worst_channel=worst,
-        description=_describe(verdict, components, strongest, line, worst, after),
+        description=_describe(verdict, components, strongest, line, worst, final.discrepancy.size),
         ambiguous=ambiguous,
         experiment=experiment,
         bench=bench,
@@ -201,23 +204,24 @@ def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) 
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
     objective = Objective(bench, fitted, Whitener(first, measured, none), settings.jobs)
     start = fit(objective, Model.base(twin.robot, twin), tolerance=1e-3)
-    sensitivity = _sensitivity(objective, start)
+    unmeasured = objective.predict(start.model.twin, start.evaluation.traces)[1]
+    sensitivity = _sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
     return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity), settings.jobs), notes
 
 
-def _sensitivity(objective: Objective, at: Fit) -> list[np.ndarray]:
+def _sensitivity(
+    bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: list[Trace] | None = None
+) -> list[np.ndarray]:
     """dy/dT (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each tension reading."""
-    bench, step = objective.bench, 0.02
-    out = [np.empty((*r.shape, bench.n_tendon)) for r in at.evaluation.raw]
+    step = 0.02
+    out = [np.empty((*y.shape, bench.n_tendon)) for y in predicted]
     for t in range(bench.n_tendon):
         push = step * np.eye(bench.n_tendon)[t]
         moved = replace(bench, inputs=tuple(replace(i, tension=i.tension + push) for i in bench.inputs))
-        shifted = Objective(moved, objective.trials, objective.whitener, objective.jobs).predict(
-            at.model.twin, at.evaluation.traces
-        )[1]
-        for G, k, y, r in zip(out, objective.trials, shifted, at.evaluation.raw, strict=True):
-            G[:, :, t] = np.nan_to_num((y - (bench.measured[k] - r)) / step)
+        traces = simulate(twin, moved, trials=trials, near=near)
+        for G, y, trace in zip(out, predicted, traces, strict=True):
+            G[:, :, t] = (readings(bench, report(twin.effects, trace.true)) - y) / step
     return out
 
 
@@ -288,12 +292,11 @@ class _HeldOut:
         return rms(self.bench, raw, "marker" if "marker" in groups else groups[0])
 
 
-def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], whitener: Whitener, seed: int) -> Errors:
+def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], floor: dict[str, float], seed: int) -> Errors:
     groups = list(dict.fromkeys(o.group for o in bench.outputs))
     raw = {name: [bench.measured[k] - y[k] for k in held] for name, y in predictions.items()}
     error = {name: {g: rms(bench, raw[name], g) for g in groups} for name in raw}
     interval = {name: {g: _interval(squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")}
-    floor = whitener.noise.floor(bench, whitener.sensitivity)
     return Errors(error["nominal"], error["calibrated"], error["after"], floor, interval["calibrated"], interval["after"])
 
 
@@ -317,7 +320,9 @@ def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], small: s
     for w in found.all:
         for e in w.effects:
             if e not in claimed and e not in own and e not in out and e not in small:
-                out[e] = Claim(e, w.fit.fitted(e), held_out.error(w.fit.model.twin), _probability(found, e, small))
+                others = tuple(o for o in w.effects if o != e)
+                error = held_out.error(w.fit.model.twin)
+                out[e] = Claim(e, w.fit.fitted(e), error, _probability(found, e, small), beside=others)
     return tuple(list(out.values())[:6])
 
 

@@ -112,23 +112,19 @@ class Effect(ABC):
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Where to begin a fit: each guess; for per-tendon laws each tendon alone and all together.
+        """Where to begin a fit: each guess; for per-tendon laws each parameter alone and all, each tendon alone and all.
 
         `predicted` is what the twin without the effect predicts, for laws that must look where the robot goes.
         """
         names = tuple(p.name for p in cls.parameters if p.name not in cls.richer)
         for guess in cls.guesses:
             yield Start(guess, names)
-        if cls.per_tendon:
-            single = [
-                Start(
-                    {f"{p.name}_{i}": p.value + p.step for p in cls.per_tendon},
-                    tuple(f"{p.name}_{i}" for p in cls.per_tendon),
-                )
-                for i in range(1, n_tendon + 1)
-            ]
-            yield from single
-            yield Start({k: v for s in single for k, v in s.values.items()}, tuple(n for s in single for n in s.free))
+        tendons = range(1, n_tendon + 1)
+        kinds = [*((p,) for p in cls.per_tendon), *([cls.per_tendon] if len(cls.per_tendon) > 1 else [])]
+        for kind in kinds:
+            single = [{f"{p.name}_{i}": p.value + p.step for p in kind} for i in tendons]
+            for values in (*single, {k: v for s in single for k, v in s.items()}):
+                yield Start(values, tuple(values))
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
