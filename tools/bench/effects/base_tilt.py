@@ -1,4 +1,4 @@
-"""Gravity points elsewhere than declared: turned by 1 degree strength about a horizontal axis. Markers stay in the base frame."""
+"""Gravity points elsewhere than declared: turned by 1 degree strength about an axis fixed in the base frame. Markers stay there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tools.bench.effects.effect import Effect, Situation, rotation
+from tools.bench.effects.effect import Effect, Situation, rotation, unit_vector
 
 
 @dataclass(frozen=True)
@@ -15,15 +15,11 @@ class BaseTilt(Effect):
     id: ClassVar[str] = "base_tilt"
     most: ClassVar[float] = 12.0
 
-    azimuth: float  # rad, where around the vertical the axis points
+    axis: tuple[float, float, float]  # unit vector in the base frame, the same whichever way the robot is mounted
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> BaseTilt:
-        return cls(1.0, float(rng.uniform(0, 2 * np.pi)))
+        return cls(1.0, tuple(float(v) for v in unit_vector(rng)))
 
     def mount(self, situation: Situation) -> None:
-        down = situation.gravity / np.linalg.norm(situation.gravity)
-        aside = np.cross(down, np.eye(3)[np.argmin(np.abs(down))])
-        aside /= np.linalg.norm(aside)
-        axis = np.cos(self.azimuth) * aside + np.sin(self.azimuth) * np.cross(down, aside)
-        situation.gravity = rotation(np.radians(self.strength) * axis) @ situation.gravity
+        situation.gravity = rotation(np.radians(self.strength) * np.array(self.axis)) @ situation.gravity
