@@ -157,10 +157,14 @@ def test_a_channel_empty_in_one_trial_is_named(folder: Path) -> None:
     assert np.all(np.isnan(recording.trials[1].values["ambient_temperature"]))
 
 
-def test_noise_below_zero_tension_passes(folder: Path) -> None:
-    edit(folder / "a.csv", "0.0,0,", "0.0,-9,")  # noise 2 gf: 5 sigma are 10 gf
+def test_a_zero_offset_of_the_load_cell_passes_with_a_notice_and_a_push_does_not(folder: Path) -> None:
+    edit(folder / "a.csv", "0.0,0,", "0.0,-9,")  # noise 2 gf: 5 sigma are 10 gf, nothing to say
     assert read(folder).trials[0].values["tendon_1_tension"][0] == pytest.approx(-9 * GRAM_FORCE)
-    edit(folder / "a.csv", "0.0,-9,", "0.0,-11,")
+    assert read(folder).notices == ()
+    edit(folder / "a.csv", "0.0,-9,", "0.0,-30,")  # 0.294 N: an offset of the cell's zero, up to 0.3 N
+    (notice,) = read(folder).notices
+    assert "tendon_1_tension falls to -0.294 N" in notice
+    edit(folder / "a.csv", "0.0,-30,", "0.0,-31,")  # 0.304 N
     with pytest.raises(DataError, match="row 2, column tendon_1_tension"):
         read(folder)
 

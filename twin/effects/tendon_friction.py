@@ -44,7 +44,7 @@ class TendonFriction(Effect):
     id = "tendon_friction"
     parameters = (
         Parameter("mu", 0.0, "1", 0.0, 1.0, "capstan coefficient; CRC handbook: 0.04 (PTFE) to 0.6 (dry metal)", scale=0.05),
-        Parameter("presliding", 4e-4, "m", 5e-5, 3e-3, "tendon travel from sticking to sliding; our choice", scale=1e-4),
+        Parameter("presliding", 4e-4, "m", 2e-5, 3e-3, "tendon travel from sticking to sliding; our choice", scale=1e-4),
     )
     shape = ("presliding",)
     guesses = ({"mu": 0.1},)

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from twin.measurements.channels import Channel
+from twin.measurements.plausible import SLACK_SIGMAS
 from twin.measurements.recording import Trial
 from twin.measurements.tables import Table
 
 
 def notices_of(channels: Sequence[Channel], trials: Sequence[Trial], tables: Sequence[Table]) -> list[str]:
-    """Undeclared columns, conditions that are not understood, inputs with gaps and channels that are empty in a trial."""
+    """Undeclared columns, conditions that are not understood, inputs with gaps or below zero, and channels empty in a trial."""
     notices = []
     for name, files in _where((table.path.name, table.extra) for table in tables).items():
         notices.append(f"column {name!r} is not declared in measurements.toml and not read ({_listed(files)})")
@@ -22,6 +23,9 @@ def notices_of(channels: Sequence[Channel], trials: Sequence[Trial], tables: Seq
         gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}
         empty = [trial.name for trial in trials if gaps[trial.name] == len(trial.time)]
         holed = [name for name, count in gaps.items() if count and name not in empty]
+        lowest = min((float(np.nanmin(t.values[channel.name])) for t in trials if t.name not in empty), default=0.0)
+        if channel.role == "input" and channel.kind == "tendon_tension" and lowest < -SLACK_SIGMAS * (channel.noise or 0.01):
+            notices.append(f"input {channel.name} falls to {lowest:.3g} N, below what its noise explains: a zero offset?")
         if empty:
             notices.append(f"{channel.role} {channel.name} has no value in {_listed(empty)}")
         if holed and channel.role == "input":
