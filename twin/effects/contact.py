@@ -15,8 +15,8 @@ TOUCHED = (0.95, 0.8)  # quantiles of how far the robot reaches, at which a wall
 
 
 class Contact(Effect):
-    """A flat wall, parallel to the straight robot, at `distance` from it in direction `azimuth`; force on a disk that enters it
-    by p is stiffness * p, along the wall's normal and without friction.
+    """A flat wall, parallel to the straight robot, at `distance` from it in direction `azimuth`. A disk whose centre is p
+    beyond it is pushed back with F = stiffness * max(0, p), along the wall's normal and without friction.
 
     Source: linear penalty contact. An edge of the frame, a hand, the table.
 

@@ -7,7 +7,7 @@ from twin.quantities import Parameter
 
 
 class StiffnessGradient(Effect):
-    """Bending and twisting stiffness times 1 + gradient (s/L - 1/2), s the distance from the base.
+    """EI(s) = EI (1 + gradient (s/L - 1/2)), and GJ alike; s is the distance from the base.
 
     Source: first-order Taylor expansion of EI(s) about the middle. A ground or tempered wire; a casting that cured from one end.
 

@@ -9,7 +9,7 @@ from twin.quantities import Parameter
 
 
 class TendonRouting(Effect):
-    """All holes of tendon i turned by angle_i about the backbone and moved out by radius_i.
+    """All holes of tendon i moved: azimuth' = azimuth + angle_i about the backbone, radius' = radius + radius_i.
 
     Source: geometry. A disk glued on with a twist, a hole drilled at the wrong mark.
 

@@ -1,0 +1,176 @@
+"""What every effect in the folder must satisfy, asked of all of them, also of those not yet written."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import itertools
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twin.bench import prepare
+from twin.effects import Effect, catalogue, named
+from twin.errors import SolveError, TwinError
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import load
+from twin.twin import Twin, readings, report, simulate
+
+FIXED = {
+    "tendon_friction", "tendon_backlash", "tendon_elasticity", "tendon_routing", "actuator_saturation", "actuator_lag",
+    "time_delay", "sma_hysteresis", "sma_cooling", "backbone_creep", "backbone_precurvature", "stiffness_asymmetry", "stiffness_gradient",
+    "temperature_softening", "base_tilt", "camera_misalignment", "tip_payload", "contact", "load_cell_gain", "load_cell_bias",
+    "load_cell_drift", "load_cell_crosstalk", "sensor_gain", "sensor_drift", "sensor_hysteresis",
+}  # fmt: skip
+NEW: set[str] = set()  # identifiers of our own, beside those of the contract
+
+laws = pytest.mark.parametrize("law", catalogue().values(), ids=catalogue().keys())
+
+
+def channels() -> tuple[Channel, ...]:
+    tensions = (Channel(f"tendon_{i}_tension", "input", "N", 0.01) for i in (1, 2, 3))
+    disks = (Channel(f"disk_{k}_{a}", "output", "mm", 2.5e-4) for k in (4, 8) for a in "xyz")
+    return (*tensions, *disks, *(Channel(f"tendon_{i}_displacement", "output", "mm", 2e-5) for i in (1, 2, 3)))
+
+
+def cycle(name: str, start: float, peak: float, payload: float) -> Trial:
+    """Tendon 1 up and down, tendon 2 following a quarter behind: a closed loop in tension."""
+    n = 41
+    time = np.linspace(0.0, 20.0, n)
+    angle = 2 * np.pi * np.arange(n) / (n - 1)
+    tension = np.stack([0.5 * peak * (1 - np.cos(angle)), 0.25 * peak * (1 - np.sin(angle)), np.full(n, 0.2)], axis=1)
+    values = {c.name: np.zeros(n) for c in channels()} | {f"tendon_{i + 1}_tension": tension[:, i] for i in range(3)}
+    return Trial(name, time, values, {"tip_payload": payload}, start=start)
+
+
+def recording(*trials: Trial) -> Recording:
+    return Recording("continuum", "conformance", "simulation", np.array([0.0, 0.0, 9.81]), channels(), trials)
+
+
+@pytest.fixture(scope="module")
+def two_trials() -> Recording:
+    return recording(cycle("a.csv", 0.0, 3.0, 0.0), cycle("b.csv", 60.0, 2.0, 0.02))
+
+
+def predict(effects: tuple[Effect, ...], data: Recording) -> list[np.ndarray]:
+    twin = Twin(load("continuum"), {}, effects)
+    bench = prepare(data, twin.robot)
+    return [readings(bench, report(effects, t.true)) for t in simulate(twin, bench)]
+
+
+@laws
+def test_it_says_what_it_is(law: type[Effect]) -> None:
+    module = sys.modules[law.__module__]
+    assert law.id == module.__name__.rpartition(".")[2]
+    assert law.id in FIXED | NEW
+    text = law.__doc__ or ""
+    assert "Source:" in text
+    assert "=" in text.split("Source:")[0], "the docstring gives the law as an equation"
+    assert ">>> " in text
+    assert doctest.testmod(importlib.import_module(law.__module__)).attempted > 0
+    assert doctest.testmod(importlib.import_module(law.__module__)).failed == 0
+    assert law.moves_with
+
+
+@laws
+def test_its_parameters_have_units_bounds_and_sources(law: type[Effect]) -> None:
+    declared = law.declared(3)
+    assert declared
+    assert len({p.name for p in declared}) == len(declared)
+    for p in declared:
+        assert p.unit
+        assert p.source
+        assert p.low <= p.value <= p.high
+        assert p.low < p.high
+        assert p.step > 0
+    assert set(law.shape) | set(law.richer) <= {p.name for p in declared}
+
+
+@laws
+def test_off_is_the_plain_twin(law: type[Effect], two_trials: Recording) -> None:
+    plain, off = predict((), two_trials), predict((law(n_tendon=3),), two_trials)
+    for a, b in zip(plain, off, strict=True):
+        # 1e-12 m: the same computation; a law that is off may at most reorder a rounding
+        np.testing.assert_allclose(b, a, rtol=0, atol=1e-12)
+
+
+@laws
+def test_unknown_parameters_and_broken_bounds_are_refused(law: type[Effect]) -> None:
+    with pytest.raises(TwinError, match=rf"effect {law.id}.*available"):
+        law({"nonsense": 1.0})
+    p = law.declared(3)[0]
+    with pytest.raises(TwinError, match=rf"effect {law.id}.*allowed"):
+        law({p.name: p.high + 1.0 + abs(p.high)})
+
+
+def starts(law: type[Effect], data: Recording) -> list[Effect]:
+    """The law as its fits begin, at most four of them."""
+    robot = load("continuum")
+    bench = prepare(data, robot)
+    predicted = [t.true for t in simulate(Twin(robot), bench)]
+    found = list(law.starts(predicted, 3))
+    assert found, "a law needs somewhere to start a fit"
+    return [law({**s.values}, 3) for s in found[:4]]
+
+
+@laws
+def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: Recording) -> None:
+    plain = predict((), two_trials)
+    for effect in starts(law, two_trials):
+        moved = predict((effect,), two_trials)
+        change = max(np.abs(a - b).max() for a, b in zip(plain, moved, strict=True))
+        assert 1e-6 < change < 0.05  # m: more than a micrometre, less than half the robot
+
+
+@laws
+def test_trials_are_independent_but_for_the_clock(law: type[Effect], two_trials: Recording) -> None:
+    for effect in starts(law, two_trials)[:1]:
+        together = predict((effect,), two_trials)
+        if effect.deform().amplitude:
+            pytest.skip("creep carries over from trial to trial by its nature; its own test is in test_twin.py")
+        for k, trial in enumerate(two_trials.trials):
+            alone = predict((effect,), recording(trial))
+            assert np.array_equal(alone[0], together[k]), "batch and serial must agree bit for bit"
+
+
+@laws
+def test_no_nan_at_the_corners_of_its_bounds(law: type[Effect]) -> None:
+    data = recording(replace(cycle("a.csv", 0.0, 2.0, 0.0)))
+    corners = itertools.product(*[(p.low, p.high) for p in law.declared(3)[:4]])
+    solved = 0
+    for corner in corners:
+        values = {p.name: v for p, v in zip(law.declared(3)[:4], corner, strict=True)}
+        try:
+            predicted = predict((law(values, 3),), data)
+        except SolveError:
+            continue  # a robot past its limits says so
+        assert all(np.isfinite(y).all() for y in predicted)
+        solved += 1
+    assert solved > 0
+
+
+@laws
+def test_a_closed_cycle_takes_energy_and_gives_none(law: type[Effect]) -> None:
+    """Work of the motors over a closed loop of tension, the second time round: lost in friction and creep, never gained."""
+    once = cycle("a.csv", 0.0, 3.0, 0.0)
+    time = np.concatenate([once.time, once.time[-1] + once.time[1:]])
+    twice = replace(once, time=time, values={k: np.concatenate([v, v[1:]]) for k, v in once.values.items()})
+    for effect in starts(law, recording(once))[:2]:
+        if effect.acts_in("sense", "command"):
+            pytest.skip("a sensor does no work")
+        twin = Twin(load("continuum"), {}, (effect,))
+        true = simulate(twin, prepare(recording(twice), twin.robot))[0].true
+        n = len(once.time)
+        T, d = true.tension[n - 1 :], true.displacement[n - 1 :]
+        work = float((0.5 * (T[1:] + T[:-1]) * np.diff(d, axis=0)).sum())
+        # An elastic loop closes to the trapezoid's error, 1e-6 J with 40 samples of a 20 mJ loop; friction and creep lose more.
+        assert work > -2e-6
+        if law.id in ("tendon_friction", "backbone_creep"):
+            assert work > 1e-5
+
+
+def test_an_unknown_effect_lists_those_there_are() -> None:
+    with pytest.raises(TwinError, match=r"no effect named 'tendon_frictoin'; available: .*tendon_friction"):
+        named("tendon_frictoin")

@@ -1,0 +1,149 @@
+"""Speed, convergence and agreement of the static solve, and its ratio to SoRoMoX on the same machine in the same run.
+
+    python tools/statics.py [--soromox /path/to/python] [--solves 10000]
+
+SoRoMoX (pip install soromox==0.5.0 optimistix, in its own environment) is run in turn with the twin, repeat by repeat: GVS of order 4,
+three tendons at 8 mm, gravity, 0-4 N, warm-started, without friction, which it does not have.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from twin.dynamics import Dynamics
+from twin.effects import Creep, Loads, Route
+from twin.equilibrium import DIRECT, FOLLOWED, NOT_FOUND, Equilibrium
+from twin.robots import load
+
+FRICTION = Route(0.2, 5e-4)
+CASES = {
+    "hanging": Loads(np.array([0, 0, 9.81])),
+    "sideways, 30 g": Loads(np.array([9.81, 0, 0]), 0.03),
+    "upright, 10 g": Loads(np.array([0, 0, -9.81]), 0.01),
+}
+
+
+def smooth(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) s and slowly wandering tensions (n, 3) N within 0-4 N."""
+    t = 0.5 * np.arange(n)
+    phase, rate = rng.uniform(0, 2 * np.pi, (3, 4)), rng.uniform(0.005, 0.05, (3, 4))
+    waves = sum(np.sin(2 * np.pi * rate[:, k] * t[:, None] + phase[:, k]) for k in range(4))
+    return t, np.clip(2 + waves, 0, 4)
+
+
+def seconds(work: object, *arguments: object) -> float:
+    began = time.perf_counter()
+    work(*arguments)  # type: ignore[operator]
+    return time.perf_counter() - began
+
+
+def speed(solver: Equilibrium, rng: np.random.Generator) -> None:
+    print(f"{'case':>16} {'friction':>8} {'warm us':>8} {'cold us':>8} {'1,500 samples ms':>17}")
+    t, T = smooth(rng, 1500)
+    for name, loads in CASES.items():
+        for route in (Route(), FRICTION):
+            whole = [seconds(solver.solve, t, T, loads, route) for _ in range(7)]
+            cold = [seconds(solver.solve, t[:1], T[k : k + 1], loads, route) for k in range(0, 1500, 25)]
+            warm = np.median(whole) / len(t)
+            friction = "yes" if route.mu else "no"
+            print(f"{name:>16} {friction:>8} {1e6 * warm:8.1f} {1e6 * np.median(cold):8.0f} {1e3 * np.median(whole):17.1f}")
+
+
+def convergence(solver: Equilibrium, rng: np.random.Generator, solves: int) -> None:
+    """Random gravity direction, payload, friction and pre-sliding; smooth paths, jumps and cold starts in equal parts."""
+    count = {DIRECT: 0, FOLLOWED: 0, NOT_FOUND: 0}
+    unstable = done = 0
+    while done < solves:
+        way = rng.normal(size=3)
+        loads = Loads(9.81 * way / np.linalg.norm(way), rng.uniform(0, 0.03))
+        route = Route(float(rng.choice([0.0, 0.1, 0.2, 0.4])), rng.uniform(1e-4, 1e-3))
+        kind = rng.integers(3)
+        n = 1 if kind == 2 else 50
+        t, T = smooth(rng, n) if kind == 0 else (np.arange(n) * 0.5, rng.uniform(0, 4, (n, 3)))
+        path = solver.solve(t, T, loads, route)
+        if path.unstable_start:
+            unstable += n
+            continue
+        done += n
+        for status in count:
+            count[status] += int((path.status == status).sum())
+    print(
+        f"{done} solves: {count[DIRECT]} direct, {count[FOLLOWED]} by following the motion, {count[NOT_FOUND]} not found;", end=" "
+    )
+    print(f"beside them {unstable} samples of trials flagged 'unstable start' (load past buckling)")
+
+
+def agreement(solver: Equilibrium, rng: np.random.Generator) -> None:
+    """Against MuJoCo steps: tensions ramped from pose to pose over 24 s, so that friction feels no inertia, and held for 6 s."""
+    moving = Dynamics(load("continuum").build({"damping.time": 0.03}))
+    print(f"{'case':>16} {'friction':>8} {'median mm':>10} {'p95':>8} {'max':>8}")
+    for name, loads in CASES.items():
+        for route in (Route(), FRICTION):
+            errors = []
+            for _ in range(4):
+                poses = rng.uniform(0, 3.5, (5, 3)) * (rng.uniform(size=(5, 3)) < 0.7)
+                knots = np.cumsum([0.0] + [24.0, 6.0] * 4)
+                t = np.linspace(0, knots[-1], int(4 * knots[-1]))
+                T = np.stack(
+                    [np.interp(t, knots, column) for column in np.vstack([poses[:1], np.repeat(poses[1:], 2, axis=0)]).T], axis=1
+                )
+                a = moving.solve(t, T, loads, route, Creep(), np.zeros((0, solver.model.nv)))
+                b = solver.solve(t, T, loads, route)
+                rest = [int(np.searchsorted(t, k)) - 1 for k in knots[2::2]]
+                errors += list(1e3 * np.linalg.norm(a.markers[rest, 7] - b.markers[rest, 7], axis=1))
+            e = np.array(errors)
+            friction = "yes" if route.mu else "no"
+            print(f"{name:>16} {friction:>8} {np.median(e):10.4f} {np.quantile(e, 0.95):8.4f} {e.max():8.4f}")
+
+
+THEIRS = Path(__file__).with_name("statics_soromox.py")
+
+
+def against_soromox(python: str, solver: Equilibrium, rng: np.random.Generator) -> None:
+    """Seven repeats in turn; the ratio of medians and of each pair."""
+    _, T = smooth(rng, 300)
+    theirs = subprocess.Popen([python, str(THEIRS)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert theirs.stdin is not None
+    assert theirs.stdout is not None
+    theirs.stdin.write(json.dumps(T.tolist()) + "\n")
+    theirs.stdin.flush()
+    theirs.stdout.readline()  # compiled
+    pairs = []
+    for _ in range(7):
+        ours = min(seconds(solver.solve, 0.5 * np.arange(300), T, CASES["hanging"], FRICTION) for _ in range(3)) / 300
+        theirs.stdin.write("go\n")
+        theirs.stdin.flush()
+        pairs.append((ours, float(theirs.stdout.readline())))
+    theirs.stdin.close()
+    a, b = np.median(pairs, axis=0)
+    ratios = sorted(y / x for x, y in pairs)
+    print(
+        f"SoRoMoX GVS order 4, warm, frictionless: {1e3 * b:.2f} ms a solve; twin, warm, with friction: {1e6 * a:.0f} us; ", end=""
+    )
+    print(f"ratio {np.median(ratios):.0f}x (from {ratios[0]:.0f}x to {ratios[-1]:.0f}x)")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--soromox", help="a python that has soromox")
+    parser.add_argument("--solves", type=int, default=10_000)
+    args = parser.parse_args()
+    rng = np.random.default_rng(0)
+    solver = Equilibrium(load("continuum").build())
+    solver.solve(np.zeros(1), np.zeros((1, 3)), CASES["hanging"])
+    if args.soromox:
+        against_soromox(args.soromox, solver, rng)
+    speed(solver, rng)
+    convergence(solver, rng, args.solves)
+    agreement(solver, rng)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
