@@ -20,7 +20,8 @@ from twin.twin import Twin, readings, report, simulate
 
 FIXED = {
     "tendon_friction", "tendon_backlash", "tendon_elasticity", "tendon_routing", "actuator_saturation", "actuator_lag",
-    "time_delay", "sma_hysteresis", "sma_cooling", "backbone_creep", "backbone_precurvature", "stiffness_asymmetry", "stiffness_gradient",
+    "time_delay",
+    "sma_hysteresis", "sma_cooling", "backbone_creep", "backbone_precurvature", "stiffness_asymmetry", "stiffness_gradient",
     "temperature_softening", "base_tilt", "camera_misalignment", "tip_payload", "contact", "load_cell_gain", "load_cell_bias",
     "load_cell_drift", "load_cell_crosstalk", "sensor_gain", "sensor_drift", "sensor_hysteresis",
 }  # fmt: skip

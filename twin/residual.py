@@ -1,7 +1,8 @@
 """Measured - predicted, in sensor sigmas: how large the noise is, and the residual made white by it.
 
-Two noises meet in a marker. Its own, sigma, and that of the tension readings that drive the twin: a reading wrong by dT moves the
-predicted shape by G dT, the same way in all channels. With A = sigma_T G / sigma the residual in sigmas has covariance
+Two noises meet in a marker. Its own, sigma, and that of the tension readings that drive the twin: a reading wrong by dT moves
+the predicted shape by G dT, the same way in all channels; so does a row whose tension and markers were not taken at quite the same
+moment, by a small share of the tension's change from row to row. With A = sigma_T G / sigma the residual in sigmas has covariance
 I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Successive
 samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples.
 """
@@ -16,6 +17,7 @@ from scipy.optimize import minimize
 
 from twin.bench import Bench
 
+SYNC = 0.05  # of a sample interval: how well tension and markers of one row are known to belong to the same moment
 SAME = 0.03  # two trials repeat each other if their tensions differ by less than this share of their range (RMS), or 3 sigma
 
 
@@ -45,13 +47,17 @@ class Noise:
 class Whitener:
     """Makes residuals and their derivatives white, given a Noise and the tension sensitivities G (n_k, n_output, n_tendon)."""
 
-    def __init__(self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> None:
-        self.noise, self.sensitivity = noise, sensitivity
+    def __init__(
+        self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], tension: Sequence[np.ndarray]
+    ) -> None:
+        self.noise = noise
         self.present = [np.isfinite(y) for y in measured]
-        self._mix = [self._across(p, g) for p, g in zip(self.present, sensitivity, strict=True)]
+        self._mix = [self._across(p, g, t) for p, g, t in zip(self.present, sensitivity, tension, strict=True)]
 
-    def _across(self, present: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        A = self.noise.tension * G / self.noise.sigma[:, None] * present[:, :, None]  # (n, m, t)
+    def _across(self, present: np.ndarray, G: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        change = np.abs(np.diff(tension, axis=0, prepend=tension[:1], append=tension[-1:]))  # (n + 1, t)
+        spread = np.hypot(self.noise.tension, SYNC * np.maximum(change[1:], change[:-1]))  # (n, t) N
+        A = spread[:, None, :] * G / self.noise.sigma[:, None] * present[:, :, None]  # (n, m, t)
         eigen, V = np.linalg.eigh(np.einsum("nmt,nms->nts", A, A))
         eigen = np.maximum(eigen, 1e-12)
         core = np.einsum("nij,nj,nkj->nik", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
@@ -184,7 +190,7 @@ def _likeliest(
 
 def _correlation(noise: Noise, d: Sequence[np.ndarray], G: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
     """Lag-1 correlation per group of the whitened differences; zero unless it is clearly there (3 standard errors)."""
-    white = Whitener(noise, d, G)
+    white = Whitener(noise, d, G, [np.zeros((len(g), g.shape[2])) for g in G])
     z = [white.trial(k, x) for k, x in enumerate(d)]
     rho = np.zeros(member.size)
     for g in range(member.max() + 1):

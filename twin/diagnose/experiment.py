@@ -74,7 +74,9 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         n = len(inputs.time)
         empty = np.zeros((n, len(bench.outputs)))
         imagined = replace(bench, inputs=(inputs,), measured=(empty,))
-        whitener = Whitener(replace(noise, tension=0.0), [empty], [np.zeros((n, len(bench.outputs), bench.n_tendon))])
+        whitener = Whitener(
+            replace(noise, tension=0.0), [empty], [np.zeros((n, len(bench.outputs), bench.n_tendon))], [inputs.tension]
+        )
         objective = Objective(imagined, [0], whitener, jobs)
         try:
             T = _separation(objective, a, b)

@@ -22,6 +22,7 @@ from twin.residual import Noise, Whitener, estimate_noise
 from twin.twin import Trace, Twin, readings, report, simulate, unstable_starts
 
 MATERIAL = 0.1  # sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say
+FORM = 0.08  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
 LEFT = (
     0.15,
     0.3,
@@ -199,15 +200,16 @@ def calibration(recording: Recording, twin: Twin, settings: Settings | None = No
 def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
     """A first calibration under a guessed noise, and the objective every later fit uses."""
     measured = [bench.measured[k] for k in fitted]
+    tension = [bench.inputs[k].tension for k in fitted]
     rough = np.array([2.5e-4 if o.group == "marker" else 5e-5 for o in bench.outputs])
     first = Noise(rough, 0.0, np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
-    objective = Objective(bench, fitted, Whitener(first, measured, none), settings.jobs)
+    objective = Objective(bench, fitted, Whitener(first, measured, none, tension), settings.jobs)
     start = fit(objective, Model.base(twin.robot, twin), tolerance=1e-3)
     unmeasured = objective.predict(start.model.twin, start.evaluation.traces)[1]
     sensitivity = _sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
-    return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity), settings.jobs), notes
+    return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity, tension), settings.jobs), notes
 
 
 def _sensitivity(
@@ -244,7 +246,7 @@ def _gate(
             return best, {}, tuple(small)
         least = min(dropped, key=lambda e: _contribution(best, dropped[e], objective))
         c = _contribution(best, dropped[least], objective)
-        if c >= bar:
+        if c >= max(bar, FORM * max(_contribution(best, w, objective) for w in dropped.values())):
             return best, dropped, tuple(small)
         small.append(Claim(least, best.fit.fitted(least), float("nan"), 0.0, c))
         best = dropped[least]

@@ -112,7 +112,8 @@ class Effect(ABC):
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Where to begin a fit: each guess; for per-tendon laws each parameter alone and all, each tendon alone and all.
+        """Where to begin a fit: each guess; for per-tendon laws each tendon alone and all, with the first parameter and with
+        all of them.
 
         `predicted` is what the twin without the effect predicts, for laws that must look where the robot goes.
         """
@@ -120,8 +121,7 @@ class Effect(ABC):
         for guess in cls.guesses:
             yield Start(guess, names)
         tendons = range(1, n_tendon + 1)
-        kinds = [*((p,) for p in cls.per_tendon), *([cls.per_tendon] if len(cls.per_tendon) > 1 else [])]
-        for kind in kinds:
+        for kind in (cls.per_tendon[:k] for k in range(1, len(cls.per_tendon) + 1)):
             single = [{f"{p.name}_{i}": p.value + p.step for p in kind} for i in tendons]
             for values in (*single, {k: v for s in single for k, v in s.items()}):
                 yield Start(values, tuple(values))

@@ -10,16 +10,16 @@ from twin.quantities import Parameter
 
 
 class TimeDelay(Effect):
-    """Outputs logged late: reported(t) = true(t - delay), by monotone cubics between samples.
+    """Outputs logged late: y_logged(t) = y(t - delay), driven by T(t - delay), monotone cubics through the logged tensions.
 
-    Before the log starts the first value holds.
+    The input is shifted, not the predicted output: a shape between two samples is then one the robot can take, while a straight line
+    between two shapes is not. Before the log starts the first value holds.
 
     Source: two loggers without a common clock; a camera's exposure and transfer (20-200 ms).
 
-    >>> z = np.zeros
     >>> t = np.arange(4.0)
-    >>> s = Signals(t, t, z((4, 1)), t[:, None], z((4, 1, 3)), z(4))
-    >>> TimeDelay(delay=0.5).sense(s).displacement[:, 0].tolist()
+    >>> s = Signals(t, t, t[:, None], np.zeros((4, 1)), np.zeros((4, 0, 3)), t)
+    >>> TimeDelay(delay=0.5).command(s).tension[:, 0].tolist()
     [0.0, 0.5, 1.5, 2.5]
     """
 
@@ -28,9 +28,9 @@ class TimeDelay(Effect):
     guesses = ({"delay": 0.1},)
     moves_with = "the rate of change of the pull"
 
-    def sense(self, true: Signals) -> Signals:
-        t = true.time - self["delay"]
-        flat = np.concatenate([true.displacement, true.markers.reshape(len(t), -1)], axis=1)
-        late = PchipInterpolator(true.time, flat)(np.clip(t, true.time[0], true.time[-1])) if len(t) > 1 else flat
-        n = true.displacement.shape[1]
-        return true.with_(displacement=late[:, :n], markers=late[:, n:].reshape(true.markers.shape))
+    def command(self, reported: Signals) -> Signals:
+        t = reported.time
+        if self["delay"] == 0.0 or len(t) < 2:
+            return reported
+        between = PchipInterpolator(t, reported.tension)
+        return reported.with_(tension=between(np.clip(t - self["delay"], t[0], t[-1])))

@@ -71,6 +71,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
 def _world() -> mujoco.MjSpec:
     """`discrete` is the one integrator implicit in position, which a 0.4 mm NiTi rod needs at millisecond steps."""
     spec = mujoco.MjSpec()
+    spec.compiler.degree = False
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
