@@ -1,0 +1,168 @@
+"""The robot's own parameters, found in days of the independent bench whose robot is known to the test alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import Day
+from tools.bench.nuisance import built
+from twin.bench import Bench, prepare
+from twin.calibrate import Fit, Model, Objective, fit
+from twin.diagnose import Settings, calibration
+from twin.diagnose.split import split
+from twin.measurements import Recording
+from twin.residual import Noise, Whitener
+from twin.robots import load
+from twin.twin import Twin
+
+SEEDS = (5, 6)
+ROBOT = load("continuum")
+PRIOR = {p.name: p for p in ROBOT.nuisance}
+
+
+def calibrated(recording: Recording, **settings: int) -> Fit:
+    return calibration(recording, Twin.of(ROBOT), Settings(**settings))[0]
+
+
+def few(bench: Day) -> Recording:
+    """A part of a day, with repeats."""
+    return bench(None, seed=5)[0].select(["slow_1", "slow_2", "fast_3", "pair_1", "hold_2", "circle_1", "circle_2", "wander_3"])
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def case(request: pytest.FixtureRequest, bench: Day) -> tuple[int, Recording, Fit]:
+    recording = bench(None, seed=request.param)[0]
+    return request.param, recording, calibrated(recording)
+
+
+def test_it_finds_the_built_robot(case: tuple[int, Recording, Fit]) -> None:
+    seed, _, found = case
+    rod, fitted = built(np.random.default_rng([seed, 0])), found.fitted(None)
+    true = {"backbone.youngs_modulus": rod.youngs_modulus, "tendons.radius": rod.hole_radius[0, 0]}
+    for name, value in true.items():
+        # Three standard errors, as for any honest fit: 3 in 1,000 days fail by chance, and these two days are always the same.
+        assert abs(fitted[name].value - value) < 3 * fitted[name].std, name
+    # What bends the robot is their ratio: known to a few per mille, or the calibration did nothing.
+    ratio, true_ratio = (v["tendons.radius"] / v["backbone.youngs_modulus"] for v in ({n: fitted[n].value for n in true}, true))
+    assert abs(ratio / true_ratio - 1) < 5e-3
+
+
+def test_all_errors_together_are_as_large_as_claimed(case: tuple[int, Recording, Fit]) -> None:
+    """Mean square of (found - true) / standard error over all parameters, those priors hold included."""
+    seed, _, found = case
+    rod, fitted = built(np.random.default_rng([seed, 0])), found.fitted(None)
+    true = {
+        "backbone.youngs_modulus": rod.youngs_modulus,
+        "backbone.radius_taper": rod.radius_taper,
+        "disks.mass": rod.disk_mass.sum(),
+        "tendons.radius": rod.hole_radius[0, 0],
+        **{f"disks.pitch_{k + 1}": p for k, p in enumerate(rod.pitch)},
+        **{f"markers.axial_offset_{k + 1}": p for k, p in enumerate(rod.marker_offset)},
+    }
+    assert set(true) == set(fitted)
+    pull = np.array([(fitted[n].value - v) / fitted[n].std for n, v in true.items()])
+    # 20 correlated numbers of unit variance: a mean square above 3 or a single one beyond 4 is beyond chance. Prior draws cut at
+    # two deviations make it smaller.
+    assert np.mean(pull**2) < 3.0
+    assert np.abs(pull).max() < 4.0
+
+
+def test_what_is_left_is_noise(case: tuple[int, Recording, Fit]) -> None:
+    _, _, found = case
+    z = found.z[found.z != 0]
+    # 30,000 whitened numbers: chance is 0.8 %; the chain's own error of 0.01 mm adds 0.2 %, and the noise estimate 2 %.
+    assert np.mean(z**2) == pytest.approx(1.0, abs=0.05)
+
+
+def test_every_value_stays_within_its_bounds_and_gets_a_smaller_error(case: tuple[int, Recording, Fit]) -> None:
+    _, _, found = case
+    for name, value in found.fitted(None).items():
+        assert PRIOR[name].low <= value.value <= PRIOR[name].high
+        assert value.std is not None
+        assert 0 < value.std < 1.1 * PRIOR[name].std  # data never widen a belief, but for the inflation by a residual above noise
+        assert value.unit == PRIOR[name].unit
+
+
+def test_it_names_what_the_data_do_not_fix(bench: Day, case: tuple[int, Recording, Fit]) -> None:
+    _, recording, found = case
+    std = {n: f.std for n, f in found.fitted(None).items()}
+    assert "backbone.youngs_modulus" not in found.unfixed()
+    # One marker alone on two unloaded pulls: the other markers' offsets cannot be known, and neither can the disks' mass.
+    tip = tuple(c for c in recording.channels if c.role == "input" or c.name.startswith("disk_8"))
+    thin = replace(
+        recording,
+        channels=tip,
+        trials=tuple(
+            replace(t, values={c.name: t.values[c.name] for c in tip})
+            for t in recording.trials
+            if t.name in ("slow_1.csv", "fast_1.csv")
+        ),
+    )
+    poor = calibrated(thin)
+    assert {f"markers.axial_offset_{k}" for k in range(1, 8)} | {"disks.mass"} <= set(poor.unfixed())
+    for name, value in poor.fitted(None).items():
+        assert value.std > std[name]  # less data, less certain
+
+
+def test_same_seed_same_result_and_threads_do_not_count(bench: Day) -> None:
+    recording = few(bench)
+    found = calibrated(recording, jobs=2)
+    again = calibrated(recording, jobs=1)
+    np.testing.assert_array_equal(again.model.vector(), found.model.vector())
+    np.testing.assert_array_equal(again.z, found.z)
+    np.testing.assert_array_equal(again.J, found.J)
+
+
+def test_held_out_trials_do_not_count(bench: Day) -> None:
+    recording = few(bench)
+    found = calibrated(recording)
+    held = {prepare(recording, ROBOT).inputs[k].name for k in split(prepare(recording, ROBOT), 0)[1]}
+    assert held
+    outputs = [c.name for c in recording.outputs()]
+    trials = tuple(
+        replace(t, values={**t.values, **{n: 1e3 * (t.values[n] + 1) for n in outputs}}) if t.name in held else t
+        for t in recording.trials
+    )
+    wild = replace(recording, trials=trials)
+    np.testing.assert_array_equal(calibrated(wild).model.vector(), found.model.vector())
+
+
+def test_its_derivatives_are_those_of_its_residual(case: tuple[int, Recording, Fit]) -> None:
+    """Columns taken near the solution against whole predictions far apart enough to be free of the solver's last digits."""
+    _, recording, found = case
+    prepared = prepare(recording.select(["slow_1", "circle_1"]), ROBOT)
+    trials = [0, 1]
+    objective = Objective(prepared, trials, _white(prepared, trials), 1)
+    model = Model(found.model.twin, found.model.free)
+    at = objective.evaluate(model)
+    x = model.vector()
+    for i in (0, 3, len(x) - 1):
+        column = objective.jacobian(at, [i])[:, 0]
+        e = 0.2 * np.eye(len(x))[i]
+        central = (objective.evaluate(model.at(x + e)).z - objective.evaluate(model.at(x - e)).z) / 0.4
+        # Sigmas per step: the one-sided difference of 0.02 steps carries 1 % of a curvature of 2 sigma, the solver's 1e-6 rad
+        # 0.5 um / 250 um / 0.02 = 0.1 sigma, of columns of up to 20.
+        np.testing.assert_allclose(column, central, rtol=0, atol=0.12 + 0.01 * np.abs(central).max())
+
+
+def test_a_fit_that_starts_at_its_answer_stays(case: tuple[int, Recording, Fit]) -> None:
+    _, recording, found = case
+    prepared = prepare(recording, ROBOT)
+    fitted = split(prepared, 0)[0]
+    objective = Objective(prepared, fitted, _white(prepared, fitted), 2)
+    once = fit(objective, Model(found.model.twin, found.model.free))
+    twice = fit(objective, once.model)
+    assert twice.cost <= once.cost
+    # Steps of a prior deviation each: the fit stops when the cost falls by less than 1e-5 of itself, i.e. by 0.3: half a standard
+    # error along the weakest direction, which a prior deviation bounds.
+    spread = once.std() / np.array([f.parameter.step for f in once.model.free])
+    assert np.all(np.abs(twice.model.vector() - once.model.vector()) < spread)
+
+
+def _white(prepared: Bench, trials: list[int]) -> Whitener:
+    measured = [prepared.measured[k] for k in trials]
+    noise = Noise(np.full(len(prepared.outputs), 2.5e-4), 0.0, np.zeros(len(prepared.outputs)), "test")
+    return Whitener(noise, measured, [np.zeros((*y.shape, 3)) for y in measured], [prepared.inputs[k].tension for k in trials])
