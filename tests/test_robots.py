@@ -157,7 +157,7 @@ def test_a_broken_file_is_named_with_what_is_wrong(case: str, tmp_path: Path) ->
         load("mine", relative_to=broken(tmp_path, old, new).parent)
 
 
-# What today ends in another error, in one without the file's name, or in none; (old, new, what the message must hold).
+# (old, new, what the message must hold)
 LEAKY = {
     "a word for a number": (RADIUS, 'value = "thin", unit = "mm"', "backbone.radius"),
     "a word for a spread": ("std = 4.66", 'std = "some"', "backbone.youngs_modulus"),
@@ -179,7 +179,6 @@ LEAKY = {
 
 
 @pytest.mark.parametrize("case", LEAKY)
-@pytest.mark.xfail(strict=True, reason="robot.toml is checked in part: no DataError that names the file and the key")
 def test_any_other_broken_file_is_named_too(case: str, tmp_path: Path) -> None:
     old, new, said = LEAKY[case]
     with pytest.raises(DataError, match=rf"(?s)mine.robot\.toml.*{said}"):

@@ -2,7 +2,7 @@
 
     python tools/statics.py [--soromox /path/to/python] [--solves 10000]
 
-SoRoMoX (pip install soromox==0.5.0 optimistix, in its own environment) is run in turn with the twin, repeat by repeat: GVS of order 4,
+SoRoMoX (pip install soromox==0.5.0 optimistix, in its own environment) is run in turn with the twin: GVS of order 4,
 three tendons at 8 mm, gravity, 0-4 N, warm-started, without friction, which it does not have.
 """
 

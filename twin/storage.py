@@ -12,11 +12,12 @@ import tomli_w
 
 from twin.effects import named
 from twin.errors import DataError, TwinError
-from twin.quantities import Fitted, Parameter, overrides, si_factor
+from twin.quantities import Fitted, Parameter, overrides, si_factor, si_unit
 from twin.robots import available, load
 from twin.twin import Twin
 
 FORMAT = "twin/1"
+SECTIONS = {"format", "robot", "parameters", "effect", "provenance"}
 
 
 def read_twin(source: str | Path) -> Twin:
@@ -39,17 +40,24 @@ def read_twin(source: str | Path) -> Twin:
         raise DataError(f"{path}: format is {table.get('format')!r}; this program reads {FORMAT!r}")
     if not isinstance(table.get("robot"), str):
         raise DataError(f"{path}: `robot` is missing; name one of {', '.join(available())}, or a path to a robot's folder")
-    robot = load(table["robot"], path.parent)
     try:
+        if unread := sorted(set(table) - SECTIONS):
+            raise DataError(f"{path}: no section {unread[0]!r} is known; allowed are {', '.join(sorted(SECTIONS))}")
+        robot = load(table["robot"], path.parent)
         values = _values(path, table.get("parameters", {}), robot.parameters)
         overrides(robot.parameters, values)
         n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
         effects = []
-        for entry in table.get("effect", []):
+        entries = table.get("effect", [])
+        if not (isinstance(entries, list) and all(isinstance(e, dict) for e in entries)):
+            raise DataError(f"{path}: `effect` is {entries!r}; write each effect as its own [[effect]]")
+        for entry in entries:
             law = named(str(entry.get("id")))
             effects.append(law(_values(path, entry.get("parameters", {}), law.declared(n_tendon)), n_tendon))
+        if twice := {e.id for e in effects if sum(o.id == e.id for o in effects) > 1}:
+            raise DataError(f"{path}: effect {', '.join(sorted(twice))} stands there twice; merge the two")
     except TwinError as error:
-        raise type(error)(str(error)) if isinstance(error, DataError) else DataError(f"{path}: {error}") from None
+        raise DataError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
     return Twin(robot, values, tuple(effects))
 
 
@@ -57,12 +65,16 @@ def _values(path: Path, table: Any, declared: tuple[Parameter, ...]) -> dict[str
     """Values of a parameter table: plain SI numbers, or {value, unit, std}."""
     units = {p.name: p.unit for p in declared}
     out = {}
+    if not isinstance(table, Mapping):
+        raise DataError(f"{path}: parameters are {table!r}; write a table of name = {{ value = ..., unit = ... }}")
     for name, entry in table.items():
         if name not in units:
             raise DataError(f"{path}: no parameter named {name!r}; available: {', '.join(sorted(units))}")
         try:
             if isinstance(entry, Mapping):
                 unit = str(entry.get("unit", units[name]))
+                if si_unit(unit, f"{path}: {name}") != units[name]:
+                    raise DataError(f"{path}: parameter {name!r} is in {unit!r}; a unit like {units[name]!r} is needed")
                 out[name] = float(entry["value"]) * si_factor(unit, f"{path}: {name}")
             else:
                 out[name] = float(entry)

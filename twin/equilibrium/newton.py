@@ -18,6 +18,7 @@ from twin.equilibrium.linear import factorise, substitute
 
 CONTRACTION = 0.25  # a chord step that shrinks the residual less than this asks for a fresh tangent
 GROWTH = 3.0  # a Newton step that lets the residual grow more than this is halved
+LOST = 1e9  # rad: a residual beyond it is a diverged step
 LONGEST_STEP = 0.5  # rad, of any hinge
 NEWTON_STEPS = 30
 FLOW_STEPS = 200
@@ -50,13 +51,13 @@ def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flo
         tangent = not have
         place(model, data, chain, q)
         balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, J if tangent else none)
-        size = 0.0
+        size, lost = 0.0, False
         for i in range(nv):
             r[i] += flow * K[i] * (q[i] - anchor[i])
-            size = max(size, abs(r[i] / K[i]))
-            if not np.isfinite(r[i]):
-                size = np.inf
-        if not size < 1e9 or (tangent and size > GROWTH * before):
+            x = abs(r[i] / K[i])
+            size = max(size, x)
+            lost = lost or not x < LOST  # also where x is no number, which isfinite may miss under fast-math
+        if lost or (tangent and size > GROWTH * before):
             if step < 1e-3 or it == 1:
                 return -it
             step *= 0.5

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from twin.errors import DataError
 from twin.robots.body import Body, JointSet
 
 PLACES = (1.0 / 6.0, 5.0 / 6.0)  # of a disk interval
@@ -28,6 +29,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
     Base frame: origin on the backbone at the base hole plate, +z along the straight robot, angles from +x towards +y.
     """
     n_disk, n_tendon = int(structure["disks"]), int(structure["tendons"])  # type: ignore[call-overload]
+    _check(n_disk, n_tendon, values)
     pitch = np.array([values[f"disks.pitch_{k}"] for k in range(1, n_disk + 1)])
     disk_z = np.concatenate([[0.0], np.cumsum(pitch)])
     length = float(disk_z[-1])
@@ -66,6 +68,24 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
         tip=f"disk_{n_disk}_centre",
         length=length,
     )
+
+
+LISTS = {"disks.pitch": "m", "markers.axial_offset": "m", "tendons.angle": "rad"}
+SCALARS = {
+    "backbone.radius": "m", "backbone.mass": "kg", "backbone.youngs_modulus": "Pa", "backbone.poisson_ratio": "1",
+    "backbone.radius_taper": "1", "disks.mass": "kg", "disks.radius": "m", "tendons.radius": "m", "damping.time": "s",
+}  # fmt: skip
+UNITS = LISTS | SCALARS  # of the parameters this family is built from
+
+
+def _check(n_disk: int, n_tendon: int, values: Mapping[str, float]) -> None:
+    """Raises DataError for counts and parameters this family cannot be built from."""
+    if n_disk < 1 or n_tendon < 1:
+        raise DataError(f"disks = {n_disk}, tendons = {n_tendon}; at least one of each is needed")
+    length = dict.fromkeys(LISTS, n_disk) | {"tendons.angle": n_tendon}
+    needed = {*SCALARS, *(f"{name}_{k}" for name, n in length.items() for k in range(1, n + 1))}
+    if missing := sorted(needed - set(values)):
+        raise DataError(f"parameter {missing[0]!r} is missing; {n_disk} disks and {n_tendon} tendons need it")
 
 
 def _world() -> mujoco.MjSpec:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.errors import DataError, UnknownNameError
+from twin.effects import named
+from twin.errors import DataError, TwinError, UnknownNameError
 from twin.quantities import Parameter, Values, overrides, si_factor, si_unit
 from twin.robots.body import Body
 
@@ -35,6 +37,10 @@ class Robot:
     gravity: np.ndarray  # (3,) m/s^2
     accuracy: float
     effects: tuple[tuple[str, Values], ...] = ()
+
+    @property
+    def n_tendon(self) -> int:
+        return int(self.structure["tendons"])  # type: ignore[call-overload]
 
     @property
     def nuisance(self) -> tuple[Parameter, ...]:
@@ -84,10 +90,11 @@ def _read(folder: Path) -> Robot:
     try:
         parameters = tuple(p for name, entry in table["parameters"].items() for p in _parameters(path, name, entry))
         gravity = np.array(table["gravity"]["value"], float) * si_factor(table["gravity"]["unit"], str(path))
+        _check_numbers(path, "accuracy", table["accuracy"])
         accuracy = float(table["accuracy"]["value"]) * si_factor(table["accuracy"]["unit"], str(path))
         declared = tuple((e["id"], dict(e.get("parameters", {}))) for e in table.get("effect", []))
         gravity.setflags(write=False)
-        return Robot(
+        robot = Robot(
             folder.name,
             table["family"],
             table["title"],
@@ -98,16 +105,52 @@ def _read(folder: Path) -> Robot:
             accuracy,
             declared,
         )
+        _check(robot)
+        return robot
     except KeyError as error:
         raise DataError(f"{path}: {error.args[0]!r} is missing") from None
+    except TwinError as error:
+        named = str(error) if str(error).startswith(str(path)) else f"{path}: {error}"
+        raise DataError(named) from None
+    except (TypeError, ValueError, AttributeError) as error:
+        raise DataError(f"{path}: {error}; compare it with the robots that ship with the twin") from None
+
+
+def _check(robot: Robot) -> None:
+    """What a robot's file must hold beyond its form. Raises TwinError."""
+    if robot.gravity.shape != (3,) or not np.isfinite(robot.gravity).all():
+        raise DataError(f"gravity is {robot.gravity.tolist()}; three finite numbers are needed")
+    if importlib.util.find_spec(f"twin.robots.{robot.family}") is None:
+        raise DataError(f"no family named {robot.family!r}; a family is a module of twin.robots, as 'continuum'")
+    units = importlib.import_module(f"twin.robots.{robot.family}").UNITS
+    for p in robot.parameters:
+        needed = units.get(p.name, units.get(p.name.rpartition("_")[0]))
+        if needed is not None and p.unit != needed:
+            raise DataError(f"parameter {p.name!r} is in {p.unit}; a unit like {needed!r} is needed")
+    for name in ("disks", "tendons"):
+        if not isinstance(robot.structure.get(name), int):
+            raise DataError(f"structure: {name} is {robot.structure.get(name)!r}; a whole number is needed")
+    for identifier, values in robot.effects:
+        named(identifier)(values, robot.n_tendon)
+    robot.build()
+
+
+def _check_numbers(path: Path, name: str, entry: Mapping[str, object]) -> None:
+    for key in {"value", "std", "low", "high"} & set(entry):
+        numbers = entry[key] if isinstance(entry[key], list) else [entry[key]]
+        if not all(isinstance(n, int | float) and np.isfinite(n) for n in numbers):  # type: ignore[union-attr]
+            raise DataError(f"{path}: parameter {name!r}: {key} is {entry[key]!r}; finite numbers are needed")
 
 
 def _parameters(path: Path, name: str, entry: Mapping[str, object]) -> list[Parameter]:
+    if not isinstance(entry, Mapping):
+        raise DataError(f"{path}: parameter {name!r} is {entry!r}; write {{ value = ..., unit = ..., source = ... }}")
     missing = {"value", "unit", "source"} - set(entry)
     if missing:
         raise DataError(f"{path}: parameter {name!r} lacks {', '.join(sorted(missing))}; every number has a unit and a source")
     factor = si_factor(str(entry["unit"]), f"{path}: parameter {name!r}")
     unit = si_unit(str(entry["unit"]), f"{path}: parameter {name!r}")
+    _check_numbers(path, name, entry)
     value = entry["value"]
     many = isinstance(value, list)
     numbers: list[float] = [float(v) for v in value] if isinstance(value, list) else [float(value)]  # type: ignore[arg-type]
