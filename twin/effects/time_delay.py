@@ -12,7 +12,7 @@ from twin.quantities import Parameter
 class TimeDelay(Effect):
     """Outputs logged late: y_logged(t) = y(t - delay), driven by T(t - delay), by monotone cubics.
 
-    The input is shifted, not the predicted output: a shape between two samples is then one the robot can take; a straight line between
+    The input is shifted, not the predicted output: a shape between two samples is one the robot can take; a straight line between
     two shapes is not. Before the log starts the first value holds.
 
     Source: two loggers without a common clock; a camera's exposure and transfer (20-200 ms).
