@@ -21,6 +21,9 @@ SIGMA = 2.5e-4  # m
 SETTINGS = Settings(seed=3, jobs=1)
 
 
+EXPERIMENT = Experiment("pull tendon 3 to 2.0 N and release it", 10.0, 3, (("tendon_friction",), ("backbone_creep",)))
+
+
 def recording(
     *, title: str = "Bench test", trial: str = "circle", n: int = 60, displacement: bool = False, markers: bool = True
 ) -> Recording:
@@ -94,7 +97,7 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         worst_channel="disk_8_x",
         description="A smooth part is left.",
         ambiguous=(("tendon_routing", "time_delay"),) if found else (),
-        experiment=Experiment("pull tendon 3 to 2.0 N and release it", 10.0, 3) if verdict != "noise" else None,
+        experiment=EXPERIMENT if verdict != "noise" else None,
         bench=bench,
         fitted_trials=(0, 1, 3),
         held_trials=(2, 4),

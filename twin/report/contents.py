@@ -68,7 +68,8 @@ def experiment_words(diagnosis: Diagnosis) -> str | None:
     if e is None:
         return None
     runs = "one run separates" if e.repeats == 1 else f"{e.repeats} runs together separate"
-    return f"{e.words}: {runs} the two best explanations by {(e.separation * e.repeats) ** 0.5:.0f} standard errors"
+    one, other = (" + ".join(names).replace("_", " ") or "no effect" for names in e.between)
+    return f"{e.words}: {runs} {one} from {other} by {(e.separation * e.repeats) ** 0.5:.0f} standard errors"
 
 
 def _weight(claim: Claim) -> dict[str, float | None]:
