@@ -44,16 +44,24 @@ def seconds(work: object, *arguments: object) -> float:
     return time.perf_counter() - began
 
 
+RUN = 25  # samples of one timing of warm solves, so that a call's own cost does not count
+
+
 def speed(solver: Equilibrium, rng: np.random.Generator) -> None:
-    print(f"{'case':>16} {'friction':>8} {'warm us':>8} {'cold us':>8} {'1,500 samples ms':>17}")
+    """Median and 95th percentile: warm a sample, over runs of 25 less their start; cold one solve from straight."""
+    heads = f"{'warm us':>9} {'p95':>6} {'cold us':>8} {'p95':>6} {'1,500 samples ms':>17}"
+    print(f"{'case':>16} {'friction':>8} {heads}")
     t, T = smooth(rng, 1500)
     for name, loads in CASES.items():
         for route in (Route(), FRICTION):
             whole = [seconds(solver.solve, t, T, loads, route) for _ in range(7)]
-            cold = [seconds(solver.solve, t[:1], T[k : k + 1], loads, route) for k in range(0, 1500, 25)]
-            warm = np.median(whole) / len(t)
-            friction = "yes" if route.mu else "no"
-            print(f"{name:>16} {friction:>8} {1e6 * warm:8.1f} {1e6 * np.median(cold):8.0f} {1e3 * np.median(whole):17.1f}")
+            starts = range(0, 1500 - RUN, RUN)
+            cold = [seconds(solver.solve, t[:1], T[k : k + 1], loads, route) for k in starts]
+            runs = [seconds(solver.solve, t[: RUN + 1], T[k : k + RUN + 1], loads, route) for k in starts]
+            warm = (np.array(runs) - cold) / RUN
+            times = f"{1e6 * np.median(warm):9.1f} {1e6 * np.quantile(warm, 0.95):6.1f}"
+            times += f" {1e6 * np.median(cold):8.0f} {1e6 * np.quantile(cold, 0.95):6.0f} {1e3 * np.median(whole):17.1f}"
+            print(f"{name:>16} {'yes' if route.mu else 'no':>8} {times}")
 
 
 def convergence(solver: Equilibrium, rng: np.random.Generator, solves: int) -> None:
@@ -117,7 +125,8 @@ def against_soromox(python: str, solver: Equilibrium, rng: np.random.Generator) 
     theirs.stdout.readline()  # compiled
     pairs = []
     for _ in range(7):
-        ours = min(seconds(solver.solve, 0.5 * np.arange(300), T, CASES["hanging"], FRICTION) for _ in range(3)) / 300
+        whole = [seconds(solver.solve, 0.5 * np.arange(300), T, CASES["hanging"], FRICTION) for _ in range(3)]
+        ours = float(np.median(whole)) / 300  # theirs is the median of 300 solves
         theirs.stdin.write("go\n")
         theirs.stdin.flush()
         pairs.append((ours, float(theirs.stdout.readline())))
