@@ -1,11 +1,11 @@
-"""A parameter: value, unit, bounds, prior, source; many of them as a vector and back.
+"""A parameter: value, unit, bounds, prior, source.
 
 Values are SI everywhere inside the program. Units as people write them are converted here, at the border, by pint.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -136,13 +136,3 @@ def check_bounds(parameter: Parameter, value: float) -> None:
         raise TwinError(
             f"parameter {parameter.name} = {value:g} {parameter.unit}: allowed is [{parameter.low:g}, {parameter.high:g}]"
         )
-
-
-def vector(parameters: Sequence[Parameter], values: Values) -> np.ndarray:
-    """Values in the order of `parameters`, shape (n,)."""
-    return np.array([values[p.name] for p in parameters], float)
-
-
-def mapping(parameters: Sequence[Parameter], x: np.ndarray) -> dict[str, float]:
-    """The inverse of `vector`."""
-    return {p.name: float(v) for p, v in zip(parameters, x, strict=True)}

@@ -13,7 +13,6 @@ from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, spectral_peak
 from twin.diagnose.experiment import Experiment, next_experiment
 from twin.diagnose.search import ACCEPT, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
-from twin.effects import Effect
 from twin.errors import DataError
 from twin.evaluate import rms, squares
 from twin.measurements import Recording
@@ -370,9 +369,3 @@ def _describe(
     if line[0] > LINE:
         words += f" It has a line at {line[1]:.2f} Hz."
     return words
-
-
-def added_effects(diagnosis: Diagnosis) -> tuple[Effect, ...]:
-    """The effects in force that the robot's description did not have."""
-    names = {c.effect for c in diagnosis.claims}
-    return tuple(e for e in diagnosis.twin.effects if e.id in names)

