@@ -212,7 +212,8 @@ def main() -> None:
         sys.exit(2)
     except KeyboardInterrupt:
         err.print("twin: stopped; nothing half-written is left")
-        sys.exit(1)
+        sys.stdout.flush()
+        os._exit(1)  # worker threads are still inside compiled code: taking the interpreter down beneath them would crash it
 
 
 if __name__ == "__main__":
