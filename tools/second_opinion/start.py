@@ -1,0 +1,66 @@
+"""Where every opinion starts and what it returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bench import Bench, prepare
+from twin.calibrate import Fit, Objective, fit
+from twin.diagnose.evidence import COMPONENTS, Discrepancy, Evidence
+from twin.diagnose.screen import Candidate, screen
+from twin.diagnose.split import split
+from twin.diagnose.verdict import Settings, _objective  # the diagnosis's own noise and calibration, whatever they become
+from twin.effects import catalogue
+from twin.evaluate import rms
+from twin.measurements import Recording
+from twin.twin import Twin, readings, report, simulate
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """Whether an effect is missing, the effects named (most important first), and the twin that came of it."""
+
+    missing: bool
+    named: tuple[str, ...]
+    twin: Twin
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A measurement set split, its noise estimated and the robot's own parameters fitted, as the diagnosis does."""
+
+    bench: Bench
+    held: list[int]
+    objective: Objective
+    evidence: Evidence
+    fit: Fit
+
+    @staticmethod
+    def of(recording: Recording, twin: Twin, settings: Settings) -> Calibrated:
+        bench = prepare(recording, twin.robot)
+        fitted, held = split(bench, settings.seed)
+        start, objective, _ = _objective(bench, twin, fitted, settings)
+        return Calibrated(bench, held, objective, Evidence(bench, fitted), fit(objective, start, refresh=True))
+
+    def screened(self, at: Fit) -> list[Candidate]:
+        """Effects not in force whose pattern lowers |z|^2 by more than p log n to first order, at their best start, best first."""
+        n_group = len(self.evidence.groups)
+        none = Discrepancy(0.0, np.zeros(0), np.full((n_group, len(COMPONENTS)), 1e-8), np.zeros((0, 0)))
+        best: dict[str, Candidate] = {}
+        for candidate in screen(self.objective, self.evidence, at, none, top=len(catalogue())):
+            best.setdefault(candidate.effect, candidate)
+        return list(best.values())
+
+    def held_out(self, twin: Twin) -> float:
+        """RMS marker error (m, Euclidean per marker) on the trials no fit has seen."""
+        traces = simulate(twin, self.bench, trials=self.held)
+        pairs = zip(self.held, traces, strict=True)
+        raw = [self.bench.measured[k] - readings(self.bench, report(twin.effects, t.true)) for k, t in pairs]
+        return rms(self.bench, raw, "marker")
+
+
+def amplitudes(candidate: Candidate) -> list[str]:
+    """The parameters of a candidate that switch it on; the others mean nothing while it is OFF."""
+    return [name for name in candidate.start.free if name not in catalogue()[candidate.effect].shape]
