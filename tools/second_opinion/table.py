@@ -39,7 +39,7 @@ def table(rows: list[dict]) -> str:
         line("held-out after / floor, pairs", spread(lambda n: [r["answers"][n]["after"] / r["floor"] for r in pairs])),
         line("worse than calibrated on held-out trials", share(rows, lambda r, a: a["after"] > 1.001 * r["calibrated"])),
         line("seconds", spread(lambda n: [r["answers"][n]["seconds"] for r in rows])),
-        "ratios and seconds: median (90 %); no effect needs no name, so that set is exact where nothing is claimed",
+        "ratios and seconds: median (90 %)",
     ]
     return "\n".join(lines)
 
