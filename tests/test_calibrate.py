@@ -164,5 +164,5 @@ def test_a_fit_that_starts_at_its_answer_stays(case: tuple[int, Recording, Fit])
 
 def _white(prepared: Bench, trials: list[int]) -> Whitener:
     measured = [prepared.measured[k] for k in trials]
-    noise = Noise(np.full(len(prepared.outputs), 2.5e-4), 0.0, np.zeros(len(prepared.outputs)), "test")
-    return Whitener(noise, measured, [np.zeros((*y.shape, 3)) for y in measured], [prepared.inputs[k].tension for k in trials])
+    noise = Noise(np.full(len(prepared.outputs), 2.5e-4), np.zeros(3), np.zeros(len(prepared.outputs)), "test")
+    return Whitener(noise, measured, [np.zeros((*y.shape, 3)) for y in measured], [prepared.inputs[k].command for k in trials])

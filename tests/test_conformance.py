@@ -43,7 +43,7 @@ def cycle(name: str, start: float, peak: float, payload: float) -> Trial:
     angle = 2 * np.pi * np.arange(n) / (n - 1)
     tension = np.stack([0.5 * peak * (1 - np.cos(angle)), 0.25 * peak * (1 - np.sin(angle)), np.full(n, 0.2)], axis=1)
     values = {c.name: np.zeros(n) for c in channels()} | {f"tendon_{i + 1}_tension": tension[:, i] for i in range(3)}
-    return Trial(name, time, values, {"tip_payload": payload}, start=start)
+    return Trial(name, time, values, {"tip_payload": payload, "ambient_temperature": 300.15}, start=start)
 
 
 def recording(*trials: Trial) -> Recording:
@@ -73,6 +73,8 @@ def test_it_says_what_it_is(law: type[Effect]) -> None:
     assert doctest.testmod(importlib.import_module(law.__module__)).attempted > 0
     assert doctest.testmod(importlib.import_module(law.__module__)).failed == 0
     assert law.moves_with
+    for other in law.akin:
+        assert law.id in named(other).akin, "kinship is mutual"
 
 
 @laws

@@ -114,7 +114,7 @@ def test_held_out_trials_never_reach_a_fit(bench: Day, friction: Diagnosis) -> N
         (c.effect, c.parameters, c.probability) for c in friction.claims
     ]
     np.testing.assert_array_equal(again.noise.sigma, friction.noise.sigma)
-    assert again.noise.tension == friction.noise.tension
+    assert np.array_equal(again.noise.drive, friction.noise.drive)
     # ... and what is measured on them must: 0.1 m of nonsense.
     assert again.errors.after["marker"] > 0.1
     assert again.errors.floor == friction.errors.floor
@@ -220,7 +220,7 @@ def test_repeats_tell_the_noise(declared: bool) -> None:
     # the tensions, 1 % for the rest; ten per cent is asked.
     np.testing.assert_allclose(noise.sigma[:12], SIGMA, rtol=0, atol=0.1 * SIGMA)
     np.testing.assert_allclose(noise.sigma[12:], SIGMA_D, rtol=0, atol=0.1 * SIGMA_D)
-    assert noise.tension == pytest.approx(SIGMA_T, abs=0 if declared else 0.1 * SIGMA_T)
+    assert noise.drive == pytest.approx(np.full(3, SIGMA_T), abs=0 if declared else 0.1 * SIGMA_T)
     np.testing.assert_array_equal(noise.rho, 0.0)
     assert any("no noise declared for the tension" in note for note in notes) != declared
     assert "6 pairs" in noise.source
@@ -263,7 +263,7 @@ def test_whitening_makes_unit_variance(rho: float) -> None:
     holes = np.random.default_rng(6).random((4000, 4)) < 0.05
     measured = np.where(np.repeat(holes, 3, axis=1), np.nan, 0.0)
     measured = np.concatenate([measured, np.zeros((4000, 3))], axis=1)
-    noise = Noise(np.array([SIGMA] * 12 + [SIGMA_D] * 3), SIGMA_T, np.full(15, rho), "known")
+    noise = Noise(np.array([SIGMA] * 12 + [SIGMA_D] * 3), np.full(3, SIGMA_T), np.full(15, rho), "known")
     resting = [np.ones((4000, 3))]  # tensions that do not change blur nothing
     z = Whitener(noise, [measured], G, resting).trial(0, np.where(np.isnan(measured), np.nan, r))
     assert np.isfinite(z).all()
@@ -285,7 +285,7 @@ def test_tension_noise_left_out_is_seen() -> None:
     bench = imagined(1, 2000, (SIGMA_T, None))
     G = sensitivities(bench)
     r = noisy(bench, G, 5)[0]
-    noise = Noise(np.array([SIGMA] * 12 + [SIGMA_D] * 3), 0.0, np.zeros(15), "too sure")
+    noise = Noise(np.array([SIGMA] * 12 + [SIGMA_D] * 3), np.zeros(3), np.zeros(15), "too sure")
     z = Whitener(noise, [np.zeros_like(r)], G, [np.ones((2000, 3))]).trial(0, r)
     assert (z**2).mean() > 1.3
 
@@ -294,7 +294,7 @@ def test_the_floor_is_what_a_perfect_twin_leaves() -> None:
     bench = imagined(1, 4000, (SIGMA_T, None))
     G = sensitivities(bench)
     r = noisy(bench, G, 8)[0]
-    noise = Noise(np.array([SIGMA] * 12 + [SIGMA_D] * 3), SIGMA_T, np.zeros(15), "known")
+    noise = Noise(np.array([SIGMA] * 12 + [SIGMA_D] * 3), np.full(3, SIGMA_T), np.zeros(15), "known")
     floor = noise.floor(bench, G)
     euclidean = np.sqrt((r[:, :12].reshape(-1, 4, 3) ** 2).sum(axis=2).mean())
     # 4,000 rows whose markers move together with three tensions: 1 %

@@ -28,9 +28,9 @@ def main() -> None:
     d = diagnose(recording, Twin.of(load("continuum")), Settings())
     bench = d.bench
     tip = [next(j for j, o in enumerate(bench.outputs) if o.channel.name == f"disk_8_{a}") for a in "xyz"]
-    pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].tension, axis=0))) for k in d.held_trials}
-    trial = max(pulls, key=lambda k: float(np.ptp(bench.inputs[k].tension)))
-    tension = bench.inputs[trial].tension[:, pulls[trial]]
+    pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].command, axis=0))) for k in d.held_trials}
+    trial = max(pulls, key=lambda k: float(np.ptp(bench.inputs[k].command)))
+    tension = bench.inputs[trial].command[:, pulls[trial]]
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"})
     figure, (loop, bars) = plt.subplots(1, 2, figsize=(8.0, 2.9), width_ratios=(1.7, 1.0), layout="constrained")
     for stage, (colour, label) in STAGES.items():

@@ -12,16 +12,19 @@ from twin.measurements import Channel, Recording, Trial
 from twin.robots import Robot
 
 ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
+READING = {"tendon_tension": 0.01, "tendon_displacement": 2e-5}  # N, m: what such a reading is typically good for
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """One trial as the twin is driven: time and clock (n,) s, reported tension (n, n_tendon) N, temperature (n,) K, its loads."""
+    """One trial as the twin is driven: time and clock (n,) s, reported command (n, n_tendon) in N or, for tendons
+    `by_length` (n_tendon,), displacement in m, temperature (n,) K, its loads."""
 
     name: str
     time: np.ndarray
     clock: np.ndarray
-    tension: np.ndarray
+    command: np.ndarray
+    by_length: np.ndarray
     temperature: np.ndarray
     loads: Loads
 
@@ -31,7 +34,7 @@ class Output:
     """One output channel the robot can predict: where it stands in a trial's signals."""
 
     channel: Channel
-    group: str  # "marker" or "displacement"
+    group: str  # "marker", "displacement" or "tension"
     index: int  # marker or tendon, from 0
     axis: int  # 0, 1, 2 for x, y, z; 0 for a scalar
 
@@ -52,6 +55,16 @@ class Bench:
         return int(self.robot.structure["tendons"])  # type: ignore[call-overload]
 
     @property
+    def by_length(self) -> np.ndarray:
+        """(n_tendon,) whether a tendon is driven by its displacement."""
+        return self.inputs[0].by_length
+
+    @property
+    def reading(self) -> np.ndarray:
+        """(n_tendon,) what one reading of the driving channels is typically good for, N or m."""
+        return np.where(self.by_length, READING["tendon_displacement"], READING["tendon_tension"])
+
+    @property
     def n_sample(self) -> int:
         return sum(len(i.time) for i in self.inputs)
 
@@ -60,18 +73,12 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
     """The bench of a recording. Raises DataError where the inputs do not determine the robot, or no output is predictable."""
     notices = list(recording.notices)
     n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
-    drives = {c.index: c for c in recording.inputs() if c.kind == "tendon_tension"}
-    missing = [f"tendon_{i}_tension" for i in range(1, n_tendon + 1) if i not in drives]
-    if missing:
-        raise DataError(
-            f"{_where(recording)}: the inputs do not determine robot {robot.name!r}: no input channel {', '.join(missing)}; "
-            f"give all {n_tendon} tensions the role 'input'"
-        )
+    driven = _drives(recording, robot, n_tendon)
+    driving = {c.name for c in driven}
     notices += [
-        f"input {c.name} does not drive robot {robot.name!r} and is not used"
-        for c in recording.inputs()
-        if c.kind != "tendon_tension"
+        f"input {c.name} does not drive robot {robot.name!r} and is not used" for c in recording.inputs() if c.name not in driving
     ]
+    by_length = np.array([c.kind == "tendon_displacement" for c in driven])
     outputs, unknown = _outputs(recording, robot, n_tendon)
     if not outputs:
         raise DataError(f"{_where(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
@@ -82,18 +89,49 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
     inputs, measured = [], []
     for k in order:
         trial = recording.trials[k]
-        tension, note = _tensions(trial, [drives[i].name for i in range(1, n_tendon + 1)])
+        command, note = _commands(trial, [c.name for c in driven])
         notices += note
         notices += [f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in trial.other]
         inputs.append(
-            Inputs(trial.name, trial.time, clocks[k], tension, _temperature(recording, trial), _loads(recording, trial, robot))
+            Inputs(
+                trial.name,
+                trial.time,
+                clocks[k],
+                command,
+                by_length,
+                _temperature(recording, trial),
+                _loads(recording, trial, robot),
+            )
         )
         measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
     return Bench(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices))
 
 
+def drives(bench: Bench) -> list[Channel]:
+    """The channel that drives each tendon."""
+    return _drives(bench.recording, bench.robot, bench.n_tendon)
+
+
 def _where(recording: Recording) -> str:
     return str(recording.folder / "measurements.toml") if recording.folder else recording.title
+
+
+def _drives(recording: Recording, robot: Robot, n_tendon: int) -> list[Channel]:
+    """The channel that drives each tendon: its tension or its displacement. Raises DataError where one is missing or doubled."""
+    drives = []
+    for i in range(1, n_tendon + 1):
+        found = [c for c in recording.inputs() if c.kind in READING and c.index == i]
+        if not found:
+            raise DataError(
+                f"{_where(recording)}: the inputs do not determine robot {robot.name!r}: tendon {i} is not driven; give "
+                f"tendon_{i}_tension or tendon_{i}_displacement the role 'input'"
+            )
+        if len(found) > 1:
+            raise DataError(
+                f"{_where(recording)}: tendon {i} is driven twice, by {found[0].name} and {found[1].name}; make one an 'output'"
+            )
+        drives.append(found[0])
+    return drives
 
 
 def _outputs(recording: Recording, robot: Robot, n_tendon: int) -> tuple[tuple[Output, ...], list[str]]:
@@ -103,8 +141,8 @@ def _outputs(recording: Recording, robot: Robot, n_tendon: int) -> tuple[tuple[O
         name = channel.name.rpartition("_")[0]
         if channel.axis is not None and name in markers:
             found.append(Output(channel, "marker", markers.index(name), "xyz".index(channel.axis)))
-        elif channel.kind == "tendon_displacement" and channel.index is not None and channel.index <= n_tendon:
-            found.append(Output(channel, "displacement", channel.index - 1, 0))
+        elif channel.kind in READING and channel.index is not None and channel.index <= n_tendon:
+            found.append(Output(channel, channel.kind.removeprefix("tendon_"), channel.index - 1, 0))
         else:
             unknown.append(channel.name)
     return tuple(found), unknown
@@ -122,8 +160,8 @@ def _clocks(recording: Recording) -> tuple[list[np.ndarray], list[str]]:
     return clocks, ["some trials have no `start`: they are taken to follow each other without a pause, which blurs drift and creep"]
 
 
-def _tensions(trial: Trial, names: list[str]) -> tuple[np.ndarray, list[str]]:
-    """The driving tensions; a gap is bridged linearly, because the robot was pulled there too, and said so."""
+def _commands(trial: Trial, names: list[str]) -> tuple[np.ndarray, list[str]]:
+    """What drives the tendons; a gap is bridged linearly, because the robot was pulled there too, and said so."""
     columns, notes = [], []
     for name in names:
         values = trial.values[name]

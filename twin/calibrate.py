@@ -102,8 +102,12 @@ class Objective:
         self.bench, self.trials, self.whitener, self.jobs = bench, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(bench.measured[k]).sum() for k in trials))
 
-    def predict(self, twin: Twin, near: list[Trace] | None = None, keep: bool = False) -> tuple[list[Trace], list[np.ndarray]]:
-        traces = simulate(twin, self.bench, trials=self.trials, near=near, keep=keep, tolerance=TOLERANCE if keep else ROUGH)
+    def predict(
+        self, twin: Twin, near: list[Trace] | None = None, keep: bool = False, once: bool = False
+    ) -> tuple[list[Trace], list[np.ndarray]]:
+        traces = simulate(
+            twin, self.bench, trials=self.trials, near=near, keep=keep, tolerance=TOLERANCE if keep else ROUGH, once=once
+        )
         own = traces[-len(self.trials) :] if len(traces) == len(self.trials) else [traces[k] for k in self.trials]
         return traces, [readings(self.bench, report(twin.effects, t.true)) for t in own]
 
@@ -115,15 +119,16 @@ class Objective:
     def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
 
-    def columns(self, at: Evaluation, models: Sequence[tuple[Model, float]]) -> np.ndarray:
-        """White change of the residual per unit, (n, n_model), for neighbouring models and the size of their difference."""
+    def columns(self, at: Evaluation, models: Sequence[tuple[Model, float]], once: bool = False) -> np.ndarray:
+        """White change of the residual per unit, (n, n_model), for neighbouring models and the size of their difference;
+        with `once` to first order in it."""
 
         def column(model: Model, size: float) -> np.ndarray:
             if _same_simulation(at.model.twin, model.twin):
                 own = at.traces if len(at.traces) == len(self.trials) else [at.traces[k] for k in self.trials]
                 predicted = [readings(self.bench, report(model.twin.effects, t.true)) for t in own]
             else:
-                predicted = self.predict(model.twin, at.traces)[1]
+                predicted = self.predict(model.twin, at.traces, once=once)[1]
             raw = [self.bench.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]
             return self.white(raw) / size
 
@@ -141,12 +146,12 @@ class Objective:
             moved = x.copy()
             moved[i] += size
             neighbours.append((at.model.at(moved), size))
-        return self.columns(at, neighbours)
+        return self.columns(at, neighbours, once=True)
 
 
 def _same_simulation(a: Twin, b: Twin) -> bool:
     """Whether two twins differ in what sensors report of outputs only, so that one simulation serves both."""
-    physical = ("command", "drive", "edit", "surround", "route", "deform")
+    physical = ("command", "drive", "edit", "soften", "surround", "route", "deform")
 
     def acting(t: Twin) -> list[Effect]:
         return [e for e in t.effects if e.acts_in(*physical)]

@@ -109,15 +109,21 @@ class Dynamics:
 
     def solve(
         self, time: np.ndarray, tension: np.ndarray, loads: Loads, route: Route, creep: Creep, delayed: np.ndarray,
-        near: Path | None = None, keep: bool = False, tolerance: float = 0.0,
+        near: Path | None = None, keep: bool = False, tolerance: float = 0.0, by_length: np.ndarray | None = None,
+        stiffness: np.ndarray | None = None, once: bool = False,
     ) -> Path:  # fmt: skip
         """The motion under base tensions (n, n_tendon) N at times (n,) s, from rest in equilibrium under the first ones.
 
-        `near`, `keep` and `tolerance` are of the static solve only: a motion has no neighbour to start from.
+        `near`, `keep`, `tolerance`, `by_length` and `once` are of the static solve only: a motion has no neighbour to start from.
+        The body's `stiffness` (n,) counts with its mean: temperature changes little in a fast trial.
         """
-        start = self.statics.solve(time[:1], tension[:1], loads, route, creep, delayed)
+        scale = 1.0 if stiffness is None else float(np.mean(stiffness))
+        start = self.statics.solve(time[:1], tension[:1], loads, route, creep, delayed, stiffness=np.array([scale]))
         moving = Equilibrium(_loaded(self._body, loads.payload))
         model, data = moving.model, moving.data
+        for spring in (model.jnt_stiffness, model.tendon_stiffness, moving.chain.stiffness, moving.chain.coupling):
+            spring *= scale
+        moving.chain.slender[:] /= scale
         step = min(model.opt.timestep, STEP_PER_PRESLIDING * route.presliding) if route.mu > 0.0 else model.opt.timestep
         model.opt.timestep = step
         model.opt.gravity[:] = loads.gravity
@@ -138,7 +144,7 @@ class Dynamics:
             np.maximum(tension, 0.0, order="C"), marker, path, q,
         )  # fmt: skip
         finite = np.isfinite(marker).all(axis=(1, 2))
-        return Path(marker, path, q, np.where(finite, DIRECT, 0), start.started, slip, distal, start.LU)
+        return Path(np.array(tension), marker, path, q, np.where(finite, DIRECT, 0), start.started, slip, distal, start.LU)
 
 
 def _loaded(body: Body, payload: float) -> Body:

@@ -1,8 +1,9 @@
 """Measured - predicted, in sensor sigmas: how large the noise is, and the residual made white by it.
 
-Two noises meet in a marker. Its own, sigma, and that of the tension readings that drive the twin: a reading wrong by dT moves
-the predicted shape by G dT, the same way in all channels; so does a row whose tension and markers were not taken at quite the same
-moment, by a small share of the tension's change from row to row. With A = sigma_T G / sigma the residual in sigmas has covariance
+Two noises meet in a marker. Its own, sigma, and that of the readings that drive the twin (tensions or displacements): one wrong
+by du moves the predicted shape by G du, the same way in all channels; so does a row whose inputs and markers were not taken at
+quite the same moment, by a small share of the input's change from row to row. With A = sigma_u G / sigma the residual in sigmas has
+covariance
 I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Successive
 samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples.
 """
@@ -15,28 +16,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from twin.bench import Bench
+from twin.bench import Bench, drives
 
-SYNC = 0.05  # of a sample interval: how well tension and markers of one row are known to belong to the same moment
-SAME = 0.03  # two trials repeat each other if their tensions differ by less than this share of their range (RMS), or 3 sigma
+SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
+SAME = (
+    0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
+)
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: sigma (n_output,) SI per channel; tension (N) of a tension reading; rho (n_output,) lag-1."""
+    """Standard deviations: sigma (n_output,) SI per channel; drive (n_tendon,) N or m of a driving reading; rho (n_output,)
+    lag-1 correlation."""
 
     sigma: np.ndarray
-    tension: float
+    drive: np.ndarray
     rho: np.ndarray
     source: str
 
     def floor(self, bench: Bench, sensitivity: Sequence[np.ndarray]) -> dict[str, float]:
         """RMS error a perfect twin would still show, by group (m; Euclidean per marker).
 
-        The sensors' noise, and that of the tension readings it is driven by, through the sensitivities
-        (n_k, n_output, n_tendon) m/N.
+        The sensors' noise, and that of the readings it is driven by, through the sensitivities (n_k, n_output, n_tendon).
         """
-        driven = self.tension**2 * np.mean([(G**2).sum(axis=2).mean(axis=0) for G in sensitivity], axis=0)  # (n_output,)
+        driven = np.mean([((G * self.drive) ** 2).sum(axis=2).mean(axis=0) for G in sensitivity], axis=0)  # (n_output,)
         floors = {}
         for group in dict.fromkeys(o.group for o in bench.outputs):
             square = float(np.mean([self.sigma[j] ** 2 + driven[j] for j, o in enumerate(bench.outputs) if o.group == group]))
@@ -45,18 +48,18 @@ class Noise:
 
 
 class Whitener:
-    """Makes residuals and their derivatives white, given a Noise and the tension sensitivities G (n_k, n_output, n_tendon)."""
+    """Makes residuals and their derivatives white, given a Noise and sensitivities G (n_k, n_output, n_tendon) to the commands."""
 
     def __init__(
-        self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], tension: Sequence[np.ndarray]
+        self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], command: Sequence[np.ndarray]
     ) -> None:
         self.noise = noise
         self.present = [np.isfinite(y) for y in measured]
-        self._mix = [self._across(p, g, t) for p, g, t in zip(self.present, sensitivity, tension, strict=True)]
+        self._mix = [self._across(p, g, u) for p, g, u in zip(self.present, sensitivity, command, strict=True)]
 
-    def _across(self, present: np.ndarray, G: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        change = np.abs(np.diff(tension, axis=0, prepend=tension[:1], append=tension[-1:]))  # (n + 1, t)
-        spread = np.hypot(self.noise.tension, SYNC * np.maximum(change[1:], change[:-1]))  # (n, t) N
+    def _across(self, present: np.ndarray, G: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        change = np.abs(np.diff(command, axis=0, prepend=command[:1], append=command[-1:]))  # (n + 1, t)
+        spread = np.hypot(self.noise.drive, SYNC * np.maximum(change[1:], change[:-1]))  # (n, t)
         A = spread[:, None, :] * G / self.noise.sigma[:, None] * present[:, :, None]  # (n, m, t)
         eigen, V = np.linalg.eigh(np.einsum("nmt,nms->nts", A, A))
         eigen = np.maximum(eigen, 1e-12)
@@ -86,7 +89,7 @@ class Whitener:
 
 
 def repeats(bench: Bench) -> list[tuple[int, int]]:
-    """Pairs of trials that repeat each other: same loads, same number of samples, same tensions but for noise."""
+    """Pairs of trials that repeat each other: same loads, same number of samples, same commands but for noise."""
     pairs = []
     for a in range(len(bench.inputs)):
         for b in range(a + 1, len(bench.inputs)):
@@ -98,8 +101,8 @@ def repeats(bench: Bench) -> list[tuple[int, int]]:
             )
             if not same_loads or len(A.time) != len(B.time):
                 continue
-            span = max(np.ptp(A.tension), 1e-3)
-            if np.sqrt(np.mean((A.tension - B.tension) ** 2)) < max(SAME * span, 0.02):
+            a_u, b_u = A.command / bench.reading, B.command / bench.reading
+            if np.sqrt(np.mean((a_u - b_u) ** 2)) < max(SAME * np.ptp(a_u), 2.0):
                 pairs.append((a, b))
     return pairs
 
@@ -116,8 +119,8 @@ def estimate_noise(
     place = {k: i for i, k in enumerate(trials)}
     pairs = [(place[a], place[b]) for a, b in repeats(bench) if a in place and b in place]
     declared = np.array([o.channel.noise or np.nan for o in bench.outputs])
-    cells = [c.noise for c in bench.recording.inputs() if c.kind == "tendon_tension" and c.noise]
-    tension = float(np.mean(cells)) if cells else None
+    cells = np.array([c.noise or np.nan for c in drives(bench)])
+    drive = cells if np.isfinite(cells).all() else None
     notes = []
     if pairs:
         d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]].time) for a, b in pairs]
@@ -133,16 +136,17 @@ def estimate_noise(
     D, G_all = np.concatenate(d), np.concatenate(G)
     if source == "as declared":
         sigma = declared
-        if tension is None:
-            tension = _likeliest(D, G_all, member, len(groups), sigma=declared)[1]
+        if drive is None:
+            drive = _likeliest(D, G_all, member, len(groups), bench.reading, sigma=declared)[1]
     else:
-        sigma, fitted = _likeliest(D, G_all, member, len(groups), tension=tension)
-        tension = fitted if tension is None else tension
-    noise = Noise(sigma, float(tension), np.zeros(len(sigma)), source)
+        sigma, fitted = _likeliest(D, G_all, member, len(groups), bench.reading, drive=drive)
+        drive = fitted if drive is None else drive
+    noise = Noise(sigma, drive, np.zeros(len(sigma)), source)
     if pairs:
         noise = replace(noise, rho=_correlation(noise, d, G, member))
-    if not cells:
-        notes.append(f"no noise declared for the tension inputs: estimated as {1e3 * noise.tension:.0f} mN from the data")
+    if not np.isfinite(cells).all():
+        said = ", ".join(f"{1e3 * d:.3g} {'mm' if b else 'mN'}" for d, b in zip(drive, bench.by_length, strict=True))
+        notes.append(f"no noise declared for the inputs: estimated as {said} from the data")
     return noise, notes
 
 
@@ -160,28 +164,30 @@ def _detrended(d: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def _likeliest(
-    d: np.ndarray, G: np.ndarray, member: np.ndarray, n_group: int, *, tension: float | None = None, sigma: np.ndarray | None = None
-) -> tuple[np.ndarray, float]:
-    """Maximum-likelihood sigma per group and sigma_T for differences d (n, m) ~ N(0, diag sigma^2 + sigma_T^2 G G')."""
+    d: np.ndarray, G: np.ndarray, member: np.ndarray, n_group: int, reading: np.ndarray, *, drive: np.ndarray | None = None,
+    sigma: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Maximum-likelihood sigma per group and that of the inputs, a common multiple of `reading` (n_tendon,), for differences
+    d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G')."""
     rows = np.isfinite(d).all(axis=1)
     if rows.sum() < 10:
         rows = np.isfinite(d).any(axis=1)
     d, G = np.nan_to_num(d[rows]), G[rows]
     scale = np.array([max(1.4826 * np.median(np.abs(d[:, member == g])), 1e-9) for g in range(n_group)])
 
-    def unpack(x: np.ndarray) -> tuple[np.ndarray, float]:
+    def unpack(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         s = sigma if sigma is not None else (scale * np.exp(x[:n_group]))[member]
-        return s, tension if tension is not None else float(1e-2 * np.exp(x[-1]))
+        return s, drive if drive is not None else reading * np.exp(x[-1])
 
     def minus_log_likelihood(x: np.ndarray) -> float:
-        s, s_T = unpack(x)
-        A, r = s_T * G / s[:, None], d / s
+        s, s_u = unpack(x)
+        A, r = s_u * G / s[:, None], d / s
         inner = np.eye(G.shape[2]) + np.einsum("nmt,nms->nts", A, A)
         b = np.einsum("nmt,nm->nt", A, r)
         quadratic = (r**2).sum() - np.einsum("nt,nt->", b, np.linalg.solve(inner, b[..., None])[..., 0])
         return 0.5 * (quadratic + np.linalg.slogdet(inner)[1].sum()) + len(d) * np.log(s).sum()
 
-    start = np.zeros((0 if sigma is not None else n_group) + (tension is None))
+    start = np.zeros((0 if sigma is not None else n_group) + (drive is None))
     if start.size == 0:
         return unpack(start)
     bounds = [(-3.0, 3.0)] * start.size

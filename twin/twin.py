@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -70,12 +70,14 @@ def is_dynamic(bench: Bench) -> bool:
     period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static motion.
     """
     period = 1.0 / first_mode(bench.robot)
+    if bench.by_length.any():  # lengths are held by static solves only
+        return False
     for trial in bench.inputs:
         dt = np.diff(trial.time)
         width = int(np.ceil(0.3 * period / np.median(dt)))
         if width < 2:
             continue
-        smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(width) / width, "valid"), 0, trial.tension)  # noqa: B023
+        smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(width) / width, "valid"), 0, trial.command)  # noqa: B023
         span = np.ptp(smooth, axis=0)
         slope = np.abs(np.gradient(smooth, np.median(dt), axis=0)).max(axis=0)
         if np.any((span > 0.3) & (slope > 0.8 * span / period)):
@@ -85,21 +87,19 @@ def is_dynamic(bench: Bench) -> bool:
 
 def simulate(
     twin: Twin, bench: Bench, *, trials: Sequence[int] | None = None, near: Sequence[Trace] | None = None, keep: bool = False,
-    dynamic: bool = False, tolerance: float = TOLERANCE,
+    dynamic: bool = False, tolerance: float = TOLERANCE, once: bool = False,
 ) -> list[Trace]:  # fmt: skip
     """The true signals of the bench's trials (all, or those listed) in order of their clock.
 
     With creep every trial before is simulated too, since the body remembers. `near` (traces with kept tangents of a
-    neighbouring twin, same trials) speeds the solves up; `keep` keeps tangents for that. Raises SolveError where a
-    static equilibrium was not found.
+    neighbouring twin, same trials) speeds the solves up, with `once` to first order in the difference; `keep` keeps tangents for
+    that. Raises SolveError where a static equilibrium was not found.
     """
     body = twin.robot.build(twin.values)
     for effect in twin.effects:
         effect.edit(body)
     solver = Dynamics(body) if dynamic else Equilibrium(body)
-    creep = _merge([e.deform() for e in twin.effects])
-    routes = [r for e in twin.effects if (r := e.route()).mu > 0.0]
-    route = routes[0] if routes else Route()
+    creep, route = _merged_creep(twin.effects), _merged_route(twin.effects)
     wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.model.nv))
@@ -110,49 +110,56 @@ def simulate(
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
         close = near[position].path if near is not None and len(near) == len(run) else None
-        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep, tolerance)
+        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep, tolerance, once)
     return [traces[k] for k in (run if keep else wanted)]
 
 
 def _trial(
     twin: Twin, solver: Equilibrium | Dynamics, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray, near: Path | None,
-    keep: bool, tolerance: float,
+    keep: bool, tolerance: float, once: bool,
 ) -> Trace:  # fmt: skip
-    n = len(inputs.time)
-    seen = Signals(
-        inputs.time, inputs.clock, inputs.tension, np.zeros_like(inputs.tension), np.zeros((n, 0, 3)), inputs.temperature
-    )
+    n, by_length = len(inputs.time), inputs.by_length
+    driving = Signals(
+        inputs.time, inputs.clock, np.where(by_length, 0.0, inputs.command), np.where(by_length, inputs.command, 0.0),
+        np.zeros((n, 0, 3)), inputs.temperature, by_length,
+    )  # fmt: skip
     for effect in reversed(twin.effects):
-        seen = effect.command(seen)
-    tension = _driven(twin.effects, inputs.time, seen.tension)
+        driving = effect.command(driving)
+    for effect in twin.effects:
+        driving = effect.drive(driving)
     loads: Loads = inputs.loads
     for effect in twin.effects:
         loads = effect.surround(loads)
-    path = solver.solve(inputs.time, tension, loads, route, creep, delayed, near, keep, tolerance)
+    command = np.where(by_length, driving.displacement, driving.tension)
+    stiffness = np.ones(n)
+    for effect in twin.effects:
+        stiffness = stiffness * effect.soften(inputs.temperature)
+    path = solver.solve(inputs.time, command, loads, route, creep, delayed, near, keep, tolerance, by_length, stiffness, once)
     if not path.status.all():
         bad = int(np.flatnonzero(path.status == 0)[0])
+        pull = ", ".join(f"{1e3 * c:.2f} mm" if b else f"{c:.2f} N" for c, b in zip(command[bad], by_length, strict=True))
+        hint = "; displacements may pull against each other" if by_length.any() else ""
         raise SolveError(
-            f"{inputs.name}: no static equilibrium at sample {bad + 1} (t = {inputs.time[bad]:.3g} s, tensions "
-            f"{np.round(tension[bad], 2).tolist()} N, payload {loads.payload * 1e3:.3g} g); check the loads' units and directions"
+            f"{inputs.name}: no static equilibrium at sample {bad + 1} (t = {inputs.time[bad]:.3g} s, tendons {pull}, payload "
+            f"{loads.payload * 1e3:.3g} g); check the loads' units and directions{hint}"
         )
-    true = Signals(inputs.time, inputs.clock, tension, solver.straight_path - path.path, path.markers, inputs.temperature)
+    shortening = solver.straight_path - path.path + route.stretch * path.tension
+    true = Signals(
+        inputs.time, inputs.clock, path.tension, np.where(by_length, driving.displacement, shortening), path.markers,
+        inputs.temperature, by_length,
+    )  # fmt: skip
     return Trace(true, path)
 
 
-def _driven(effects: tuple[Effect, ...], time: np.ndarray, tension: np.ndarray) -> np.ndarray:
-    """Commands to tensions through every `drive` law with a memory, sample by sample."""
-    for effect in effects:
-        if not effect.acts_in("drive"):
-            continue
-        state, out = effect.start(tension[0]), np.empty_like(tension)
-        for i, dt in enumerate(np.diff(time, prepend=time[0])):
-            out[i], state = effect.drive(tension[i], state, float(dt))
-        tension = out
-    return tension
-
-
-def _merge(creeps: list[Creep]) -> Creep:
+def _merged_creep(effects: tuple[Effect, ...]) -> Creep:
+    creeps = [e.deform() for e in effects]
     return Creep(tuple(a for c in creeps for a in c.amplitude), tuple(t for c in creeps for t in c.time))
+
+
+def _merged_route(effects: tuple[Effect, ...]) -> Route:
+    routes = [e.route() for e in effects]
+    rubbing = next((r for r in routes if r.mu > 0.0), Route())
+    return replace(rubbing, stretch=sum(r.stretch for r in routes))
 
 
 def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
@@ -164,8 +171,8 @@ def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
 
 def readings(bench: Bench, seen: Signals) -> np.ndarray:
     """The bench's output channels of one trial's signals, (n, n_output)."""
-    columns = [seen.markers[:, o.index, o.axis] if o.group == "marker" else seen.displacement[:, o.index] for o in bench.outputs]
-    return np.stack(columns, axis=1)
+    of = {"marker": seen.markers, "displacement": seen.displacement[..., None], "tension": seen.tension[..., None]}
+    return np.stack([of[o.group][:, o.index, o.axis] for o in bench.outputs], axis=1)
 
 
 def unstable_starts(bench: Bench, traces: Sequence[Trace]) -> list[str]:

@@ -55,10 +55,10 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
     column = next((j for j, o in enumerate(bench.outputs) if o.channel.name == "disk_8_x"), 0)
     nominal, calibrated, after = [], [], []
     for y, i in zip(bench.measured, bench.inputs, strict=True):
-        side = np.sign(np.gradient(i.tension[:, 1], i.time))
+        side = np.sign(np.gradient(i.command[:, 1], i.time))
         noisy = y + rng.normal(0, SIGMA, y.shape)
         loop = np.zeros_like(y)
-        loop[:, column] = LOOP * side * i.tension[:, 1] / 2.0
+        loop[:, column] = LOOP * side * i.command[:, 1] / 2.0
         after.append(noisy)
         calibrated.append(noisy + loop)
         nominal.append(noisy + 2.0 * loop)
@@ -88,7 +88,9 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
             ci_calibrated=dict.fromkeys(groups, (6.9e-4, 8.8e-4)),
             ci_after=dict.fromkeys(groups, (last - 1e-5, last + 1e-5)),
         ),
-        noise=Noise(np.full(len(bench.outputs), SIGMA), 0.01, np.zeros(len(bench.outputs)), "2 pairs of repeated trials"),
+        noise=Noise(
+            np.full(len(bench.outputs), SIGMA), np.full(3, 0.01), np.zeros(len(bench.outputs)), "2 pairs of repeated trials"
+        ),
         structure_before=0.42,
         structure_after=0.21 if verdict == "partly_explained" else 0.02,
         structure={"static": 0.01, "direction": 0.2, "rate": 0.0},

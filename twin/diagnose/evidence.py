@@ -16,7 +16,7 @@ from twin.bench import Bench, Inputs
 
 COMPONENTS = ("static", "direction", "rate", "memory", "slow", "trial")
 IN_WORDS = {
-    "static": "the pose (tensions and payload)",
+    "static": "the pose (pull and payload)",
     "direction": "the direction of pull",
     "rate": "the rate of pull",
     "memory": "the recent past (2-30 s)",
@@ -39,8 +39,10 @@ class Regressors:
 def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     """What an unnamed error could move with, on the listed trials' samples (n, p)."""
     inputs = [bench.inputs[k] for k in trials]
-    span = max(max(float(i.tension.max()) for i in inputs), 1e-6)
-    u = [i.tension / span for i in inputs]
+    span = np.max([np.abs(i.command).max(axis=0) for i in inputs], axis=0)
+    for kind in (bench.by_length, ~bench.by_length):  # tendons driven alike have one scale
+        span[kind] = max(span[kind].max(initial=0.0), 1e-9)
+    u = [i.command / span for i in inputs]
     slopes = [_slope(i, w) for i, w in zip(inputs, u, strict=True)]
     typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
     U, dU = np.concatenate(u), np.concatenate(slopes)
@@ -51,7 +53,7 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     warm = (warm - warm.mean()) / max(float(warm.std()), 0.5)
     n_tendon = U.shape[1]
     blocks: dict[str, list[tuple[str, np.ndarray]]] = {c: [] for c in COMPONENTS}
-    T = [f"T{i + 1}" for i in range(n_tendon)]
+    T = [f"{'d' if b else 'T'}{i + 1}" for i, b in enumerate(bench.by_length)]
     static = blocks["static"]
     static.append(("1", np.ones(len(U))))
     for a in range(n_tendon):
@@ -86,7 +88,7 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
 
 
 def _slope(inputs: Inputs, u: np.ndarray) -> np.ndarray:
-    """du/dt (n, n_tendon) of tensions smoothed over three samples, so that noise alone makes no direction."""
+    """du/dt (n, n_tendon) of commands smoothed over three samples, so that noise alone makes no direction."""
     padded = np.pad(u, ((1, 1), (0, 0)), mode="edge")
     smooth = (padded[:-2] + padded[1:-1] + padded[2:]) / 3.0
     return np.gradient(smooth, inputs.time, axis=0) if len(u) > 1 else np.zeros_like(u)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.bench import Bench, Inputs
-from twin.calibrate import Fit, Objective
+from twin.calibrate import Evaluation, Fit, Objective
 from twin.errors import SolveError
 from twin.residual import Noise, Whitener
 
@@ -30,67 +30,75 @@ class Experiment:
 
 
 def menu(bench: Bench) -> list[tuple[str, Inputs]]:
-    """Trials this robot could run, within the tensions already used; payload up to three times as much, at most 30 g."""
+    """Trials this robot could run, within the commands already used; payload up to three times as much, at most 30 g.
+
+    Where displacements are commanded, the tendons that do not pull are paid out, so that they are slack.
+    """
     n = bench.n_tendon
-    top = max(float(i.tension.max()) for i in bench.inputs)
+    top = np.max([i.command.max(axis=0) for i in bench.inputs], axis=0)
+    top = np.where(bench.by_length, np.max(top[bench.by_length], initial=0.0), np.max(top[~bench.by_length], initial=0.0))
+    words = [f"{1e3 * x:.1f} mm" if b else f"{x:.1f} N" for x, b in zip(top, bench.by_length, strict=True)]
     heaviest = max(i.loads.payload for i in bench.inputs)
     payloads = sorted({0.0, min(0.03, max(0.01, 3.0 * heaviest))})
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
-    def add(words: str, duration: float, *columns: np.ndarray) -> None:
-        shapes.append((words, np.linspace(0.0, duration, len(columns[0])), np.stack(columns, axis=1)))
+    def add(label: str, duration: float, *shares: np.ndarray) -> None:
+        pull = np.stack(shares, axis=1)
+        command = top * np.where(bench.by_length & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
+        shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
+    hold = np.concatenate([[0.0], np.full(60, 0.75)])
     for i in range(n):
-        pull = [top * up_down if j == i else 0.0 * up_down for j in range(n)]
-        add(f"pull tendon {i + 1} to {top:.1f} N and release it, slowly (120 s)", 120.0, *pull)
-        add(f"pull tendon {i + 1} to {top:.1f} N and release it, fast (4 s)", 4.0, *pull)
-        hold = np.concatenate([[0.0], np.full(60, 0.75 * top)])
-        add(
-            f"step tendon {i + 1} to {0.75 * top:.1f} N and hold for 120 s",
-            120.0,
-            *(hold if j == i else 0.0 * hold for j in range(n)),
-        )
+        alone = np.eye(n)[i]
+        add(f"pull tendon {i + 1} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
+        add(f"pull tendon {i + 1} to {words[i]} and release it, fast (4 s)", 4.0, *np.outer(alone, up_down))
+        add(f"step tendon {i + 1} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
     turns = np.linspace(0, 4 * np.pi, 80)
-    circle = [0.6 * top * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
-    add(f"two circles with all tendons up to {0.6 * top:.1f} N (160 s)", 160.0, *circle)
-    add("rest unloaded for 60 s", 60.0, *(np.zeros(30) for _ in range(n)))
+    circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
+    if not bench.by_length.any():
+        add(f"two circles with all tendons up to 0.6 of {words[0]} (160 s)", 160.0, *circle)
+    add("rest unloaded for 60 s", 60.0, *np.zeros((n, 30)))
     last = max(float(i.clock[-1]) for i in bench.inputs)
     like = bench.inputs[0]
     out = []
     for payload in payloads:
-        for words, time, tension in shapes:
+        for motion, time, command in shapes:
             loads = replace(like.loads, payload=payload, force=np.zeros(3))
-            label = f"{words}, tip payload {1e3 * payload:.0f} g"
-            out.append((label, Inputs(label, time, last + 60.0 + time, tension, np.full(len(time), like.temperature[0]), loads)))
+            label = f"{motion}, tip payload {1e3 * payload:.0f} g"
+            warm = np.full(len(time), like.temperature[0])
+            out.append((label, Inputs(label, time, last + 60.0 + time, command, bench.by_length, warm, loads)))
     return out
 
 
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
     """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
-    best: Experiment | None = None
     rivals = tuple(e.id for e in a.model.twin.effects), tuple(e.id for e in b.model.twin.effects)
+    apart = []
     for words, inputs in menu(bench):
         n = len(inputs.time)
         empty = np.zeros((n, len(bench.outputs)))
         imagined = replace(bench, inputs=(inputs,), measured=(empty,))
-        whitener = Whitener(
-            replace(noise, tension=0.0), [empty], [np.zeros((n, len(bench.outputs), bench.n_tendon))], [inputs.tension]
-        )
+        exact = replace(noise, drive=np.zeros(bench.n_tendon))
+        whitener = Whitener(exact, [empty], [np.zeros((n, len(bench.outputs), bench.n_tendon))], [inputs.command])
         objective = Objective(imagined, [0], whitener, jobs)
         try:
-            T = _separation(objective, a, b)
+            at = objective.evaluate(b.model)
+            apart.append((words, objective, at, objective.evaluate(a.model).z - at.z))
         except SolveError:
             continue
+    best: Experiment | None = None
+    for words, objective, at, d in sorted(apart, key=lambda trial: -float(trial[3] @ trial[3])):
+        if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it
+            break
+        T = _separation(objective, b, at, d)
         if best is None or best.separation < T:
             best = Experiment(words, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))), rivals)
     return best if best is not None and best.repeats <= 50 else None
 
 
-def _separation(objective: Objective, a: Fit, b: Fit) -> float:
-    """|W (y_A - y_B)|^2 left when B's parameters move within their present covariance to imitate A."""
-    at = objective.evaluate(b.model)
-    d = objective.evaluate(a.model).z - at.z
+def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> float:
+    """What is left of |d|^2, d = W (y_A - y_B), when B's parameters move within their present covariance to imitate A."""
     J = objective.jacobian(at, range(len(b.model.free)))
     inner = b.information() + J.T @ J
     u = J.T @ d

@@ -43,7 +43,7 @@ def screen(objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Disc
     neighbours: dict[Twin, tuple[Model, float]] = {}
     index: dict[Twin, int] = {}  # several starts may share a pattern
     for identifier, law in catalogue().items():
-        if identifier in present:
+        if identifier in present or present & set(law.akin):
             continue
         for start in law.starts(predicted, bench.n_tendon):
             try:

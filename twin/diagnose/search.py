@@ -17,6 +17,10 @@ ACCEPT = 12.0  # evidence an effect must bring, after k log n: odds of e^6, safe
 WIDTH = 3  # models carried from level to level
 BEHIND = 400.0  # a model this far behind the best is not extended
 DEEPEST = 3  # effects at once
+MATERIAL = 0.1  # sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say
+FORM = 0.08  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
+PROMISE = 0.25  # of a material gain: what a first-order pattern must promise to be worth a refit
+ROUGHLY = 2e-4  # of the cost: the last step's fall at which a refit is weighed; what is left is second order in it
 
 Progress = Callable[[str], None]
 
@@ -60,13 +64,16 @@ def search(objective: Objective, evidence: Evidence, base: Weighed, progress: Pr
             if member.score < best_before - BEHIND:
                 continue
             for candidate in screen(objective, evidence, member.fit, member.discrepancy):
-                if candidate.gain < ACCEPT:
+                if candidate.gain < max(ACCEPT, PROMISE * _material(objective, base, member)):
                     continue
                 progress(f"level {level}: {' + '.join((*member.effects, candidate.effect))}")
                 found = _extended(objective, evidence, member, candidate.effect, dict(candidate.start.values), candidate.start.free)
                 if found is not None and (found.effects not in fresh or found.score > fresh[found.effects].score):
                     fresh[found.effects] = found
-        fresh = {k: _fuller(objective, evidence, w, k, progress) if w.score > best_before else w for k, w in fresh.items()}
+        leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
+        fresh = {
+            k: _fuller(objective, evidence, w, k, progress) if w.score > max(best_before, leading) else w for k, w in fresh.items()
+        }
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
         if not beam or beam[0].score < best_before + ACCEPT:
@@ -76,12 +83,18 @@ def search(objective: Objective, evidence: Evidence, base: Weighed, progress: Pr
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
+def _material(objective: Objective, base: Weighed, member: Weighed) -> float:
+    """The fall of |z|^2 below which an effect added to `member` would be immaterial."""
+    explained = max(0.0, float(base.fit.z @ base.fit.z - member.fit.z @ member.fit.z))
+    return max(MATERIAL**2 * objective.n, FORM**2 * explained)
+
+
 def _extended(
     objective: Objective, evidence: Evidence, member: Weighed, effect: str, values: dict[str, float], free: tuple[str, ...]
 ) -> Weighed | None:
     model = member.fit.model.with_effect(effect, values, free, objective.bench.n_tendon)
     try:
-        found = fit(objective, model, near=member.fit.evaluation, J=member.fit.J)
+        found = fit(objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY)
         return weigh(objective, evidence, found)
     except SolveError:
         return None

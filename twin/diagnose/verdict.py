@@ -11,7 +11,7 @@ from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Model, Objective, fit
 from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, spectral_peak
 from twin.diagnose.experiment import Experiment, next_experiment
-from twin.diagnose.search import ACCEPT, Progress, Search, Weighed, refit_without, search, weigh
+from twin.diagnose.search import ACCEPT, FORM, MATERIAL, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
 from twin.errors import DataError
 from twin.evaluate import rms, squares
@@ -20,8 +20,6 @@ from twin.quantities import Fitted
 from twin.residual import Noise, Whitener, estimate_noise
 from twin.twin import Trace, Twin, readings, report, simulate, unstable_starts
 
-MATERIAL = 0.1  # sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say
-FORM = 0.08  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
 LEFT = (
     0.15,
     0.3,
@@ -199,27 +197,27 @@ def calibration(recording: Recording, twin: Twin, settings: Settings | None = No
 def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
     """A first calibration under a guessed noise, and the objective every later fit uses."""
     measured = [bench.measured[k] for k in fitted]
-    tension = [bench.inputs[k].tension for k in fitted]
-    rough = np.array([2.5e-4 if o.group == "marker" else 5e-5 for o in bench.outputs])
-    first = Noise(rough, 0.0, np.zeros(len(rough)), "start")
+    command = [bench.inputs[k].command for k in fitted]
+    rough = np.array([{"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2}[o.group] for o in bench.outputs])
+    first = Noise(rough, np.zeros(bench.n_tendon), np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
-    objective = Objective(bench, fitted, Whitener(first, measured, none, tension), settings.jobs)
+    objective = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)
     start = fit(objective, Model.base(twin.robot, twin), tolerance=1e-3)
     unmeasured = objective.predict(start.model.twin, start.evaluation.traces)[1]
     sensitivity = _sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
-    return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity, tension), settings.jobs), notes
+    return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity, command), settings.jobs), notes
 
 
 def _sensitivity(
     bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: list[Trace] | None = None
 ) -> list[np.ndarray]:
-    """dy/dT (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each tension reading."""
-    step = 0.02
+    """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading."""
     out = [np.empty((*y.shape, bench.n_tendon)) for y in predicted]
     for t in range(bench.n_tendon):
+        step = 2.0 * bench.reading[t]
         push = step * np.eye(bench.n_tendon)[t]
-        moved = replace(bench, inputs=tuple(replace(i, tension=i.tension + push) for i in bench.inputs))
+        moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
         traces = simulate(twin, moved, trials=trials, near=near)
         for G, y, trace in zip(out, predicted, traces, strict=True):
             G[:, :, t] = (readings(bench, report(twin.effects, trace.true)) - y) / step

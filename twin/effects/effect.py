@@ -3,10 +3,11 @@
 A law acts in the places below, in the order of the signal, and in no other. State goes in and comes out; a law keeps none.
 
     command   reported input -> true input      (a load cell that misreads: the inverse of its `sense`)
-    drive     command -> tension at the base    (lag, saturation; with memory)
+    drive     command -> what the motors do     (lag, saturation, play)
     edit      the body                          (stiffness, rest shape, routing)
+    soften    temperature -> its stiffness
     surround  the loads on it                   (gravity, payload, a wall)
-    route     tension along the tendon          (friction)
+    route     along the tendon                  (friction, stretch)
     deform    slow change of the rest shape     (creep)
     sense     true output -> reported output    (frame, delay, drift)
 
@@ -39,10 +40,11 @@ class Loads:
 
 @dataclass(frozen=True)
 class Route:
-    """Friction along the tendon: coefficient and pre-sliding travel (m)."""
+    """A tendon: friction coefficient and pre-sliding travel (m), stretch (m/N)."""
 
     mu: float = 0.0
     presliding: float = 4e-4
+    stretch: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,9 @@ class Creep:
 class Signals:
     """The quantities of one trial that sensors see, true or reported; batch (sample) first.
 
-    time (n,) s in the trial; clock (n,) s since the first trial; tension (n, n_tendon) N; displacement (n, n_tendon) m;
-    markers (n, n_marker, 3) m; temperature (n,) K.
+    time (n,) s in the trial; clock (n,) s since the first trial; tension (n, n_tendon) N at the base; displacement (n, n_tendon) m
+    at the motor; markers (n, n_marker, 3) m; temperature (n,) K; by_length (n_tendon,): driven by displacement, else by tension.
+    On the way in (`command`, `drive`) what does not drive a tendon is zero.
     """
 
     time: np.ndarray
@@ -67,6 +70,7 @@ class Signals:
     displacement: np.ndarray
     markers: np.ndarray
     temperature: np.ndarray
+    by_length: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
 
     def with_(self, **changes: np.ndarray) -> Signals:
         return replace(self, **changes)
@@ -85,7 +89,8 @@ class Effect(ABC):
 
     `per_tendon` parameters exist once per tendon, as name_1, name_2, ... `shape` names parameters that mean nothing while
     the effect is OFF (a time constant of no creep). `richer` names parameters of a second, fuller law that stay OFF
-    until the plain one has been accepted. `moves_with` says in words what gives the effect away in a plot.
+    until the plain one has been accepted. `akin` names effects whose signature is so like this one's that both are never
+    claimed together. `moves_with` says in words what gives the effect away in a plot.
     """
 
     id: ClassVar[str]
@@ -93,6 +98,7 @@ class Effect(ABC):
     per_tendon: ClassVar[tuple[Parameter, ...]] = ()
     shape: ClassVar[tuple[str, ...]] = ()
     richer: ClassVar[tuple[str, ...]] = ()
+    akin: ClassVar[tuple[str, ...]] = ()
     guesses: ClassVar[tuple[Values, ...]] = ()
     moves_with: ClassVar[str]
 
@@ -151,15 +157,15 @@ class Effect(ABC):
     def command(self, reported: Signals) -> Signals:
         return reported
 
-    def start(self, tension: np.ndarray) -> Any:
-        """State of `drive` at rest under the first command (n_tendon,)."""
-        return None
-
-    def drive(self, tension: np.ndarray, state: Any, dt: float) -> tuple[np.ndarray, Any]:
-        return tension, state
+    def drive(self, command: Signals) -> Signals:
+        return command
 
     def edit(self, body: Any) -> None:
         """Change the body (a `twin.robots.Body`) before it is compiled."""
+
+    def soften(self, temperature: np.ndarray) -> np.ndarray | float:
+        """Stiffness of the body over that at its reference temperature, at `temperature` (n,) K."""
+        return 1.0
 
     def surround(self, loads: Loads) -> Loads:
         return loads

@@ -25,6 +25,7 @@ class TimeDelay(Effect):
 
     id = "time_delay"
     parameters = (Parameter("delay", 0.0, "s", -3.0, 3.0, "positive: outputs come late", scale=0.05),)
+    akin = ("actuator_lag",)
     guesses = ({"delay": 0.1},)
     moves_with = "the rate of change of the pull"
 
@@ -32,5 +33,6 @@ class TimeDelay(Effect):
         t = reported.time
         if self["delay"] == 0.0 or len(t) < 2:
             return reported
-        between = PchipInterpolator(t, reported.tension)
-        return reported.with_(tension=between(np.clip(t - self["delay"], t[0], t[-1])))
+        then = np.clip(t - self["delay"], t[0], t[-1])
+        pull, travel = PchipInterpolator(t, reported.tension), PchipInterpolator(t, reported.displacement)
+        return reported.with_(tension=pull(then), displacement=travel(then))

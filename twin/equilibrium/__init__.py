@@ -2,7 +2,8 @@
 
 engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic energy
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
-linear.py   factorisation                              trial.py    a trial, sample by sample
+linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
+trial.py    a trial, sample by sample
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from twin.effects import Creep, Loads, Route
 from twin.equilibrium.chain import Chain, Law, Load
 from twin.equilibrium.elastic import COUPLING
-from twin.equilibrium.trial import run
+from twin.equilibrium.lengths import STIFFEST
+from twin.equilibrium.trial import Drive, run
 from twin.robots import Body, available, hinge_pairs, load
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
@@ -28,9 +30,10 @@ __all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Path"
 
 @dataclass(frozen=True)
 class Path:
-    """The equilibria of one trial: markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad, status (n,), `started`;
-    slip states and distal tendon lengths (n_tendon, n_disk) at its end."""
+    """The equilibria of one trial: base tension (n, n_tendon) N, markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad,
+    status (n,), `started`; slip states and distal tendon lengths (n_tendon, n_disk) at its end."""
 
+    tension: np.ndarray
     markers: np.ndarray
     path: np.ndarray
     q: np.ndarray
@@ -92,22 +95,34 @@ class Equilibrium:
         self.straight_path: np.ndarray = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)  # (n_tendon,) m
 
     def solve(
-        self, time: np.ndarray, tension: np.ndarray, loads: Loads, route: Route | None = None, creep: Creep | None = None,
+        self, time: np.ndarray, command: np.ndarray, loads: Loads, route: Route | None = None, creep: Creep | None = None,
         delayed: np.ndarray | None = None, near: Path | None = None, keep: bool = False, tolerance: float = TOLERANCE,
+        by_length: np.ndarray | None = None, stiffness: np.ndarray | None = None, once: bool = False,
     ) -> Path:  # fmt: skip
-        """Equilibria for base tensions (n, n_tendon) N at times (n,) s, in the order of `twin.equilibrium.trial`.
+        """Equilibria for commands (n, n_tendon) at times (n,) s, in the order of `twin.equilibrium.trial`.
 
-        `delayed` (n_element, nv) holds the creep strains and is advanced in place. `near`, a solution with LU of a neighbouring
-        problem on the same samples, speeds the solve up. Where no equilibrium was found the sample's status is NOT_FOUND and
-        its shape is the one before.
+        A command is a base tension in N or, for the tendons of `by_length` (n_tendon,), a displacement in m. `delayed`
+        (n_element, nv) holds the creep strains and is advanced in place. `stiffness` (n,) scales the body's. `near`, a solution
+        with LU of a neighbouring problem on the same samples, speeds the solve up; with `once` one Newton step a sample is taken
+        from it. Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before.
         """
-        n, nt = tension.shape
+        n, nt = command.shape
         nv = self.model.nv
         route, creep = route or Route(), creep or Creep()
         amplitude, retardation = np.array(creep.amplitude, float), np.array(creep.time, float)
         if delayed is None:
             delayed = np.zeros((amplitude.size, nv))
+        by_length = np.zeros(nt, bool) if by_length is None else by_length
+        drive = Drive(
+            time=np.array(time, float),
+            command=np.where(by_length, command, np.maximum(command, 0.0)),
+            by_length=np.array(by_length, bool),
+            straight=self.straight_path,
+            stretch=max(float(route.stretch), STIFFEST),
+            stiffness=np.ones(n) if stiffness is None else np.array(stiffness, float),
+        )
         out = Path(
+            tension=np.empty((n, nt)),
             markers=np.empty((n, self.chain.marker.size, 3)),
             path=np.empty((n, nt)),
             q=np.empty((n, nv)),
@@ -127,16 +142,18 @@ class Equilibrium:
             amplitude,
             retardation,
             delayed,
-            np.array(time, float),
-            np.maximum(tension, 0.0, order="C"),
+            drive,
             near.q if near is not None else np.empty((0, nv)),
+            near.tension if near is not None else np.empty((0, nt)),
             near.LU if near is not None else np.empty((0, nv, nv)),
             float(tolerance),
             keep,
+            once,
             out.slip,
             out.distal,
             out.LU,
             out.q,
+            out.tension,
             out.markers,
             out.path,
             out.status,

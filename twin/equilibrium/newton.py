@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.compiled import assign, jit
+from twin.compiled import assign, dot, jit
+from twin.effects.tendon_friction import slip_state
 from twin.equilibrium.chain import balance
 from twin.equilibrium.engine import mj_com_pos, mj_kinematics
 from twin.equilibrium.linear import factorise, substitute
@@ -158,3 +159,36 @@ def solve(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol)
         return 1
     assign(q, start)
     return 2 if follow(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol) else 0
+
+
+@jit
+def commit(chain, law, z, s):
+    """Advance slip states and distal lengths to the geometry in MuJoCo's data."""
+    for t in range(z.shape[0]):
+        distal = 0.0
+        for d in range(z.shape[1] - 1, -1, -1):
+            a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
+            v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+            distal += np.sqrt(dot(v, v))
+            z[t, d] = slip_state(z[t, d], s[t, d] - distal, law.presliding)
+            s[t, d] = distal
+
+
+@jit
+def step_once(model, data, chain, rest, tension, law, load, z, s, q, LU):
+    """One Newton step from q with the factors LU of a neighbouring problem's tangent there. Commits (z, s).
+
+    Returns 1, or 0 where lost.
+    """
+    r, none = np.empty(q.size), np.empty((0, 0))
+    z1, s1 = np.empty(z.shape), np.empty(s.shape)
+    place(model, data, chain, q)
+    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
+    substitute(LU, r)
+    longest = 0.0
+    for i in range(q.size):
+        q[i] -= r[i]
+        longest = max(longest, abs(r[i]))
+    place(model, data, chain, q)
+    commit(chain, law, z, s)
+    return 1 if longest < LONGEST_STEP else 0

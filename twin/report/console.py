@@ -8,10 +8,10 @@ from rich.text import Text
 
 from twin.diagnose import Diagnosis
 from twin.report.contents import KINDS, experiment_words
-from twin.report.numbers import plus_minus
+from twin.report.numbers import SHOWN, plus_minus
 from twin.report.sections.before_after import rows
 from twin.report.sections.effects import table
-from twin.report.sentence import sentence
+from twin.report.sentence import headline, sentence
 
 
 def console(diagnosis: Diagnosis) -> RenderableType:
@@ -20,16 +20,21 @@ def console(diagnosis: Diagnosis) -> RenderableType:
     parts: list[RenderableType] = [Text(sentence(d), style="bold"), Text("")]
     for group in d.errors.after:
         error = _table(f"{KINDS.get(group, group).replace('_', ' ')} error on held-out trials ({d.bench.recording.source})")
-        for name, justify in (("", "left"), ("RMS, mm", "right"), ("95 % confidence", "right")):
+        for name, justify in (("", "left"), (f"RMS, {SHOWN[group][0]}", "right"), ("95 % confidence", "right")):
             error.add_column(name, justify=justify)  # type: ignore[arg-type]
         for row in rows(d, group):
             error.add_row(row["stage"], row["error"], row["interval"])
         parts += [error, Text("")]
     if d.claims:
         effects = _table("effects in force")
-        for name, justify in (("", "left"), ("parameters", "left"), ("probability", "right"), ("error without, mm", "right")):
+        for name, justify in (
+            ("", "left"),
+            ("parameters", "left"),
+            ("probability", "right"),
+            (f"error without, {SHOWN[headline(d)][0]}", "right"),
+        ):
             effects.add_column(name, justify=justify)  # type: ignore[arg-type]
-        for claim, row in zip(d.claims, table(d.claims), strict=True):
+        for claim, row in zip(d.claims, table(d.claims, headline(d)), strict=True):
             values = "\n".join(f"{n} = {plus_minus(f)}" for n, f in claim.parameters.items())
             effects.add_row(str(row["name"]), Text(values), str(row["probability"]), str(row["error"]))
         parts += [effects, Text("")]

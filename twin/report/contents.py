@@ -5,29 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twin.bench import Bench, drives
 from twin.diagnose import Claim, Diagnosis
 from twin.quantities import Fitted
-from twin.report.numbers import MM, finite
+from twin.report.numbers import SHOWN, finite
 from twin.report.sentence import headline, sentence, structure_left
 
 FORMAT = "twin-report/1"
-KINDS = {"marker": "position", "displacement": "tendon_displacement"}  # group of outputs -> kind in the report
+KINDS = {
+    "marker": "position",
+    "displacement": "tendon_displacement",
+    "tension": "tendon_tension",
+}  # group of outputs -> kind in the report
 
 
 def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """The report as JSON's own types: plain floats, None where there is no number. Effects' and robot's parameters are SI."""
     d = diagnosis
     left = structure_left(d)
+    _, factor = SHOWN[headline(d)]
     return {
         "format": FORMAT,
         "verdict": d.verdict,
         "summary": sentence(d),
         "effects": [
-            {"id": c.effect, "parameters": _parameters(c.parameters), "error_without": finite(c.error, MM), **_weight(c)}
+            {"id": c.effect, "parameters": _parameters(c.parameters), "error_without": finite(c.error, factor), **_weight(c)}
             for c in d.claims
         ],
         "candidates": [
-            {"id": c.effect, "error": finite(c.error, MM), "parameters": _parameters(c.parameters), **_weight(c)}
+            {"id": c.effect, "error": finite(c.error, factor), "parameters": _parameters(c.parameters), **_weight(c)}
             for c in d.runners_up
         ],
         "error": _error(d),
@@ -90,16 +96,17 @@ def _error(d: Diagnosis) -> dict[str, Any]:
 
 def _of_group(d: Diagnosis, group: str) -> dict[str, Any]:
     e = d.errors
+    unit, factor = SHOWN[group]
     return {
-        "unit": "mm",
-        "nominal": finite(e.nominal[group], MM),
-        "calibrated": finite(e.calibrated[group], MM),
-        "after": finite(e.after[group], MM),
+        "unit": unit,
+        "nominal": finite(e.nominal[group], factor),
+        "calibrated": finite(e.calibrated[group], factor),
+        "after": finite(e.after[group], factor),
         "ci95": {
-            "calibrated": [finite(x, MM) for x in e.ci_calibrated[group]],
-            "after": [finite(x, MM) for x in e.ci_after[group]],
+            "calibrated": [finite(x, factor) for x in e.ci_calibrated[group]],
+            "after": [finite(x, factor) for x in e.ci_after[group]],
         },
-        "noise_floor": finite(e.floor[group], MM),
+        "noise_floor": finite(e.floor[group], factor),
     }
 
 
@@ -107,9 +114,19 @@ def _noise(d: Diagnosis) -> dict[str, Any]:
     outputs = d.bench.outputs
     return {
         "source": d.noise.source,
-        "tension": {"value": finite(d.noise.tension), "unit": "N"},
+        "inputs": {
+            c.name: {"sigma": finite(float(s), SHOWN[of][1]), "unit": SHOWN[of][0]}
+            for c, s, of in zip(drives(d.bench), d.noise.drive, driven(d.bench), strict=True)
+        },
         "channels": {
-            o.channel.name: {"sigma": finite(float(s), MM), "unit": "mm", "correlation": finite(float(r))}
+            o.channel.name: {
+                "sigma": finite(float(s), SHOWN[o.group][1]), "unit": SHOWN[o.group][0], "correlation": finite(float(r)),
+            }
             for o, s, r in zip(outputs, d.noise.sigma, d.noise.rho, strict=True)
         },
-    }
+    }  # fmt: skip
+
+
+def driven(bench: Bench) -> list[str]:
+    """What drives each tendon: "tension" or "displacement"."""
+    return ["displacement" if b else "tension" for b in bench.by_length]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from twin.quantities import Fitted
 
 MM = 1e3  # m -> mm
+SHOWN = {"marker": ("mm", MM), "displacement": ("mm", MM), "tension": ("N", 1.0)}  # group of outputs -> unit and factor from SI
 NONE = "\N{EN DASH}"  # where there is no number
 MINUS = "\N{MINUS SIGN}"
 FRIENDLY = {  # SI unit -> (shown unit, factor)

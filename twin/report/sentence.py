@@ -6,7 +6,7 @@ from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.diagnose.verdict import LINE
 from twin.effects import named
-from twin.report.numbers import MM, number, percent, plus_minus, upper_first
+from twin.report.numbers import SHOWN, number, percent, plus_minus, upper_first
 
 MOST = 3  # parameters of an effect named in a sentence
 
@@ -55,10 +55,11 @@ def rivals(diagnosis: Diagnosis) -> list[str]:
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, what it rests on, and the error on trials no fit has seen."""
     d, group, e = diagnosis, headline(diagnosis), diagnosis.errors
-    nominal, before, after, floor = (number(x[group] * MM) for x in (e.nominal, e.calibrated, e.after, e.floor))
+    unit, factor = SHOWN[group]
+    nominal, before, after, floor = (number(x[group] * factor) for x in (e.nominal, e.calibrated, e.after, e.floor))
     count = len(d.held_trials)
     unseen = f"on {count} trial{'s' if count != 1 else ''} no fit has seen"
-    error = f"error is {after} mm, from {nominal} mm as described (noise floor {floor} mm)"
+    error = f"error is {after} {unit}, from {nominal} {unit} as described (noise floor {floor} {unit})"
     if d.verdict == "noise":
         return f"No missing effect: after calibration only noise is left; {unseen} the {error}."
     left = structure_left(d)
@@ -74,7 +75,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     they = "Together they explain" if many else "It explains"
     explains = "" if share is None else f"{they} {percent(share)} of the structured error; "
     verb = "falls" if e.after[group] < e.calibrated[group] else "goes"
-    change = f"the error {verb} from {before} to {after} mm (noise floor {floor} mm)"
+    change = f"the error {verb} from {before} to {after} {unit} (noise floor {floor} {unit})"
     others = rivals(d)
     doubt = f" These data cannot tell {'them' if many else 'it'} from {' or '.join(others[:2])}." if others else ""
     rest = f" What is left moves mostly with {left}." if left else ""

@@ -32,17 +32,18 @@ class Variable:
 def variables(bench: Bench) -> Iterator[tuple[str, Variable]]:
     """Each variable with its kind, as `giveaway.WORDS` names it."""
     inputs, n = bench.inputs, bench.n_sample
-    tension = np.concatenate([i.tension for i in inputs])
-    slope = np.concatenate([_slopes(i.time, i.tension) for i in inputs])
+    pull = np.concatenate([i.command for i in inputs]) * np.where(bench.by_length, 1e3, 1.0)
+    slope = np.concatenate([_slopes(i.time, i.command) for i in inputs]) * np.where(bench.by_length, 1e3, 1.0)
     still = STILL * np.median(np.abs(slope), axis=0)
-    strongest = np.argmax(tension, axis=1)
+    strongest = np.argmax(pull, axis=1)
     every, no = np.ones(n, bool), np.zeros(n)
     for t in range(bench.n_tendon):
         side = np.where(np.abs(slope[:, t]) > still[t], np.sign(slope[:, t]), 0.0)
-        title, which, shown = f"tension of tendon {t + 1} (N)", f"in which tendon {t + 1} pulls hardest", strongest == t
-        yield "loop", Variable(title, tension[:, t], side, shown, True, which)
-        yield "tension", Variable(title, tension[:, t], no, shown, False, which)
-        yield "rate", Variable(f"rate of tendon {t + 1}'s tension (N/s)", slope[:, t], no, every)
+        what, unit = ("displacement", "mm") if bench.by_length[t] else ("tension", "N")
+        title, which, shown = f"{what} of tendon {t + 1} ({unit})", f"in which tendon {t + 1} pulls hardest", strongest == t
+        yield "loop", Variable(title, pull[:, t], side, shown, True, which)
+        yield "tension", Variable(title, pull[:, t], no, shown, False, which)
+        yield "rate", Variable(f"rate of tendon {t + 1}'s {what} ({unit}/s)", slope[:, t], no, every)
     for kind, title, parts in (
         ("elapsed", "time in the trial (s)", [i.time - i.time[0] for i in inputs]),
         ("clock", "time since the first trial (min)", [i.clock / 60.0 for i in inputs]),
@@ -70,10 +71,10 @@ def _of_the_tip(bench: Bench) -> Iterator[tuple[str, str, np.ndarray]]:
     yield "reach", f"distance of {name} from the z axis (mm)", np.hypot(at[:, 0], at[:, 1])
 
 
-def _slopes(time: np.ndarray, tension: np.ndarray) -> np.ndarray:
-    """dT/dt (n, n_tendon) in N/s, smoothed over five samples so that noise alone makes no direction."""
+def _slopes(time: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """du/dt (n, n_tendon) in N/s or m/s, smoothed over five samples so that noise alone makes no direction."""
     if len(time) < 2:
-        return np.zeros_like(tension)
-    padded = np.pad(tension, ((2, 2), (0, 0)), mode="edge")
+        return np.zeros_like(command)
+    padded = np.pad(command, ((2, 2), (0, 0)), mode="edge")
     smooth = sum(padded[k : k + len(time)] for k in range(5)) / 5.0
     return np.gradient(smooth, time, axis=0)

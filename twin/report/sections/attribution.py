@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from twin.diagnose import Claim
-from twin.report.numbers import MM, column, percent, plus_minus
+from twin.report.numbers import SHOWN, column, percent, plus_minus
 from twin.report.sections.section import Section, Story
-from twin.report.sentence import effect_words
+from twin.report.sentence import effect_words, headline
 
 
 def section(story: Story) -> Section:
@@ -17,16 +17,17 @@ def section(story: Story) -> Section:
         "attribution.html",
         {
             "claimed": claimed,
-            "runners_up": _table(d.runners_up),
+            "unit": SHOWN[headline(d)][0],
+            "runners_up": _table(d.runners_up, headline(d)),
             "too_small": [effect_words(c.effect) for c in d.below_materiality],
             "ambiguous": [" with ".join(effect_words(e) for e in effects) for effects in d.ambiguous],
-            "small": _table(d.below_materiality),
+            "small": _table(d.below_materiality, headline(d)),
         },
     )
 
 
-def _table(claims: tuple[Claim, ...]) -> list[dict[str, object]]:
-    errors = column([MM * c.error for c in claims])
+def _table(claims: tuple[Claim, ...], group: str) -> list[dict[str, object]]:
+    errors = column([SHOWN[group][1] * c.error for c in claims])
     moved = column([c.contribution for c in claims], 2)
     return [
         {

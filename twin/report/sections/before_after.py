@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
 from twin.report.contents import KINDS, labels
-from twin.report.numbers import MM, number, places, upper_first
+from twin.report.numbers import SHOWN, number, places, upper_first
 from twin.report.plots import ACCENT, BEFORE, MEASURED, Plot, figure
 from twin.report.sections.section import Section, Story
 
@@ -16,13 +16,16 @@ ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with th
 def section(story: Story) -> Section:
     d = story.diagnosis
     groups = list(d.errors.after)
-    tables = [{"kind": upper_first(KINDS.get(g, g).replace("_", " ")), "rows": rows(d, g), "plot": _plot(d, g)} for g in groups]
+    tables = [
+        {"kind": upper_first(KINDS.get(g, g).replace("_", " ")), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)}
+        for g in groups
+    ]
     return Section("before-after", "Before and after", "before_after.html", {"tables": tables, "trials": labels(d, d.held_trials)})
 
 
 def rows(d: Diagnosis, group: str) -> list[dict[str, str]]:
-    """The table: stage, error, 95 % interval, all in mm with the same decimals; the noise floor last."""
-    floor = MM * d.errors.floor[group]
+    """The table: stage, error, 95 % interval, all in the unit people read with the same decimals; the noise floor last."""
+    floor = SHOWN[group][1] * d.errors.floor[group]
     decimals = places([floor], 3)
     out = []
     for stage in stages(d):
@@ -38,15 +41,16 @@ def stages(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _of(d: Diagnosis, stage: str, group: str) -> tuple[float, tuple[float, float] | None]:
-    """Error and its interval (mm) at a stage; nominal has none."""
+    """Error and its interval, in the unit people read, at a stage; nominal has none."""
     e = d.errors
     value = {"nominal": e.nominal, "calibrated": e.calibrated, "after": e.after}[stage][group]
     interval = {"calibrated": e.ci_calibrated, "after": e.ci_after}.get(stage, {}).get(group)
-    return MM * value, None if interval is None else (MM * interval[0], MM * interval[1])
+    factor = SHOWN[group][1]
+    return factor * value, None if interval is None else (factor * interval[0], factor * interval[1])
 
 
 def _plot(d: Diagnosis, group: str) -> Plot:
-    shown = stages(d)
+    shown, (unit, factor) = stages(d), SHOWN[group]
     found = [_of(d, s, group) for s in shown]
     ends = [interval or (value, value) for value, interval in found]
     values = [value for value, _ in found]
@@ -65,13 +69,13 @@ def _plot(d: Diagnosis, group: str) -> Plot:
         width=0.5,
         marker={"color": [BEFORE] * (len(shown) - 1) + [ACCENT]},
         error_x=spread,
-        hovertemplate="%{y}: %{x:.3f} mm<extra></extra>",
+        hovertemplate=f"%{{y}}: %{{x:.3f}} {unit}<extra></extra>",
     )
     height = 100 + 44 * len(shown)
     out = figure([bars], height, showlegend=False, margin={"l": 120, "r": 14, "t": 28, "b": 50})
     out.update_yaxes(autorange="reversed", ticks="", showgrid=False)
-    out.update_xaxes(title_text="root-mean-square error (mm)", rangemode="tozero")
-    floor = MM * d.errors.floor[group]
+    out.update_xaxes(title_text=f"root-mean-square error ({unit})", rangemode="tozero")
+    floor = factor * d.errors.floor[group]
     out.add_vline(x=floor, line={"color": MEASURED, "width": 1.2, "dash": "dot"})
     out.add_annotation(x=floor, y=1, yref="paper", yanchor="bottom", text="noise floor", showarrow=False, font={"size": 12})
     return Plot("Error before and after, with the noise floor", height, out)

@@ -6,9 +6,9 @@ import sys
 
 from twin.diagnose import Claim
 from twin.effects import named
-from twin.report.numbers import MM, column, percent, plus_minus, upper_first
+from twin.report.numbers import SHOWN, column, percent, plus_minus, upper_first
 from twin.report.sections.section import Section, Story
-from twin.report.sentence import effect_words, explained_share
+from twin.report.sentence import effect_words, explained_share, headline
 
 
 def section(story: Story) -> Section:
@@ -19,7 +19,8 @@ def section(story: Story) -> Section:
         "Missing effects" if len(d.claims) != 1 else "Missing effect",
         "effects.html",
         {
-            "effects": table(d.claims),
+            "effects": table(d.claims, headline(d)),
+            "unit": SHOWN[headline(d)][0],
             "verdict": d.verdict,
             "before": f"{d.structure_before:.2f}",
             "after": f"{d.structure_after:.2f}",
@@ -28,9 +29,9 @@ def section(story: Story) -> Section:
     )
 
 
-def table(claims: tuple[Claim, ...]) -> list[dict[str, object]]:
-    """Rows of effects in words; errors (mm) with common decimals."""
-    errors = column([MM * c.error for c in claims])
+def table(claims: tuple[Claim, ...], group: str) -> list[dict[str, object]]:
+    """Rows of effects in words; errors with common decimals."""
+    errors = column([SHOWN[group][1] * c.error for c in claims])
     moved = column([c.contribution for c in claims])
     return [
         {

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.report.contents import KINDS
-from twin.report.numbers import MM, column
+from twin.report.contents import KINDS, driven
+from twin.report.numbers import SHOWN, column
 from twin.report.sections.section import Section, Story
 
 
@@ -15,16 +15,18 @@ def section(story: Story) -> Section:
     rows = []
     for g in groups:
         j = [i for i, o in enumerate(d.bench.outputs) if o.group == g]
-        sigma = MM * d.noise.sigma[j]
+        sigma = SHOWN[g][1] * d.noise.sigma[j]
         low, high = column([float(sigma.min()), float(sigma.max())])
         rows.append(
             {
                 "kind": KINDS.get(g, g).replace("_", " "),
                 "channels": len(j),
+                "unit": SHOWN[g][0],
                 "sigma": low if low == high else f"{low} to {high}",
                 "rho": f"{float(np.mean(d.noise.rho[j])):.2f}",
-                "floor": column([MM * d.errors.floor[g]])[0],
+                "floor": column([SHOWN[g][1] * d.errors.floor[g]])[0],
             }
         )
-    content = {"rows": rows, "tension": f"{1e3 * d.noise.tension:.1f}", "origin": d.noise.source}
+    inputs = [f"{SHOWN[of][1] * s:.3g} {SHOWN[of][0]}" for s, of in zip(d.noise.drive, driven(d.bench), strict=True)]
+    content = {"rows": rows, "inputs": ", ".join(inputs), "origin": d.noise.source}
     return Section("noise", "The noise", "noise.html", content)

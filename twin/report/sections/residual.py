@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
 from twin.report.giveaway import Giveaway, giveaways, means
-from twin.report.numbers import MINUS, upper_first
+from twin.report.numbers import MINUS, SHOWN, upper_first
 from twin.report.plots import ACCENT, MEASURED, MOST_POINTS, Plot, figure, numbers, thin
 from twin.report.sections.section import Section, Story
 from twin.report.stages import Stage, before_and_after, residuals
@@ -31,15 +31,16 @@ def section(story: Story) -> Section:
 
 
 def plots(d: Diagnosis, giveaway: Giveaway, stages: tuple[Stage, Stage]) -> list[Plot]:
-    """The same axes twice: one residual (mm) before, one after."""
-    sides = [1e3 * np.concatenate(residuals(d, s))[:, giveaway.column] for s in stages]
+    """The same axes twice: one residual, in the unit people read, before, one after."""
+    channel = d.bench.outputs[giveaway.column]
+    unit, factor = SHOWN[channel.group]
+    sides = [factor * np.concatenate(residuals(d, s))[:, giveaway.column] for s in stages]
     seen = [np.abs(r[np.isfinite(r) & giveaway.variable.shown]) for r in sides]
     reach = 1.1 * max((float(np.quantile(r, 0.998)) for r in seen if r.size), default=1.0)
-    name = d.bench.outputs[giveaway.column].channel.name
-    return [_plot(giveaway, r, s, reach, name) for r, s in zip(sides, stages, strict=True)]
+    return [_plot(giveaway, r, s, reach, channel.channel.name, unit) for r, s in zip(sides, stages, strict=True)]
 
 
-def _plot(giveaway: Giveaway, residual: np.ndarray, stage: Stage, reach: float, name: str) -> Plot:
+def _plot(giveaway: Giveaway, residual: np.ndarray, stage: Stage, reach: float, name: str, unit: str) -> Plot:
     v = giveaway.variable
     ok = v.shown & np.isfinite(v.values) & np.isfinite(residual)
     branches = [(ok, "mean", ACCENT)]
@@ -50,16 +51,16 @@ def _plot(giveaway: Giveaway, residual: np.ndarray, stage: Stage, reach: float, 
         keep = np.flatnonzero(mask)
         keep = keep[thin(len(keep), MOST_POINTS // len(branches))]
         x, y = numbers(v.values[keep]), numbers(residual[keep])
-        hover = "%{x:.3g}, %{y:.3f} mm<extra></extra>"
+        hover = f"%{{x:.3g}}, %{{y:.3f}} {unit}<extra></extra>"
         faint = {"color": color, "size": 4, "opacity": 0.35}
         dots.append(go.Scatter(x=x, y=y, mode="markers", marker=faint, showlegend=False, hovertemplate=hover))
         if mask.sum() > 3:
             x, y = means(v.values[mask], residual[mask])
             line = {"width": 2.5, "color": color if v.loop else MEASURED}
-            hover = f"{words} %{{y:.3f}} mm<extra></extra>"
+            hover = f"{words} %{{y:.3f}} {unit}<extra></extra>"
             style = {"mode": "lines+markers", "line": line, "marker": {"size": 6}, "name": words, "showlegend": v.loop}
             lines.append(go.Scatter(x=numbers(x), y=numbers(y), hovertemplate=hover, **style))
     out = figure(dots + lines, HEIGHT)
     out.update_xaxes(title_text=v.words)
-    out.update_yaxes(title_text=f"{name}, measured {MINUS} predicted (mm)", range=[-reach, reach])
+    out.update_yaxes(title_text=f"{name}, measured {MINUS} predicted ({unit})", range=[-reach, reach])
     return Plot(f"Residual of {name} against {v.words}, {stage.words}", HEIGHT, out)

@@ -8,6 +8,7 @@ from plotly.subplots import make_subplots
 
 from twin.diagnose import Diagnosis
 from twin.report.contents import labels
+from twin.report.numbers import SHOWN
 from twin.report.plots import MEASURED, MOST_POINTS, Plot, figure, numbers, plain, thin
 from twin.report.sections.section import Section, Story
 from twin.report.stages import before_and_after, markers, residuals
@@ -38,24 +39,28 @@ def _telling(d: Diagnosis, columns: list[int]) -> int:
 def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
     time = d.bench.inputs[k].time
     stages = before_and_after(d)
+    unit, factor = SHOWN[d.bench.outputs[columns[0]].group]
     n_row = len(columns) + 1
     keep = thin(len(time), MOST_POINTS // (3 * n_row))
     grid = make_subplots(rows=n_row, cols=1, shared_xaxes=True, vertical_spacing=0.03)
     for row, j in enumerate(columns, 1):
         for s in stages:
-            y = numbers(1e3 * d.predictions[s.key][k][keep, j])
+            y = numbers(factor * d.predictions[s.key][k][keep, j])
             grid.add_trace(_line(time[keep], y, s.words, s.color, row == 1), row=row, col=1)
         dots = {"size": 4, "color": MEASURED}
-        grid.add_trace(go.Scatter(x=numbers(time[keep]), y=numbers(1e3 * d.bench.measured[k][keep, j]), mode="markers", marker=dots,
+        y = numbers(factor * d.bench.measured[k][keep, j])
+        grid.add_trace(go.Scatter(x=numbers(time[keep]), y=y, mode="markers", marker=dots,
                                   name="measured", showlegend=row == 1), row=row, col=1)  # fmt: skip
     for s in stages:
-        off = 1e3 * np.sqrt((residuals(d, s)[k][:, columns] ** 2).sum(axis=1))[keep]
+        off = factor * np.sqrt((residuals(d, s)[k][:, columns] ** 2).sum(axis=1))[keep]
         grid.add_trace(_line(time[keep], numbers(off), s.words, s.color, False), row=n_row, col=1)
     height = ROW * n_row + 60
     out = figure(list(grid.data), height, **{a: grid.layout[a] for a in grid.layout if a.startswith(("xaxis", "yaxis"))})
     for row, j in enumerate(columns, 1):
-        out.update_yaxes(title_text=f"{d.bench.outputs[j].channel.name} (mm)", selector={"anchor": "x" if row == 1 else f"x{row}"})
-    out.update_yaxes(title_text="error (mm)", rangemode="tozero", selector={"anchor": f"x{n_row}"})
+        out.update_yaxes(
+            title_text=f"{d.bench.outputs[j].channel.name} ({unit})", selector={"anchor": "x" if row == 1 else f"x{row}"}
+        )
+    out.update_yaxes(title_text=f"error ({unit})", rangemode="tozero", selector={"anchor": f"x{n_row}"})
     out.update_xaxes(title_text="time (s)", selector={"anchor": f"y{n_row}"})
     out.update_layout(hovermode="x", margin_l=72)
     return Plot(f"Time series of {plain(labels(d, (k,))[0])}", height, out)
@@ -63,4 +68,4 @@ def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
 
 def _line(x: np.ndarray, y: np.ndarray, name: str, color: str, legend: bool) -> go.Scatter:
     return go.Scatter(x=numbers(x), y=y, mode="lines", name=name, line={"color": color, "width": 2}, showlegend=legend,
-                      hovertemplate="%{y:.3f} mm")  # fmt: skip
+                      hovertemplate="%{y:.3f}")  # fmt: skip

@@ -1,0 +1,29 @@
+"""Temperature softening: the body's stiffness depends on temperature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.effects.effect import Effect
+from twin.quantities import Parameter
+
+REFERENCE = 296.15  # K, 23 degC: where stiffness is quoted
+SOFTEST = 0.05  # of the stiffness there: what is left of a body that has all but melted
+
+
+class TemperatureSoftening(Effect):
+    """Stiffness K(theta) = K_23 (1 - rate (theta - 23 degC)); a negative rate stiffens (superelastic NiTi).
+
+    Source: first-order Taylor expansion. Silicone and nylon lose 0.2-1 % per kelvin near room temperature; superelastic NiTi gains.
+
+    >>> TemperatureSoftening(rate=0.01).soften(np.array([296.15, 306.15])).round(3).tolist()
+    [1.0, 0.9]
+    """
+
+    id = "temperature_softening"
+    parameters = (Parameter("rate", 0.0, "1/K", -0.1, 0.1, "plastics near room temperature: 0.002-0.01", scale=0.003),)
+    guesses = ({"rate": 0.005},)
+    moves_with = "the room's temperature"
+
+    def soften(self, temperature: np.ndarray) -> np.ndarray:
+        return np.maximum(SOFTEST, 1.0 - self["rate"] * (temperature - REFERENCE))

@@ -1,0 +1,59 @@
+"""Tendon backlash: play or slack between drive and tendon."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.compiled import jit
+from twin.effects.effect import Effect, Signals
+from twin.quantities import Parameter
+
+
+@jit
+def lead(travelled, swap, z):
+    """Side of the gap z in [-1, 1] for travel (n, m), from the middle at rest: z = clip(z + d travel / swap, -1, 1)."""
+    for j in range(travelled.shape[1]):
+        before, side = 0.0, 0.0
+        for i in range(travelled.shape[0]):
+            side = min(1.0, max(-1.0, side + (travelled[i, j] - before) / swap))
+            before = travelled[i, j]
+            z[i, j] = side
+
+
+class TendonBacklash(Effect):
+    """Displacement at the motor = that of the tendon + slack + gap/2 z, z = +1 after pulling in, -1 after paying out.
+
+    The side z changes over the travel `swap`; with swap = gap/2 the tendon stands still while the motor crosses the gap (the play
+    operator), with less it is a spring-loaded one. `slack` is what must be taken up before the tendon pulls.
+
+    Source: play operator (Krasnosel'skii and Pokrovskii). Worn gears, a loose coupling, a slack line: tenths of a millimetre.
+
+    >>> u = np.array([[0.0], [1e-3], [0.5e-3]])
+    >>> s = Signals(u[:, 0], u[:, 0], 0 * u, u, np.zeros((3, 0, 3)), u[:, 0], np.array([True]))
+    >>> (1e3 * TendonBacklash(gap=2e-4, swap=1e-4).drive(s).displacement[:, 0]).round(3).tolist()
+    [0.0, 0.9, 0.6]
+    """
+
+    id = "tendon_backlash"
+    parameters = (
+        Parameter("gap", 0.0, "m", 0.0, 2e-2, "gears and couplings: 0.05-1 mm at the tendon", scale=5e-5),
+        Parameter("swap", 1e-4, "m", 1e-5, 1e-2, "half the gap for pure play; ours", scale=5e-5),
+        Parameter("slack", 0.0, "m", -2e-2, 2e-2, "a line cut too long; negative: pre-tensioned", scale=5e-5),
+    )
+    shape = ("swap",)
+    richer = ("slack",)
+    guesses = ({"gap": 2e-4},)
+    moves_with = "the direction of travel"
+
+    def drive(self, command: Signals) -> Signals:
+        moved = command.displacement - self["slack"] - 0.5 * self["gap"] * self._side(command.displacement)
+        return command.with_(displacement=np.where(command.by_length, moved, command.displacement))
+
+    def sense(self, true: Signals) -> Signals:
+        ahead = true.displacement + self["slack"] + 0.5 * self["gap"] * self._side(true.displacement)
+        return true.with_(displacement=np.where(true.by_length, true.displacement, ahead))
+
+    def _side(self, travelled: np.ndarray) -> np.ndarray:
+        z = np.empty_like(travelled)
+        lead(np.ascontiguousarray(travelled), self["swap"], z)
+        return z

@@ -1,0 +1,200 @@
+"""Tensions that hold given tendon lengths, where motors command displacements: a tendon pulls or is slack, it never pushes.
+
+For each such tendon   T >= 0,   gap = path(T) - free length - stretch T <= 0,   T gap = 0.
+
+Newton on shape and tensions at once: dpath_i/dT_j = -A_i J^-1 B_j with A_i = dpath_i/dq, B_j = dr/dT_j and J the tangent of the
+balance; which tendons are taut is settled on the linear problem.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.compiled import assign, dot, jit
+from twin.effects.tendon_friction import turn
+from twin.equilibrium.chain import balance, lever
+from twin.equilibrium.linear import factorise, substitute
+from twin.equilibrium.newton import CONTRACTION, LONGEST_STEP, LOST, commit, is_minimum, place
+
+CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
+STIFFEST = 1e-6  # m/N of any tendon: three taut ones on a straight robot are redundant, 4 um at 4 N decide between them
+STEPS = 12
+SMALLEST = 1e-3  # of a jump
+
+
+@jit
+def pulls(chain, law, z, path_gradient, pull):
+    """dpath/dq and dr/dT, (n_tendon, nv) each, at the geometry in MuJoCo's data and committed slip states z."""
+    nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
+    for t in range(nt):
+        wrapped, share = 0.0, 1.0
+        before = (0.0, 0.0, 0.0)
+        for d in range(nd):
+            a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
+            v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+            length = np.sqrt(dot(v, v))
+            u = (v[0] / length, v[1] / length, v[2] / length)
+            if d > 0 and law.mu > 0.0:
+                wrapped += z[t, d] * turn(np.arccos(min(1.0, dot(before, u))))[0]
+                share = np.exp(-law.mu * wrapped)
+            before = u
+            for i in range(chain.first[d], chain.first[d + 1]):
+                path_gradient[t, i] = dot(u, lever(chain.axis[i], b, chain.anchor[i]))
+                pull[t, i] = share * path_gradient[t, i]
+
+
+@jit
+def settle(C, gap, T, by_length, dT):
+    """dT with C dT = gap for the tendons that end up taut, T + dT = 0 for those that end up slack, 0 where tension is given."""
+    nt = T.size
+    taut, M = np.empty(nt, np.bool_), np.empty((nt, nt))
+    for t in range(nt):
+        taut[t] = by_length[t] and (T[t] > 0.0 or gap[t] > 0.0)
+    for _ in range(2 * nt + 2):
+        for i in range(nt):
+            dT[i] = gap[i] if taut[i] else (-T[i] if by_length[i] else 0.0)
+            for j in range(nt):
+                M[i, j] = C[i, j] if taut[i] else 0.0
+            if not taut[i]:
+                M[i, i] = 1.0
+        if not factorise(M):
+            return False
+        substitute(M, dT)
+        worst, change = 1e-12, -1
+        for i in range(nt):
+            if not by_length[i]:
+                continue
+            if taut[i]:
+                violation = -(T[i] + dT[i])  # pushes
+            else:
+                violation = gap[i]  # still too long
+                for j in range(nt):
+                    violation -= C[i, j] * dT[j]
+                violation /= C[i, i]
+            if violation > worst:
+                worst, change = violation, i
+        if change < 0:
+            return True
+        taut[change] = not taut[change]
+    return True
+
+
+@jit
+def reach(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, held, free, stretch):
+    """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N), from that at `held`;
+    their tensions are found. Where the jump is too far for Newton it is made in ever smaller parts.
+
+    Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits (z, s); with parts, after each.
+    """
+    nt = tension.size
+    q0, T0, T1, way = q.copy(), tension.copy(), tension.copy(), np.empty(nt)
+    if hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, free, stretch) == 1:
+        return 1
+    done, part = 0.0, 0.25
+    while done < 1.0:
+        for t in range(nt):
+            way[t] = held[t] + (done + part) * (free[t] - held[t])
+            tension[t] = T0[t]
+        assign(q, q0)
+        fresh[0] = False
+        if hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, way, stretch) == 1:
+            done += part
+            part = min(2.0 * part, 1.0 - done)
+            assign(q0, q)
+            assign(T0, tension)
+        else:
+            part *= 0.5
+            if part < SMALLEST:
+                for t in range(nt):
+                    tension[t] = T1[t]
+                return 0
+    return 2
+
+
+@jit
+def advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch):
+    """One Newton step on shape and tensions together, with the factors LU and the balance's (r, z1, s1) at q.
+
+    Returns the longest change of a hinge (rad), negative where the lengths have no solution.
+    """
+    nt, nv = tension.size, q.size
+    A, B, C, gap, dT = np.empty((nt, nv)), np.empty((nt, nv)), np.empty((nt, nt)), np.empty(nt), np.empty(nt)
+    pulls(chain, law, z1, A, B)
+    substitute(LU, r)
+    for j in range(nt):
+        substitute(LU, B[j])
+        for i in range(nt):
+            C[i, j] = dot_n(A[i], B[j])
+        C[j, j] += stretch
+        gap[j] = s1[j, 0] - free[j] - stretch * tension[j] - dot_n(A[j], r)
+    if not settle(C, gap, tension, by_length, dT):
+        return -1.0
+    longest = 0.0
+    for i in range(nv):
+        step = r[i]
+        for t in range(nt):
+            step += dT[t] * B[t, i]
+        q[i] -= step
+        longest = max(longest, abs(step))
+    for t in range(nt):
+        tension[t] = max(0.0, tension[t] + dT[t])
+    return longest
+
+
+@jit
+def hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, free, stretch):
+    """Newton on shape and tensions at once, with the chord LU while it contracts. Returns 1 and commits (z, s), or 0."""
+    nt = tension.size
+    r, none = np.empty(q.size), np.empty((0, 0))
+    z1, s1 = np.empty(z.shape), np.empty(s.shape)
+    before = 1e300
+    for _ in range(STEPS):
+        place(model, data, chain, q)
+        balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
+        size = 0.0
+        for i in range(q.size):
+            size = max(size, abs(r[i] / chain.stiffness[i]))
+        for t in range(nt):
+            if by_length[t]:
+                gap = s1[t, 0] - free[t] - stretch * tension[t]
+                size = max(size, (abs(gap) if tension[t] > 0.0 else gap) / CLOSED)
+        if size < tol:
+            for t in range(nt):
+                assign(z[t], z1[t])
+                assign(s[t], s1[t])
+            return 1
+        if not size < LOST:
+            return 0
+        if not fresh[0] or size > CONTRACTION * before:
+            fresh[0] = is_minimum(model, data, chain, rest, tension, law, load, z, s, q, LU)
+            if not fresh[0]:
+                return 0
+        before = size
+        longest = advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch)
+        if longest < 0.0 or longest > LONGEST_STEP:
+            return 0
+    return 0
+
+
+@jit
+def hold_once(model, data, chain, rest, law, load, z, s, q, LU, tension, by_length, free, stretch):
+    """One Newton step on shape and tensions from a neighbouring solution with the factors LU of its tangent. Commits (z, s).
+
+    Returns 1, or 0 where lost.
+    """
+    r, none = np.empty(q.size), np.empty((0, 0))
+    z1, s1 = np.empty(z.shape), np.empty(s.shape)
+    place(model, data, chain, q)
+    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
+    longest = advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch)
+    place(model, data, chain, q)
+    commit(chain, law, z, s)
+    return 1 if 0.0 <= longest < LONGEST_STEP else 0
+
+
+@jit
+def dot_n(a, b):
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
