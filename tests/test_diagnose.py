@@ -222,7 +222,7 @@ def test_repeats_tell_the_noise(declared: bool) -> None:
     np.testing.assert_allclose(noise.sigma[12:], SIGMA_D, rtol=0, atol=0.1 * SIGMA_D)
     assert noise.drive == pytest.approx(np.full(3, SIGMA_T), abs=0 if declared else 0.1 * SIGMA_T)
     np.testing.assert_array_equal(noise.rho, 0.0)
-    assert any("no noise declared for the tension" in note for note in notes) != declared
+    assert any("no noise declared for the inputs" in note for note in notes) != declared
     assert "6 pairs" in noise.source
 
 

@@ -17,7 +17,7 @@ from tools.bench.effects.effect import Effect as Truth
 from twin.bench import prepare
 from twin.calibrate import Fit, fit
 from twin.diagnose.evidence import Evidence
-from twin.diagnose.screen import screen
+from twin.diagnose.screen import dictionary, screen
 from twin.diagnose.search import _fuller, weigh
 from twin.diagnose.verdict import Settings, _objective
 from twin.effects import catalogue
@@ -91,9 +91,8 @@ def fitted_alone(bench: Day, effect: str) -> tuple[Fit, Fit, Truth]:
     start, objective, _ = _objective(prepared, Twin.of(robot), trials, Settings())
     base = fit(objective, start, refresh=True)
     evidence = Evidence(prepared, trials)
-    found = [
-        c for c in screen(objective, evidence, base, weigh(objective, evidence, base).discrepancy, top=99) if c.effect == effect
-    ]
+    every = screen(objective, evidence, base, weigh(objective, evidence, base).discrepancy, dictionary(objective, base), top=99)
+    found = [c for c in every if c.effect == effect]
     assert found, "the screening must see an effect of this size"
     fits = [fit(objective, base.model.with_effect(effect, c.start.values, c.start.free, 3), J=base.J) for c in found]
     best = weigh(objective, evidence, min(fits, key=lambda f: f.cost))

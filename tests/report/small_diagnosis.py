@@ -10,6 +10,7 @@ from twin import robots
 from twin.bench import prepare
 from twin.diagnose import Claim, Diagnosis, Errors, Settings
 from twin.diagnose.experiment import Experiment
+from twin.diagnose.identifiability import Visibility
 from twin.effects import named
 from twin.measurements import Channel, Recording, Trial
 from twin.quantities import Fitted
@@ -98,6 +99,11 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         line=(2.0, 0.1),
         worst_channel="disk_8_x",
         description="A smooth part is left.",
+        identifiability=(
+            Visibility("tendon_friction", 0.1, 0.1, 0.8, "backbone_creep", ("mu", 0.004, "1"), ()),
+            Visibility("time_delay", 0.1, 0.3, 0.06, "actuator_lag", ("delay", 0.01, "s"), ("two rates of pull, ten times apart",)),
+            Visibility("tendon_elasticity", np.inf, np.inf, 0.0, "", ("stretch", np.inf, "m/N"), ("tendon displacements",)),
+        ),
         ambiguous=(("tendon_routing", "time_delay"),) if found else (),
         experiment=EXPERIMENT if verdict != "noise" else None,
         bench=bench,

@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from tools.bench.day import make_set
+from tools.bench.day import MISMATCH, make_set
 from tools.bench.design import DESIGNS
 from tools.bench.effects import all_effects
 
@@ -26,6 +26,7 @@ def main() -> None:
     parser.add_argument("--displacement", action="store_true", help="also log tendon displacements")
     parser.add_argument("--ambient", action="store_true", help="also log the ambient temperature")
     parser.add_argument("--coloured", action="store_true", help="marker noise AR(1) 0.4 with Student-t tails, 5 degrees")
+    parser.add_argument("--mismatch", default="built", choices=MISMATCH, help="how far the robot is from its description")
     args = parser.parse_args()
 
     began = time.perf_counter()
@@ -42,6 +43,7 @@ def main() -> None:
         displacement=args.displacement,
         ambient=args.ambient,
         coloured=args.coloured,
+        mismatch=args.mismatch,
         progress=progress,
     )
     print(file=sys.stderr)

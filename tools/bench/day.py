@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,9 @@ from tools.bench.nuisance import built
 from tools.bench.sensors import Noise
 from tools.bench.write import write_set, write_truth
 
+MISMATCH = {"exact": 0.0, "built": 1.0, "rough": 1.5}  # how far the robot is from its description, in tolerances
+UNNAMED = {"soft_spot": 0.15, "helix": 0.05}  # what a rough robot has besides, that no parameter spans: some 0.1 sigma together
+
 
 def make_set(
     folder: Path,
@@ -26,13 +30,14 @@ def make_set(
     displacement: bool = False,
     ambient: bool = False,
     coloured: bool = False,
+    mismatch: str = "built",
     progress: Callable[[str], None] = lambda what: None,
 ) -> list[tuple[Effect, float]]:
-    """Write the set; returns each effect as scaled and the sigmas it leaves."""
+    """Write the set; returns each effect as scaled and the sigmas it leaves. `mismatch` is one of MISMATCH."""
     known = all_effects()
     # Streams of their own, so that adding an effect changes neither robot nor day.
     robot, motions, instruments, laws = (np.random.default_rng([seed, n]) for n in range(4))
-    rod = built(robot)
+    rod = built(robot, spread=MISMATCH[mismatch])
     day = bench_day(design, motions)
     noise = Noise.draw(instruments, coloured)
     found = []
@@ -40,7 +45,8 @@ def make_set(
         progress(f"scaling {name}")
         found.append(scaled(known[name].draw(laws), amplitude, Scale(rod, day, noise)))
     chosen = [effect for effect, _ in found]
-    logs = run(rod, chosen, day, lambda done: progress(f"trial {done} of {len(day.trials)}"))
+    unnamed = [replace(known[n].draw(laws), strength=s) for n, s in UNNAMED.items()] if mismatch == "rough" else []
+    logs = run(rod, [*chosen, *unnamed], day, lambda done: progress(f"trial {done} of {len(day.trials)}"))
     title = f"Virtual bench day {seed}"
     write_set(
         folder,
@@ -53,5 +59,5 @@ def make_set(
         ambient=ambient or any(e.needs_ambient for e in chosen),
         exact_input=any(e.logs_command for e in chosen),
     )
-    write_truth(folder, seed, design, rod, found, noise)
+    write_truth(folder, seed, design, rod, found, noise, mismatch)
     return found

@@ -90,11 +90,14 @@ def _write_csv(path: Path, table: np.ndarray, formats: list[str], names: list[st
     path.write_text("\n".join(rows) + "\n")
 
 
-def write_truth(folder: Path, seed: int, design: str, rod: Rod, effects: Sequence[tuple[Effect, float]], noise: Noise) -> None:
+def write_truth(
+    folder: Path, seed: int, design: str, rod: Rod, effects: Sequence[tuple[Effect, float]], noise: Noise, mismatch: str = "built"
+) -> None:
     """What the set's reader is to find out: effects with their amplitude in sigmas, the built robot, the noise."""
     truth = {
         "seed": seed,
         "design": design,
+        "mismatch": mismatch,
         "effects": [
             {"id": e.id, "in_catalogue": e.in_catalogue, "seen_in": e.seen_in, "sigmas": round(a, 3), "parameters": asdict(e)}
             for e, a in effects

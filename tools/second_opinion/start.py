@@ -9,7 +9,7 @@ import numpy as np
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Objective, fit
 from twin.diagnose.evidence import COMPONENTS, Discrepancy, Evidence
-from twin.diagnose.screen import Candidate, screen
+from twin.diagnose.screen import Candidate, dictionary, screen
 from twin.diagnose.split import split
 from twin.diagnose.verdict import Settings, _objective  # the diagnosis's own noise and calibration, whatever they become
 from twin.effects import catalogue
@@ -49,7 +49,7 @@ class Calibrated:
         n_group = len(self.evidence.groups)
         none = Discrepancy(0.0, np.zeros(0), np.full((n_group, len(COMPONENTS)), 1e-8), np.zeros((0, 0)))
         best: dict[str, Candidate] = {}
-        for candidate in screen(self.objective, self.evidence, at, none, top=len(catalogue())):
+        for candidate in screen(self.objective, self.evidence, at, none, dictionary(self.objective, at), top=len(catalogue())):
             best.setdefault(candidate.effect, candidate)
         return list(best.values())
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tools.attribution import same
+from tools.attribution_table import same
 
 
 def table(rows: list[dict]) -> str:

@@ -2,6 +2,7 @@
 
 split.py       trials no fit may see
 evidence.py    named effects against "some smooth error"
+identifiability.py  what these data cannot tell
 screen.py      which effects are worth a refit
 search.py      beam search over sets of effects
 verdict.py     gates, the verdict, and its numbers

@@ -28,18 +28,30 @@ class Candidate:
         return max(self.gain_white, self.gain_beside)
 
 
-def screen(objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, top: int = 4) -> list[Candidate]:
-    """The `top` candidates by either measure, best first, at most two starts an effect.
+@dataclass(frozen=True)
+class Pattern:
+    """What an effect would do first: its start, the amplitudes switched on one by one, and where their columns stand."""
 
-    With c the effect's white pattern (per free parameter), J the model's derivatives with their priors P and V the residual's
-    covariance (I, or I + Phi D Phi'): A = c' V^-1 c - c' V^-1 J (J' V^-1 J + P)^-1 J' V^-1 c, u = c' V^-1 z less the same
-    projection, gain = u' A^-1 u - p log n. A one-sided effect whose best amplitude is negative gains nothing.
-    """
+    effect: str
+    start: Start
+    amplitudes: tuple[str, ...]
+    where: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Dictionary:
+    """First-order patterns of all effects not yet in a fitted model: white columns (n, n_column), per unit of each amplitude."""
+
+    patterns: tuple[Pattern, ...]
+    columns: np.ndarray
+
+
+def dictionary(objective: Objective, fit: Fit) -> Dictionary:
+    """Patterns of every effect of the catalogue that the model lacks and that is not akin to one it has."""
     bench = objective.bench
     present = {e.id for e in fit.model.twin.effects}
-    traces = fit.evaluation.traces
-    predicted = [report(fit.model.twin.effects, t.true) for t in traces]
-    patterns: list[tuple[str, Start, list[str], list[int]]] = []
+    predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces]
+    patterns: list[Pattern] = []
     neighbours: dict[Twin, tuple[Model, float]] = {}
     index: dict[Twin, int] = {}  # several starts may share a pattern
     for identifier, law in catalogue().items():
@@ -50,14 +62,24 @@ def screen(objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Disc
                 models, names = _patterns(fit.model, bench, identifier, start)
             except TwinError:
                 continue
-            patterns.append((identifier, start, names, [index.setdefault(m.twin, len(index)) for m, _ in models]))
+            where = tuple(index.setdefault(m.twin, len(index)) for m, _ in models)
+            patterns.append(Pattern(identifier, start, tuple(names), where))
             neighbours |= {m.twin: (m, size) for m, size in models}
-    columns = _solvable_columns(objective, fit, list(neighbours.values()))
-    both = np.concatenate([fit.J, columns, fit.z[:, None]], axis=1)
-    gains = []
-    for X in (both, evidence.whiten(discrepancy, both)):
-        gains.append(_gains(both, X, fit, patterns, bench.n_tendon, objective.n))
-    found = [Candidate(e, s, a, b) for (e, s, _, _), a, b in zip(patterns, *gains, strict=True)]
+    return Dictionary(tuple(patterns), _solvable_columns(objective, fit, list(neighbours.values())))
+
+
+def screen(
+    objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, known: Dictionary, top: int = 4
+) -> list[Candidate]:
+    """The `top` candidates by either measure, best first, at most two starts an effect.
+
+    With c the effect's white pattern (per free parameter), J the model's derivatives with their priors P and V the residual's
+    covariance (I, or I + Phi D Phi'): A = c' V^-1 c - c' V^-1 J (J' V^-1 J + P)^-1 J' V^-1 c, u = c' V^-1 z less the same
+    projection, gain = u' A^-1 u - p log n. A one-sided effect whose best amplitude is negative gains nothing.
+    """
+    both = np.concatenate([fit.J, known.columns, fit.z[:, None]], axis=1)
+    white, beside = (gains(both, X, fit, known, objective) for X in (both, evidence.whiten(discrepancy, both)))
+    found = [Candidate(p.effect, p.start, a, b) for p, a, b in zip(known.patterns, white, beside, strict=True)]
     chosen: list[Candidate] = []
     for key in ("gain_white", "gain_beside"):
         taken = 0
@@ -99,32 +121,35 @@ def _solvable_columns(objective: Objective, fit: Fit, neighbours: list[tuple[Mod
         return out
 
 
-def _gains(
-    X: np.ndarray, VX: np.ndarray, fit: Fit, patterns: list[tuple[str, Start, list[str], list[int]]], n_tendon: int, n: int
-) -> list[float]:
-    """Gain of every pattern; X = [J, columns, z] and VX = V^-1 X."""
+def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
+    """X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X."""
     k = fit.J.shape[1]
     S = X.T @ VX
-    prior = np.zeros(S.shape[0])
-    prior[:k] = prior_weight(fit.model) ** 2
-    JJ = S[:k, :k] + np.diag(prior[:k]) + 1e-9 * np.eye(k)
-    projected = S - S[:, :k] @ np.linalg.solve(JJ, S[:k, :])
+    JJ = S[:k, :k] + np.diag(prior_weight(fit.model) ** 2) + 1e-9 * np.eye(k)
+    return S - S[:, :k] @ np.linalg.solve(JJ, S[:k, :])
+
+
+def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective: Objective) -> list[float]:
+    """Gain of every pattern; X = [J, columns, z] and VX = V^-1 X."""
+    k = fit.J.shape[1]
+    left = projected(X, VX, fit)
+    raw = np.einsum("ni,ni->i", X, VX)
     out = []
-    for identifier, _, names, where in patterns:
-        index = k + np.array(where)
-        A, u = projected[np.ix_(index, index)], projected[index, -1]
-        keep = np.diag(A) > 1e-6 * np.maximum(np.diag(S)[index], 1e-12)
+    for pattern in known.patterns:
+        index = k + np.array(pattern.where)
+        A, u = left[np.ix_(index, index)], left[index, -1]
+        keep = np.diag(A) > 1e-6 * np.maximum(raw[index], 1e-12)
         if not keep.any():
             out.append(-np.inf)
             continue
         A, u = A[np.ix_(keep, keep)], u[keep]
         # z falls by column * amplitude, columns being changes of the residual: amplitude = -A^-1 u
         amplitude = -np.linalg.solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), u)
-        table = {p.name: p for p in catalogue()[identifier].declared(n_tendon)}
-        used = [n for n, kept in zip(names, keep, strict=True) if kept]
+        table = {p.name: p for p in catalogue()[pattern.effect].declared(objective.bench.n_tendon)}
+        used = [n for n, kept in zip(pattern.amplitudes, keep, strict=True) if kept]
         one_sided = [table[n].low >= table[n].value for n in used]
         if any(o and a < 0 for o, a in zip(one_sided, amplitude, strict=True)):
             out.append(-np.inf)
             continue
-        out.append(float(-u @ amplitude - len(used) * np.log(n)))
+        out.append(float(-u @ amplitude - len(used) * np.log(objective.n)))
     return out

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.calibrate import Fit, Objective, fit
 from twin.diagnose.evidence import Discrepancy, Evidence
-from twin.diagnose.screen import screen
+from twin.diagnose.screen import Dictionary, dictionary, screen
 from twin.effects import catalogue
 from twin.errors import SolveError
 
@@ -53,8 +53,8 @@ def weigh(objective: Objective, evidence: Evidence, fitted: Fit) -> Weighed:
     return Weighed(fitted, gain - prior - fitted.effective_parameters() * float(np.log(objective.n)), discrepancy)
 
 
-def search(objective: Objective, evidence: Evidence, base: Weighed, progress: Progress) -> Search:
-    """From the calibrated base to the best set of effects."""
+def search(objective: Objective, evidence: Evidence, base: Weighed, patterns: Dictionary, progress: Progress) -> Search:
+    """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
     known: dict[tuple[str, ...], Weighed] = {base.effects: base}
     beam = [base]
     for level in range(1, DEEPEST + 1):
@@ -63,7 +63,8 @@ def search(objective: Objective, evidence: Evidence, base: Weighed, progress: Pr
         for member in beam:
             if member.score < best_before - BEHIND:
                 continue
-            for candidate in screen(objective, evidence, member.fit, member.discrepancy):
+            lacks = patterns if member is base else dictionary(objective, member.fit)
+            for candidate in screen(objective, evidence, member.fit, member.discrepancy, lacks):
                 if candidate.gain < max(ACCEPT, PROMISE * _material(objective, base, member)):
                     continue
                 progress(f"level {level}: {' + '.join((*member.effects, candidate.effect))}")

@@ -11,6 +11,8 @@ from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Model, Objective, fit
 from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, spectral_peak
 from twin.diagnose.experiment import Experiment, next_experiment
+from twin.diagnose.identifiability import Visibility, identifiability
+from twin.diagnose.screen import dictionary
 from twin.diagnose.search import ACCEPT, FORM, MATERIAL, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
 from twin.errors import DataError
@@ -83,6 +85,7 @@ class Diagnosis:
     line: tuple[float, float]  # z-score, Hz
     worst_channel: str
     description: str
+    identifiability: tuple[Visibility, ...]
     ambiguous: tuple[tuple[str, ...], ...]
     experiment: Experiment | None
     bench: Bench
@@ -115,9 +118,12 @@ def diagnose(
     evidence = Evidence(bench, fitted)
     progress("calibration")
     base = weigh(objective, evidence, fit(objective, start, refresh=True))
-    found = search(objective, evidence, base, progress)
+    patterns = dictionary(objective, base.fit)
+    bar = _material(bench, objective.whitener.noise, twin.robot.accuracy)
+    table = identifiability(objective, base.fit, patterns, bar)
+    found = search(objective, evidence, base, patterns, progress)
     progress("verdict")
-    best, dropped, small = _gate(objective, evidence, found, bench, twin.robot.accuracy, progress)
+    best, dropped, small = _gate(objective, evidence, found, bar, progress)
     before, after = base.discrepancy.size, best.discrepancy.size
     line = spectral_peak(bench, fitted, (best.fit.z - best.discrepancy.mean.ravel()).reshape(best.discrepancy.mean.shape))
     own = tuple(e.id for e in twin.effects)
@@ -172,6 +178,7 @@ def diagnose(
         line=line,
         worst_channel=worst,
         description=_describe(verdict, components, strongest, line, worst, final.discrepancy.size),
+        identifiability=tuple(table),
         ambiguous=ambiguous,
         experiment=experiment,
         bench=bench,
@@ -225,13 +232,14 @@ def _sensitivity(
 
 
 def _gate(
-    objective: Objective, evidence: Evidence, found: Search, bench: Bench, accuracy: float, progress: Progress
+    objective: Objective, evidence: Evidence, found: Search, bar: float, progress: Progress
 ) -> tuple[Weighed, dict[str, Weighed], tuple[Claim, ...]]:
-    """Drop effects below materiality, smallest first: what stays, each survivor's drop-one refit, and what was too small."""
+    """Drop effects below the materiality `bar` (sigma), smallest first.
+
+    Returns what stays, its refits with one effect dropped, and what was too small.
+    """
     best, small = found.best, []
     own = set(found.base.effects)
-    sigma = np.array([s for s, o in zip(objective.whitener.noise.sigma, bench.outputs, strict=True) if o.group == "marker"])
-    bar = max(MATERIAL, accuracy / float(np.mean(sigma)) if sigma.size else 0.0)
     while True:
         dropped = {}
         for e in best.effects:
@@ -247,6 +255,12 @@ def _gate(
             return best, dropped, tuple(small)
         small.append(Claim(least, best.fit.fitted(least), float("nan"), 0.0, c))
         best = dropped[least]
+
+
+def _material(bench: Bench, noise: Noise, accuracy: float) -> float:
+    """The least an effect must move the prediction by (sigma): MATERIAL, or the twin's own accuracy (m) where that is worse."""
+    sigma = np.array([s for s, o in zip(noise.sigma, bench.outputs, strict=True) if o.group == "marker"])
+    return max(MATERIAL, accuracy / float(np.mean(sigma)) if sigma.size else 0.0)
 
 
 def _contribution(best: Weighed, without: Weighed, objective: Objective) -> float:

@@ -1,0 +1,88 @@
+"""The table of the attribution benchmark: shares of sets, by amplitude and by how far the robot is from its description."""
+
+from __future__ import annotations
+
+import numpy as np
+
+CLASSES = ({"base_tilt", "camera_misalignment"}, {"time_delay", "actuator_lag"})  # effects such data hardly tell apart
+SURE = 0.9  # a claim at this probability or more must be right nine times of ten
+FLAGS = ("unexplained", "partly_explained")
+
+
+def same(a: str, b: str) -> bool:
+    return a == b or any(a in c and b in c for c in CLASSES)
+
+
+def right(r: dict, claim: str) -> bool:
+    return any(same(claim, t) for t in r["true"])
+
+
+def exact(r: dict) -> bool:
+    return len(r["claims"]) == len(r["true"]) and all(right(r, c) for c in r["claims"])
+
+
+def first(r: dict) -> bool:
+    return bool(r["claims"]) and right(r, r["claims"][0])
+
+
+def false_positive(r: dict) -> bool:
+    return bool(r["claims"]) or r["verdict"] in FLAGS
+
+
+def flagged(r: dict) -> bool:
+    return r["verdict"] in FLAGS
+
+
+def share(hits: list[bool]) -> str:
+    return f"{sum(hits)}/{len(hits)}" + (f" {100 * sum(hits) / len(hits):.0f} %" if hits else "")
+
+
+def table(rows: list[dict]) -> str:
+    of = {k: [r for r in rows if r["kind"] == k] for k in ("none", "one", "pair", "unknown")}
+    known = [r for r in rows if r["kind"] in ("one", "pair")]
+    sure = [right(r, c) for r in rows for c, p in zip(r["claims"], r["probability"], strict=True) if p >= SURE]
+    ratio = [r["after"] / r["floor"] for r in known]
+    seconds = [r["seconds"] for r in rows]
+    wrong_names = [bool(r["claims"]) and r["verdict"] == "explained" and not all(right(r, c) for c in r["claims"]) for r in rows]
+    lines = [
+        f"sets                                        {len(rows)}: " + ", ".join(f"{len(v)} {k}" for k, v in of.items()),
+        f"false positives, no effect                  {share([false_positive(r) for r in of['none']])}",
+        f"right effect first, one effect              {share([first(r) for r in of['one']])}",
+        f"exact set, one effect                       {share([exact(r) for r in of['one']])}",
+        f"first is a true one, two effects            {share([first(r) for r in of['pair']])}",
+        f"exact set, two effects                      {share([exact(r) for r in of['pair']])}",
+        f"out of catalogue, flagged                   {share([flagged(r) for r in of['unknown']])}",
+        f"a wrong name without a flag, all sets       {share(wrong_names)}",
+        f"false 'unexplained', one or two effects     {share([r['verdict'] == 'unexplained' for r in known])}",
+        f"false 'partly explained'                    {share([r['verdict'] == 'partly_explained' for r in known])}",
+        f"claims at probability >= {SURE}, right         {share(sure)}",
+        f"worse than calibrated on held-out trials    {share([r['after'] > 1.001 * r['calibrated'] for r in rows])}",
+    ]
+    if ratio:
+        lines.append(
+            f"held-out after / floor                      median {np.median(ratio):.3f}, 90 % {np.quantile(ratio, 0.9):.3f}"
+        )
+    lines.append(
+        f"seconds a diagnosis, one core               median {np.median(seconds):.1f}, 90 % {np.quantile(seconds, 0.9):.1f}"
+    )
+    lines += ["", f"{'':30}{'no effect: false':>18}{'one: first':>14}{'one: exact':>14}{'pair: exact':>14}{'unknown: flag':>16}"]
+    for key in ("amplitude", "mismatch", "design"):
+        for level in sorted({r[key] for r in rows}):
+            cell = {k: [r for r in v if r[key] == level] for k, v in of.items()}
+            shares = [
+                share([false_positive(r) for r in cell["none"]]), share([first(r) for r in cell["one"]]),
+                share([exact(r) for r in cell["one"]]), share([exact(r) for r in cell["pair"]]),
+                share([flagged(r) for r in cell["unknown"]]),
+            ]  # fmt: skip
+            name = f"{key} {level:g} sigma" if key == "amplitude" else f"{key} {level}"
+            lines.append(f"{name:30}{shares[0]:>18}{shares[1]:>14}{shares[2]:>14}{shares[3]:>14}{shares[4]:>16}")
+    lines += ["", "every set that went wrong:"]
+    for r in sorted(rows, key=lambda r: r["seed"]):
+        wrong = not flagged(r) if r["kind"] == "unknown" else not exact(r) or flagged(r)
+        if wrong:
+            said = f"{r['verdict']} {' + '.join(r['claims']) or '-'}" + (
+                f" (too small: {', '.join(r['small'])})" if r["small"] else ""
+            )
+            true = " + ".join(f"{t} {s:.1f}" for t, s in zip(r["true"], r["sigmas"], strict=True)) or "none"
+            lines.append(f"  {r['seed']} {r['design']}, {r['mismatch']}: {true} sigma -> {said}")
+    return "\n".join(lines)
