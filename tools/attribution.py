@@ -5,9 +5,9 @@
 Of the sets 15 % have no effect, 55 % one (all in turn), 15 % two, 15 % one that is not in the catalogue. Amplitudes are 1, 3 or 8
 sigma (marker noise, left after refitting the robot's own parameters); the robot is as described ("exact"), within its tolerances
 ("built"), or half again as far and with a soft spot and a slight helix that no parameter spans ("rough": some 0.1 sigma). Designs,
-mounts, instruments and what drives the tendons are drawn. Results go to results/attribution.jsonl as they come, so an interrupted run
-resumes; shards of one plan run side by side. An effect counts as named if it, or one of its class (effects such data hardly tell
-apart), is claimed with the largest contribution.
+mounts, instruments and what drives the tendons are drawn. Results go to results/attribution.jsonl as they come, so an interrupted
+run resumes; shards of one plan run side by side. An effect counts as named if it, or one of its class (effects such data hardly
+tell apart), is claimed with the largest contribution.
 """
 
 from __future__ import annotations

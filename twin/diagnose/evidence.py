@@ -25,6 +25,7 @@ IN_WORDS = {
 }
 MEMORY = (2.0, 8.0, 30.0)  # s
 ROUNDS = 60
+NOTHING = 1e-5  # variance of a component that no longer matters: 0.003 sigma
 
 
 @dataclass(frozen=True)
@@ -132,8 +133,11 @@ class Evidence:
         self.member = np.array([groups.index(o.group) for o in bench.outputs])
         present = np.isfinite(np.concatenate([bench.measured[k] for k in trials]))
         self.present = present
-        masks, which = np.unique(present, axis=1, return_inverse=True)  # channels of one marker are missing together
-        self.gram = np.stack([self.phi.matrix.T @ (self.phi.matrix * mask[:, None]) for mask in masks.T])[which.ravel()]
+        # Channels of one group that are missing together (a marker's x, y and z) share everything but their residual.
+        alike, self.kind = np.unique(np.vstack([self.member, present]), axis=1, return_inverse=True)
+        self.kind = self.kind.ravel()
+        self.group = alike[0].astype(int)  # (n_kind,)
+        self.gram = np.stack([self.phi.matrix.T @ (self.phi.matrix * mask[:, None]) for mask in alike[1:].T])
 
     def discrepancy(self, z: np.ndarray) -> Discrepancy:
         """The most likely discrepancy of z (n * m,) or (n, m)."""
@@ -143,11 +147,11 @@ class Evidence:
         b = (self.phi.matrix.T @ Z).T  # (m, p)
         component = self.phi.component
         for _ in range(ROUNDS):
-            D = variance[self.member][:, component]  # (m, p)
+            D = variance[self.group][:, component]  # (n_kind, p)
             covariance = np.linalg.inv(self.gram + _diagonal(1.0 / D))
-            mean = np.einsum("mpq,mq->mp", covariance, b)
+            mean = np.einsum("mpq,mq->mp", covariance[self.kind], b)
             explained = mean**2
-            determined = 1.0 - np.einsum("mpp->mp", covariance) / D
+            determined = (1.0 - np.einsum("kpp->kp", covariance) / D)[self.kind]
             new = np.empty_like(variance)
             for g in range(n_group):
                 rows = self.member == g
@@ -155,26 +159,22 @@ class Evidence:
                     block = np.ix_(rows, component == c)
                     new[g, c] = explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else 1e-8
             new = np.clip(new, 1e-8, 1e4)
-            settled = np.abs(np.log(new / variance)).max() < 0.05
+            settled = np.all((np.abs(np.log(new / variance)) < 0.05) | (new < NOTHING))
             variance = new
             if settled:
                 break
-        D = variance[self.member][:, component]
+        D = variance[self.group][:, component]
         inner = np.eye(len(component)) + np.sqrt(D)[:, :, None] * self.gram * np.sqrt(D)[:, None, :]
-        scaled = np.sqrt(D) * b
-        gain = float(
-            np.einsum("mp,mp->", scaled, np.linalg.solve(inner, scaled[..., None])[..., 0]) - np.linalg.slogdet(inner)[1].sum()
-        )
-        covariance = np.linalg.inv(self.gram + _diagonal(1.0 / D))
-        coefficients = np.einsum("mpq,mq->mp", covariance, b)
+        coefficients = np.einsum("mpq,mq->mp", np.linalg.inv(self.gram + _diagonal(1.0 / D))[self.kind], b)
+        gain = float(np.einsum("mp,mp->", b, coefficients) - np.linalg.slogdet(inner)[1][self.kind].sum())
         return Discrepancy(gain, (self.phi.matrix @ coefficients.T) * self.present, variance, coefficients.T)
 
     def whiten(self, discrepancy: Discrepancy, X: np.ndarray) -> np.ndarray:
         """(I + Phi D Phi')^-1 X for columns X (n * m, k)."""
         n, m = self.present.shape
         Y = X.reshape(n, m, -1)
-        D = discrepancy.variance[self.member][:, self.phi.component]
-        inside = np.linalg.inv(self.gram + _diagonal(1.0 / D))
+        D = discrepancy.variance[self.group][:, self.phi.component]
+        inside = np.linalg.inv(self.gram + _diagonal(1.0 / D))[self.kind]
         b = np.einsum("np,nmk->mpk", self.phi.matrix, Y, optimize=True)
         c = np.einsum("mpq,mqk->mpk", inside, b, optimize=True)
         smooth = np.einsum("np,mpk->nmk", self.phi.matrix, c, optimize=True) * self.present[:, :, None]
@@ -196,27 +196,38 @@ def _diagonal(x: np.ndarray) -> np.ndarray:
     return x[:, :, None] * np.eye(x.shape[1])
 
 
-def spectral_peak(bench: Bench, trials: Sequence[int], rest: np.ndarray) -> tuple[float, float]:
-    """The strongest line in the spectrum of what is left when the smooth error is removed: (z-score, frequency in Hz).
+@dataclass(frozen=True)
+class Spectrum:
+    """Waves exp(-2 pi i f t) of every trial on one absolute grid of frequencies (Hz), (n_f, n_k) each."""
 
-    Periodograms of all trials and channels (n, m) are added on one absolute grid of frequencies; white noise gives each grid
-    point a chi-square with 2 (trials x channels) degrees of freedom.
-    """
-    times = [bench.inputs[k].time for k in trials]
-    fastest = 0.45 / float(np.median(np.concatenate([np.diff(t) for t in times])))
-    longest = max(float(t[-1] - t[0]) for t in times)
-    grid = np.arange(4.0 / longest, fastest, 0.5 / longest)
-    if grid.size < 4:
-        return 0.0, 0.0
-    power, count, row = np.zeros(grid.size), 0, 0
-    for t in times:
-        x = rest[row : row + len(t)]
-        row += len(t)
-        wave = np.exp(-2j * np.pi * np.outer(grid, t - t[0]))
-        used = x.std(axis=0) > 0
-        x = x[:, used] - x[:, used].mean(axis=0)
-        power += (np.abs(wave @ x) ** 2 / (len(t) * x.var(axis=0) + 1e-12)).sum(axis=1)
-        count += int(used.sum())
-    score = (power - np.median(power)) / np.sqrt(count)
-    best = int(np.argmax(score))
-    return float(score[best]), float(grid[best])
+    grid: np.ndarray
+    waves: tuple[np.ndarray, ...]
+
+    @staticmethod
+    def of(bench: Bench, trials: Sequence[int]) -> Spectrum:
+        times = [bench.inputs[k].time for k in trials]
+        fastest = 0.45 / float(np.median(np.concatenate([np.diff(t) for t in times])))
+        longest = max(float(t[-1] - t[0]) for t in times)
+        grid = np.arange(4.0 / longest, fastest, 0.5 / longest)
+        return Spectrum(grid, tuple(np.exp(-2j * np.pi * np.outer(grid, t - t[0])).astype(np.complex64) for t in times))
+
+    def peak(self, rest: np.ndarray) -> tuple[float, float]:
+        """The strongest line of what is left when the smooth error is removed: (z-score, frequency in Hz).
+
+        Periodograms of all trials and channels (n, m) are added; white noise gives each grid point a chi-square with
+        2 (trials x channels) degrees of freedom.
+        """
+        if self.grid.size < 4:
+            return 0.0, 0.0
+        power, count, row = np.zeros(self.grid.size), 0, 0
+        for wave in self.waves:
+            n = wave.shape[1]
+            x = rest[row : row + n]
+            row += n
+            used = x.std(axis=0) > 0
+            x = x[:, used] - x[:, used].mean(axis=0)
+            power += (np.abs(wave @ x.astype(np.float32)) ** 2 / (n * x.var(axis=0) + 1e-12)).sum(axis=1)
+            count += int(used.sum())
+        score = (power - np.median(power)) / np.sqrt(max(count, 1))
+        best = int(np.argmax(score))
+        return float(score[best]), float(self.grid[best])

@@ -9,15 +9,14 @@ import numpy as np
 
 from twin.calibrate import Fit, Objective, fit
 from twin.diagnose.evidence import Discrepancy, Evidence
+from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Dictionary, dictionary, screen
 from twin.effects import catalogue
 from twin.errors import SolveError
 
-ACCEPT = 12.0  # evidence an effect must bring, after k log n: odds of e^6, safe over two dozen candidates
 WIDTH = 3  # models carried from level to level
 BEHIND = 400.0  # a model this far behind the best is not extended
 DEEPEST = 3  # effects at once
-MATERIAL = 0.1  # sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say
 FORM = 0.08  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
 PROMISE = 0.25  # of a material gain: what a first-order pattern must promise to be worth a refit
 ROUGHLY = 2e-4  # of the cost: the last step's fall at which a refit is weighed; what is left is second order in it
@@ -53,7 +52,9 @@ def weigh(objective: Objective, evidence: Evidence, fitted: Fit) -> Weighed:
     return Weighed(fitted, gain - prior - fitted.effective_parameters() * float(np.log(objective.n)), discrepancy)
 
 
-def search(objective: Objective, evidence: Evidence, base: Weighed, patterns: Dictionary, progress: Progress) -> Search:
+def search(
+    objective: Objective, evidence: Evidence, base: Weighed, patterns: Dictionary, bars: Thresholds, progress: Progress
+) -> Search:
     """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
     known: dict[tuple[str, ...], Weighed] = {base.effects: base}
     beam = [base]
@@ -65,7 +66,7 @@ def search(objective: Objective, evidence: Evidence, base: Weighed, patterns: Di
                 continue
             lacks = patterns if member is base else dictionary(objective, member.fit)
             for candidate in screen(objective, evidence, member.fit, member.discrepancy, lacks):
-                if candidate.gain < max(ACCEPT, PROMISE * _material(objective, base, member)):
+                if candidate.gain < max(bars.accept, PROMISE * _material(objective, base, member, bars.material)):
                     continue
                 progress(f"level {level}: {' + '.join((*member.effects, candidate.effect))}")
                 found = _extended(objective, evidence, member, candidate.effect, dict(candidate.start.values), candidate.start.free)
@@ -73,21 +74,22 @@ def search(objective: Objective, evidence: Evidence, base: Weighed, patterns: Di
                     fresh[found.effects] = found
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
         fresh = {
-            k: _fuller(objective, evidence, w, k, progress) if w.score > max(best_before, leading) else w for k, w in fresh.items()
+            k: _fuller(objective, evidence, w, k, bars.accept, progress) if w.score > max(best_before, leading) else w
+            for k, w in fresh.items()
         }
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
-        if not beam or beam[0].score < best_before + ACCEPT:
+        if not beam or beam[0].score < best_before + bars.accept:
             break
-    best = max(known.values(), key=lambda w: w.score - ACCEPT * len(w.effects))
-    best = _leaner(objective, evidence, best, known, progress)
+    best = max(known.values(), key=lambda w: w.score - bars.accept * len(w.effects))
+    best = _leaner(objective, evidence, best, known, bars.accept, progress)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
-def _material(objective: Objective, base: Weighed, member: Weighed) -> float:
+def _material(objective: Objective, base: Weighed, member: Weighed, bar: float) -> float:
     """The fall of |z|^2 below which an effect added to `member` would be immaterial."""
     explained = max(0.0, float(base.fit.z @ base.fit.z - member.fit.z @ member.fit.z))
-    return max(MATERIAL**2 * objective.n, FORM**2 * explained)
+    return max(bar**2 * objective.n, FORM**2 * explained)
 
 
 def _extended(
@@ -101,7 +103,9 @@ def _extended(
         return None
 
 
-def _fuller(objective: Objective, evidence: Evidence, found: Weighed, effects: tuple[str, ...], progress: Progress) -> Weighed:
+def _fuller(
+    objective: Objective, evidence: Evidence, found: Weighed, effects: tuple[str, ...], accept: float, progress: Progress
+) -> Weighed:
     """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it.
 
     Before other effects are added: what the plain law leaves would be taken for them.
@@ -121,7 +125,7 @@ def _fuller(objective: Objective, evidence: Evidence, found: Weighed, effects: t
             fuller = weigh(objective, evidence, fit(objective, model, J=_own(found.fit)))
         except SolveError:
             continue
-        if fuller.score > found.score + ACCEPT:
+        if fuller.score > found.score + accept:
             found = fuller
     return found
 
@@ -132,9 +136,14 @@ def _own(fitted: Fit) -> np.ndarray:
 
 
 def _leaner(
-    objective: Objective, evidence: Evidence, best: Weighed, known: dict[tuple[str, ...], Weighed], progress: Progress
+    objective: Objective,
+    evidence: Evidence,
+    best: Weighed,
+    known: dict[tuple[str, ...], Weighed],
+    accept: float,
+    progress: Progress,
 ) -> Weighed:
-    """Drop every effect whose removal costs less than `ACCEPT`."""
+    """Drop every effect whose removal costs less evidence than `accept`."""
     while len(best.effects) > 1:
         reduced = []
         for effect in best.effects:
@@ -144,7 +153,7 @@ def _leaner(
                 known[rest] = refit_without(objective, evidence, best, effect)
             reduced.append(known[rest])
         lean = max(reduced, key=lambda w: w.score)
-        if lean.score < best.score - ACCEPT:
+        if lean.score < best.score - accept:
             break
         best = lean
     return best

@@ -9,11 +9,12 @@ import numpy as np
 
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Model, Objective, fit
-from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, spectral_peak
+from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, Spectrum
 from twin.diagnose.experiment import Experiment, next_experiment
 from twin.diagnose.identifiability import Visibility, identifiability
+from twin.diagnose.null import ACCEPT, LINE, Thresholds, thresholds
 from twin.diagnose.screen import dictionary
-from twin.diagnose.search import ACCEPT, FORM, MATERIAL, Progress, Search, Weighed, refit_without, search, weigh
+from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
 from twin.errors import DataError
 from twin.evaluate import rms, squares
@@ -22,13 +23,10 @@ from twin.quantities import Fitted
 from twin.residual import Noise, Whitener, estimate_noise
 from twin.twin import Trace, Twin, readings, report, simulate, unstable_starts
 
-LEFT = (
-    0.15,
-    0.3,
-    0.45,
-)  # sigma, share, sigma: left-over structure counts if above the first and this share of before, or the third
+SHARE = 0.3  # of the structure before: what is left counts if it is above the design's threshold and above this share
+MUCH = 0.45  # sigma of structure that counts whatever was there before
+ALONE = 0.3  # sigma of structure that counts where no effect was found: a base model may be off by less
 HALF = 0.5  # effects that leave more than this share of the structure do not explain it
-LINE = 30.0  # z-score of a spectral line that counts
 TEMPER = 20.0  # odds are exp(score / 20): the likelihood takes the laws' form for exact, which makes raw odds absurd
 
 
@@ -119,16 +117,18 @@ def diagnose(
     progress("calibration")
     base = weigh(objective, evidence, fit(objective, start, refresh=True))
     patterns = dictionary(objective, base.fit)
-    bar = _material(bench, objective.whitener.noise, twin.robot.accuracy)
-    table = identifiability(objective, base.fit, patterns, bar)
-    found = search(objective, evidence, base, patterns, progress)
+    progress("no-effect sets of this design")
+    bars = thresholds(objective, evidence, base.fit, patterns, settings.seed)
+    bars = replace(bars, material=max(bars.material, _accuracy(bench, objective.whitener.noise, twin.robot.accuracy)))
+    table = identifiability(objective, base.fit, patterns, bars.material)
+    found = search(objective, evidence, base, patterns, bars, progress)
     progress("verdict")
-    best, dropped, small = _gate(objective, evidence, found, bar, progress)
+    best, dropped, small = _gate(objective, evidence, found, bars.material, progress)
     before, after = base.discrepancy.size, best.discrepancy.size
-    line = spectral_peak(bench, fitted, (best.fit.z - best.discrepancy.mean.ravel()).reshape(best.discrepancy.mean.shape))
+    line = Spectrum.of(bench, fitted).peak(best.fit.z.reshape(best.discrepancy.mean.shape) - best.discrepancy.mean)
     own = tuple(e.id for e in twin.effects)
     added = tuple(e for e in best.effects if e not in own)
-    verdict = _verdict(added, before, after, line[0])
+    verdict = _verdict(added, before, after, line[0], bars)
     final = base if verdict in ("noise", "unexplained") else best
     held_out = _HeldOut(bench, held)
     too_small = {c.effect for c in small}
@@ -257,10 +257,10 @@ def _gate(
         best = dropped[least]
 
 
-def _material(bench: Bench, noise: Noise, accuracy: float) -> float:
-    """The least an effect must move the prediction by (sigma): MATERIAL, or the twin's own accuracy (m) where that is worse."""
+def _accuracy(bench: Bench, noise: Noise, accuracy: float) -> float:
+    """The twin's own accuracy (m) in sigmas of the markers: no less can be claimed."""
     sigma = np.array([s for s, o in zip(noise.sigma, bench.outputs, strict=True) if o.group == "marker"])
-    return max(MATERIAL, accuracy / float(np.mean(sigma)) if sigma.size else 0.0)
+    return accuracy / float(np.mean(sigma)) if sigma.size else 0.0
 
 
 def _contribution(best: Weighed, without: Weighed, objective: Objective) -> float:
@@ -269,10 +269,10 @@ def _contribution(best: Weighed, without: Weighed, objective: Objective) -> floa
     return float(np.sqrt(max(0.0, fall) / objective.n))
 
 
-def _verdict(added: tuple[str, ...], before: float, after: float, line: float) -> str:
-    left = (after > LEFT[0] and after > LEFT[1] * before) or after > LEFT[2] or line > LINE
+def _verdict(added: tuple[str, ...], before: float, after: float, line: float, bars: Thresholds) -> str:
+    left = (after > bars.left and after > SHARE * before) or after > max(MUCH, bars.left) or line > bars.line
     if not added:
-        left = after > LEFT[1] or line > LINE
+        left = after > max(ALONE, bars.left) or line > bars.line
         return "unexplained" if left else "noise"
     if not left:
         return "explained"

@@ -14,10 +14,11 @@ from twin.compiled import assign, dot, jit
 from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, lever
 from twin.equilibrium.linear import factorise, substitute
-from twin.equilibrium.newton import CONTRACTION, LONGEST_STEP, LOST, commit, is_minimum, place
+from twin.equilibrium.newton import CONTRACTION, LONGEST_STEP, LOST, commit, place
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
 STIFFEST = 1e-6  # m/N of any tendon: three taut ones on a straight robot are redundant, 4 um at 4 N decide between them
+PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
 STEPS = 12
 SMALLEST = 1e-3  # of a jump
 
@@ -80,7 +81,28 @@ def settle(C, gap, T, by_length, dT):
 
 
 @jit
-def reach(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, held, free, stretch):
+def tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU, held_by):
+    """Factors of J + PULL sum B_i A_i' over the taut tendons of `by_length`, which `held_by` (n_tendon,) then names.
+
+    J alone need not be positive: a shape that gives way under constant tension may be held by the lengths. Returns whether this is.
+    """
+    nt, nv = tension.size, q.size
+    r, A, B = np.empty(nv), np.empty((nt, nv)), np.empty((nt, nv))
+    z1, s1 = np.empty(z.shape), np.empty(s.shape)
+    place(model, data, chain, q)
+    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, LU)
+    pulls(chain, law, z1, A, B)
+    for t in range(nt):
+        held_by[t] = by_length[t] and tension[t] > 0.0
+        if held_by[t]:
+            for i in range(nv):
+                for j in range(nv):
+                    LU[i, j] += PULL * B[t, i] * A[t, j]
+    return factorise(LU)
+
+
+@jit
+def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, held, free, stretch):
     """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N), from that at `held`;
     their tensions are found. Where the jump is too far for Newton it is made in ever smaller parts.
 
@@ -88,7 +110,7 @@ def reach(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension,
     """
     nt = tension.size
     q0, T0, T1, way = q.copy(), tension.copy(), tension.copy(), np.empty(nt)
-    if hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, free, stretch) == 1:
+    if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, free, stretch) == 1:
         return 1
     done, part = 0.0, 0.25
     while done < 1.0:
@@ -97,7 +119,7 @@ def reach(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension,
             tension[t] = T0[t]
         assign(q, q0)
         fresh[0] = False
-        if hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, way, stretch) == 1:
+        if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, way, stretch) == 1:
             done += part
             part = min(2.0 * part, 1.0 - done)
             assign(q0, q)
@@ -112,21 +134,30 @@ def reach(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension,
 
 
 @jit
-def advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch):
-    """One Newton step on shape and tensions together, with the factors LU and the balance's (r, z1, s1) at q.
+def advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch):
+    """One Newton step on shape and tensions together, with the `tangent` (LU, held_by) and the balance's (r, z1, s1) at q.
 
     Returns the longest change of a hinge (rad), negative where the lengths have no solution.
     """
     nt, nv = tension.size, q.size
     A, B, C, gap, dT = np.empty((nt, nv)), np.empty((nt, nv)), np.empty((nt, nt)), np.empty(nt), np.empty(nt)
     pulls(chain, law, z1, A, B)
+    for t in range(nt):
+        gap[t] = s1[t, 0] - free[t] - stretch * tension[t]
+        if held_by[t]:
+            for i in range(nv):
+                r[i] += PULL * gap[t] * B[t, i]
     substitute(LU, r)
+    for t in range(nt):
+        gap[t] -= dot_n(A[t], r)
     for j in range(nt):
+        if held_by[j]:
+            for i in range(nv):
+                B[j, i] *= 1.0 - PULL * stretch
         substitute(LU, B[j])
         for i in range(nt):
             C[i, j] = dot_n(A[i], B[j])
         C[j, j] += stretch
-        gap[j] = s1[j, 0] - free[j] - stretch * tension[j] - dot_n(A[j], r)
     if not settle(C, gap, tension, by_length, dT):
         return -1.0
     longest = 0.0
@@ -142,7 +173,7 @@ def advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch):
 
 
 @jit
-def hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, by_length, free, stretch):
+def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, free, stretch):
     """Newton on shape and tensions at once, with the chord LU while it contracts. Returns 1 and commits (z, s), or 0."""
     nt = tension.size
     r, none = np.empty(q.size), np.empty((0, 0))
@@ -166,18 +197,18 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, fresh, tol, tension, 
         if not size < LOST:
             return 0
         if not fresh[0] or size > CONTRACTION * before:
-            fresh[0] = is_minimum(model, data, chain, rest, tension, law, load, z, s, q, LU)
+            fresh[0] = tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU, held_by)
             if not fresh[0]:
                 return 0
         before = size
-        longest = advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch)
+        longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch)
         if longest < 0.0 or longest > LONGEST_STEP:
             return 0
     return 0
 
 
 @jit
-def hold_once(model, data, chain, rest, law, load, z, s, q, LU, tension, by_length, free, stretch):
+def hold_once(model, data, chain, rest, law, load, z, s, q, LU, held_by, tension, by_length, free, stretch):
     """One Newton step on shape and tensions from a neighbouring solution with the factors LU of its tangent. Commits (z, s).
 
     Returns 1, or 0 where lost.
@@ -186,7 +217,7 @@ def hold_once(model, data, chain, rest, law, load, z, s, q, LU, tension, by_leng
     z1, s1 = np.empty(z.shape), np.empty(s.shape)
     place(model, data, chain, q)
     balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
-    longest = advance(chain, law, z1, s1, q, r, LU, tension, by_length, free, stretch)
+    longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch)
     place(model, data, chain, q)
     commit(chain, law, z, s)
     return 1 if 0.0 <= longest < LONGEST_STEP else 0

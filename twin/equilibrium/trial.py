@@ -15,7 +15,7 @@ from twin.compiled import assign, jit
 from twin.effects.backbone_creep import retard
 from twin.equilibrium.chain import Law, Load, balance
 from twin.equilibrium.elastic import bendings
-from twin.equilibrium.lengths import hold_once, reach
+from twin.equilibrium.lengths import hold_once, reach, tangent
 from twin.equilibrium.newton import follow, is_minimum, place, solve, step_once
 
 RAMP = 8  # steps from slack to the first tensions; 8 against 64 moved the tip by at most 0.005 mm in 40 random poses, mu 0.2
@@ -79,7 +79,7 @@ def run(
     n, nv, nt = drive.time.size, spring.size, drive.command.shape[1]
     q, q1, q2, rest, instant = np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv)
     LU, fresh, T, free = np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt), drive.straight.copy()
-    held = drive.straight.copy()
+    held, held_by = drive.straight.copy(), np.zeros(nt, np.bool_)
     r, z1, s1, none = np.empty(nv), np.empty(z.shape), np.empty(z.shape), np.empty((0, 0))
     D = np.empty((chain.hand.size, 3, 3))
     now_load = Load(load.gravity.copy(), load.payload, load.force.copy())
@@ -117,7 +117,7 @@ def run(
                     T[t] = factor * drive.command[0, t] * (k / steps)
             if by_length:
                 found = reach(
-                    model, data, chain, rest, now_law, now_load, z, s, q, LU, fresh, fine, T, drive.by_length, held, free,
+                    model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, fresh, fine, T, drive.by_length, held, free,
                     drive.stretch / factor,
                 )  # fmt: skip
                 assign(held, free)
@@ -150,15 +150,16 @@ def run(
                 free[t] = drive.straight[t] - drive.command[i, t]
                 if guess.size:
                     T[t] = factor * guess_T[i, t]
+                    held_by[t] = T[t] > 0.0
             else:
                 T[t] = factor * drive.command[i, t]
         if by_length and once and guess.size:
             status[i] = hold_once(
-                model, data, chain, rest, now_law, now_load, z, s, q, LU, T, drive.by_length, free, drive.stretch / factor
+                model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, T, drive.by_length, free, drive.stretch / factor
             )  # fmt: skip
         elif by_length:
             status[i] = reach(
-                model, data, chain, rest, now_law, now_load, z, s, q, LU, fresh, fine, T, drive.by_length, held, free,
+                model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, fresh, fine, T, drive.by_length, held, free,
                 drive.stretch / factor,
             )  # fmt: skip
             assign(held, free)
@@ -168,9 +169,14 @@ def run(
             status[i] = solve(model, data, chain, rest, T, now_law, now_load, z, s, q, LU, fresh, tol)
         if status[i] == 0:
             assign(q, q1)
-        if keep and not is_minimum(model, data, chain, rest, T, now_law, now_load, z, s, q, LUs[i]):
-            for k in range(nv):
-                assign(LUs[i, k], LU[k])
+        if keep:
+            if by_length:
+                kept = tangent(model, data, chain, rest, now_law, now_load, z, s, q, T, drive.by_length, LUs[i], held_by)
+            else:
+                kept = is_minimum(model, data, chain, rest, T, now_law, now_load, z, s, q, LUs[i])
+            if not kept:
+                for k in range(nv):
+                    assign(LUs[i, k], LU[k])
         assign(q1, q)
         assign(q_out[i], q)
         for k in range(chain.marker.size):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
-from twin.diagnose.verdict import LINE
+from twin.diagnose.null import LINE
 from twin.effects import named
 from twin.report.numbers import SHOWN, number, percent, plus_minus, upper_first
 

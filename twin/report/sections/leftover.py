@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.diagnose.evidence import IN_WORDS
-from twin.diagnose.verdict import LINE
+from twin.diagnose.null import LINE
 from twin.report.numbers import column
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import structure_left
