@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,10 @@ from typing import Any
 import tomli_w
 
 from twin.effects import named
-from twin.errors import DataError, TwinError
+from twin.errors import DataError
 from twin.quantities import Fitted, Parameter, overrides, si_factor, si_unit
 from twin.robots import available, load
+from twin.robots.toml_file import opened
 from twin.twin import Twin
 
 FORMAT = "twin/1"
@@ -23,7 +23,7 @@ SECTIONS = {"format", "robot", "parameters", "effect", "provenance"}
 def read_twin(source: str | Path) -> Twin:
     """A twin from a `twin.toml`, a folder that holds one (a report), or a robot's name alone.
 
-    Raises DataError where the file breaks its contract, UnknownNameError for a robot or effect that does not exist.
+    Raises DataError where the file breaks its contract, UnknownNameError for a robot's name that does not exist.
     """
     path = Path(source)
     if path.is_dir() and (path / "twin.toml").is_file():
@@ -32,54 +32,49 @@ def read_twin(source: str | Path) -> Twin:
         if path.suffix == ".toml" or (os.sep in str(source) and not (path / "robot.toml").is_file()):
             raise DataError(f"{path}: no such twin; give a twin.toml, a folder with one, or a robot: {', '.join(available())}")
         return Twin.of(load(str(source)))
-    try:
-        table = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DataError(f"{path}: {error}") from None
-    if table.get("format") != FORMAT:
-        raise DataError(f"{path}: format is {table.get('format')!r}; this program reads {FORMAT!r}")
+    with opened(path, FORMAT) as table:
+        return _twin(table, path.parent)
+
+
+def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
     if not isinstance(table.get("robot"), str):
-        raise DataError(f"{path}: `robot` is missing; name one of {', '.join(available())}, or a path to a robot's folder")
-    try:
-        if unread := sorted(set(table) - SECTIONS):
-            raise DataError(f"{path}: no section {unread[0]!r} is known; allowed are {', '.join(sorted(SECTIONS))}")
-        robot = load(table["robot"], path.parent)
-        values = _values(path, table.get("parameters", {}), robot.parameters)
-        overrides(robot.parameters, values)
-        n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
-        effects = []
-        entries = table.get("effect", [])
-        if not (isinstance(entries, list) and all(isinstance(e, dict) for e in entries)):
-            raise DataError(f"{path}: `effect` is {entries!r}; write each effect as its own [[effect]]")
-        for entry in entries:
-            law = named(str(entry.get("id")))
-            effects.append(law(_values(path, entry.get("parameters", {}), law.declared(n_tendon)), n_tendon))
-        if twice := {e.id for e in effects if sum(o.id == e.id for o in effects) > 1}:
-            raise DataError(f"{path}: effect {', '.join(sorted(twice))} stands there twice; merge the two")
-    except TwinError as error:
-        raise DataError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+        raise DataError(f"`robot` is missing; name one of {', '.join(available())}, or a path to a robot's folder")
+    if unread := sorted(set(table) - SECTIONS):
+        raise DataError(f"no section {unread[0]!r} is known; allowed are {', '.join(sorted(SECTIONS))}")
+    robot = load(table["robot"], folder)
+    values = _values(table.get("parameters", {}), robot.parameters)
+    overrides(robot.parameters, values)
+    entries = table.get("effect", [])
+    if not (isinstance(entries, list) and all(isinstance(e, dict) for e in entries)):
+        raise DataError(f"`effect` is {entries!r}; write each effect as its own [[effect]]")
+    effects = []
+    for entry in entries:
+        law = named(str(entry.get("id")))
+        effects.append(law(_values(entry.get("parameters", {}), law.declared(robot.n_tendon)), robot.n_tendon))
+    if twice := {e.id for e in effects if sum(o.id == e.id for o in effects) > 1}:
+        raise DataError(f"effect {', '.join(sorted(twice))} stands there twice; merge the two")
     return Twin(robot, values, tuple(effects))
 
 
-def _values(path: Path, table: Any, declared: tuple[Parameter, ...]) -> dict[str, float]:
+def _values(table: Any, declared: tuple[Parameter, ...]) -> dict[str, float]:
     """Values of a parameter table: plain SI numbers, or {value, unit, std}."""
     units = {p.name: p.unit for p in declared}
     out = {}
     if not isinstance(table, Mapping):
-        raise DataError(f"{path}: parameters are {table!r}; write a table of name = {{ value = ..., unit = ... }}")
+        raise DataError(f"parameters are {table!r}; write a table of name = {{ value = ..., unit = ... }}")
     for name, entry in table.items():
         if name not in units:
-            raise DataError(f"{path}: no parameter named {name!r}; available: {', '.join(sorted(units))}")
+            raise DataError(f"no parameter named {name!r}; available: {', '.join(sorted(units))}")
         try:
             if isinstance(entry, Mapping):
                 unit = str(entry.get("unit", units[name]))
-                if si_unit(unit, f"{path}: {name}") != units[name]:
-                    raise DataError(f"{path}: parameter {name!r} is in {unit!r}; a unit like {units[name]!r} is needed")
-                out[name] = float(entry["value"]) * si_factor(unit, f"{path}: {name}")
+                if si_unit(unit, name) != units[name]:
+                    raise DataError(f"parameter {name!r} is in {unit!r}; a unit like {units[name]!r} is needed")
+                out[name] = float(entry["value"]) * si_factor(unit, name)
             else:
                 out[name] = float(entry)
         except (KeyError, TypeError, ValueError):
-            raise DataError(f"{path}: parameter {name!r} is {entry!r}; write a number, or {{ value = ..., unit = ... }}") from None
+            raise DataError(f"parameter {name!r} is {entry!r}; write a number, or {{ value = ..., unit = ... }}") from None
     return out
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from twin.effects import named
-from twin.errors import DataError, TwinError, UnknownNameError
+from twin.errors import DataError, UnknownNameError
 from twin.quantities import Parameter, Values, overrides, si_factor, si_unit
 from twin.robots.body import Body
+from twin.robots.toml_file import opened
 
 FORMAT = "twin-robot/1"
 
@@ -80,40 +81,32 @@ def load(name: str, relative_to: Path | None = None) -> Robot:
 
 @lru_cache(maxsize=16)
 def _read(folder: Path) -> Robot:
-    path = folder / "robot.toml"
-    try:
-        table = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DataError(f"{path}: {error}") from None
-    if table.get("format") != FORMAT:
-        raise DataError(f"{path}: format is {table.get('format')!r}; this program reads {FORMAT!r}")
-    try:
-        parameters = tuple(p for name, entry in table["parameters"].items() for p in _parameters(path, name, entry))
-        gravity = np.array(table["gravity"]["value"], float) * si_factor(table["gravity"]["unit"], str(path))
-        _check_numbers(path, "accuracy", table["accuracy"])
-        accuracy = float(table["accuracy"]["value"]) * si_factor(table["accuracy"]["unit"], str(path))
-        declared = tuple((e["id"], dict(e.get("parameters", {}))) for e in table.get("effect", []))
-        gravity.setflags(write=False)
-        robot = Robot(
-            folder.name,
-            table["family"],
-            table["title"],
-            folder,
-            table["structure"],
-            parameters,
-            gravity,
-            accuracy,
-            declared,
-        )
-        _check(robot)
-        return robot
-    except KeyError as error:
-        raise DataError(f"{path}: {error.args[0]!r} is missing") from None
-    except TwinError as error:
-        named = str(error) if str(error).startswith(str(path)) else f"{path}: {error}"
-        raise DataError(named) from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise DataError(f"{path}: {error}; compare it with the robots that ship with the twin") from None
+    with opened(folder / "robot.toml", FORMAT) as table:
+        try:
+            robot = _robot(folder, table)
+            _check(robot)
+            return robot
+        except KeyError as error:
+            raise DataError(f"{error.args[0]!r} is missing") from None
+        except (TypeError, ValueError, AttributeError) as error:
+            raise DataError(f"{error}; compare it with the robots that ship with the twin") from None
+
+
+def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
+    gravity = np.array(table["gravity"]["value"], float) * si_factor(table["gravity"]["unit"], "gravity")
+    gravity.setflags(write=False)
+    _check_numbers("accuracy", table["accuracy"])
+    return Robot(
+        name=folder.name,
+        family=table["family"],
+        title=table["title"],
+        folder=folder,
+        structure=table["structure"],
+        parameters=tuple(p for name, entry in table["parameters"].items() for p in _parameters(name, entry)),
+        gravity=gravity,
+        accuracy=float(table["accuracy"]["value"]) * si_factor(table["accuracy"]["unit"], "accuracy"),
+        effects=tuple((e["id"], dict(e.get("parameters", {}))) for e in table.get("effect", [])),
+    )
 
 
 def _check(robot: Robot) -> None:
@@ -135,22 +128,22 @@ def _check(robot: Robot) -> None:
     robot.build()
 
 
-def _check_numbers(path: Path, name: str, entry: Mapping[str, object]) -> None:
+def _check_numbers(name: str, entry: Mapping[str, object]) -> None:
     for key in {"value", "std", "low", "high"} & set(entry):
         numbers = entry[key] if isinstance(entry[key], list) else [entry[key]]
         if not all(isinstance(n, int | float) and np.isfinite(n) for n in numbers):  # type: ignore[union-attr]
-            raise DataError(f"{path}: parameter {name!r}: {key} is {entry[key]!r}; finite numbers are needed")
+            raise DataError(f"parameter {name!r}: {key} is {entry[key]!r}; finite numbers are needed")
 
 
-def _parameters(path: Path, name: str, entry: Mapping[str, object]) -> list[Parameter]:
+def _parameters(name: str, entry: Mapping[str, object]) -> list[Parameter]:
     if not isinstance(entry, Mapping):
-        raise DataError(f"{path}: parameter {name!r} is {entry!r}; write {{ value = ..., unit = ..., source = ... }}")
+        raise DataError(f"parameter {name!r} is {entry!r}; write {{ value = ..., unit = ..., source = ... }}")
     missing = {"value", "unit", "source"} - set(entry)
     if missing:
-        raise DataError(f"{path}: parameter {name!r} lacks {', '.join(sorted(missing))}; every number has a unit and a source")
-    factor = si_factor(str(entry["unit"]), f"{path}: parameter {name!r}")
-    unit = si_unit(str(entry["unit"]), f"{path}: parameter {name!r}")
-    _check_numbers(path, name, entry)
+        raise DataError(f"parameter {name!r} lacks {', '.join(sorted(missing))}; every number has a unit and a source")
+    factor = si_factor(str(entry["unit"]), f"parameter {name!r}")
+    unit = si_unit(str(entry["unit"]), f"parameter {name!r}")
+    _check_numbers(name, entry)
     value = entry["value"]
     many = isinstance(value, list)
     numbers: list[float] = [float(v) for v in value] if isinstance(value, list) else [float(value)]  # type: ignore[arg-type]
