@@ -117,6 +117,36 @@ def wall_force(chain, wall, r, J):
 
 
 @jit
+def lay(chain, t, u, length, theta, distal):
+    """Tendon t as it lies: by piece its direction u (n_disk, 3), length and what lies beyond its start (n_disk,), all in m; by hole
+    the angle theta (n_disk,) it turns there, rad."""
+    nd = length.size
+    for d in range(nd):
+        a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
+        v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+        length[d] = np.sqrt(dot(v, v))
+        put(u[d], (v[0] / length[d], v[1] / length[d], v[2] / length[d]))
+    beyond = 0.0
+    for d in range(nd - 1, -1, -1):
+        beyond += length[d]
+        distal[d] = beyond
+    theta[0] = 0.0
+    for d in range(1, nd):
+        v = cross(u[d - 1], u[d])
+        theta[d] = np.arctan2(np.sqrt(dot(v, v)), dot(u[d - 1], u[d]))
+
+
+@jit
+def pass_on(tension, law, theta, z0, s0, s, z, T):
+    """Tensions T (n_disk,) by piece under that at the base, and slip states z at distal lengths s, after (z0, s0)."""
+    T[0], wrapped = tension, 0.0
+    for d in range(1, T.size):
+        z[d] = slip_state(z0[d], s0[d] - s[d], law.presliding)
+        wrapped += z[d] * turn(theta[d])[0]
+        T[d] = tension * np.exp(-law.mu * wrapped)
+
+
+@jit
 def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
     """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), at angles q already in MuJoCo's data.
 
@@ -140,26 +170,13 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
     dl = np.zeros(nv)
     dlog = np.empty(nv)
     for t in range(nt):
+        lay(chain, t, u, length, theta, s[t])
+        pass_on(tension[t], law, theta, z0[t], s0[t], s[t], z[t], T)
         for d in range(nd):
-            a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
-            v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-            length[d] = np.sqrt(dot(v, v))
-            put(u[d], (v[0] / length[d], v[1] / length[d], v[2] / length[d]))
+            b = chain.site[chain.hole[t, d + 1]]
             for i in range(chain.first[d], chain.first[d + 1]):
                 put(X[i], lever(chain.axis[i], b, chain.anchor[i]))
                 dl[i] = dot(u[d], X[i])
-        distal = 0.0
-        for d in range(nd - 1, -1, -1):
-            distal += length[d]
-            s[t, d] = distal
-        wrapped = 0.0
-        T[0] = tension[t]
-        for d in range(1, nd):
-            v = cross(u[d - 1], u[d])
-            theta[d] = np.arctan2(np.sqrt(dot(v, v)), dot(u[d - 1], u[d]))
-            z[t, d] = slip_state(z0[t, d], s0[t, d] - s[t, d], law.presliding)
-            wrapped += z[t, d] * turn(theta[d])[0]
-            T[d] = tension[t] * np.exp(-law.mu * wrapped)
         for d in range(nd):
             for i in range(chain.first[d], chain.first[d + 1]):
                 r[i] += T[d] * dl[i]
