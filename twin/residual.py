@@ -169,11 +169,10 @@ def _likeliest(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Maximum-likelihood sigma per group and that of the inputs, a common multiple of `reading` (n_tendon,), for differences
     d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G')."""
-    rows = np.isfinite(d).all(axis=1)
-    if rows.sum() < 10:
-        rows = np.isfinite(d).any(axis=1)
-    d, G = np.nan_to_num(d[rows]), G[rows]
-    scale = np.array([max(1.4826 * np.median(np.abs(d[:, member == g])), 1e-9) for g in range(n_group)])
+    present = np.isfinite(d)
+    count = present.sum(axis=0)
+    scale = np.array([max(1.4826 * np.nanmedian(np.abs(d[:, member == g])), 1e-9) for g in range(n_group)])
+    d, G = np.where(present, d, 0.0), G * present[:, :, None]  # what is missing says nothing, of no channel and no input
 
     def unpack(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         s = sigma if sigma is not None else (scale * np.exp(x[:n_group]))[member]
@@ -185,7 +184,7 @@ def _likeliest(
         inner = np.eye(G.shape[2]) + np.einsum("nmt,nms->nts", A, A)
         b = np.einsum("nmt,nm->nt", A, r)
         quadratic = (r**2).sum() - np.einsum("nt,nt->", b, np.linalg.solve(inner, b[..., None])[..., 0])
-        return 0.5 * (quadratic + np.linalg.slogdet(inner)[1].sum()) + len(d) * np.log(s).sum()
+        return 0.5 * (quadratic + np.linalg.slogdet(inner)[1].sum()) + float(count @ np.log(s))
 
     start = np.zeros((0 if sigma is not None else n_group) + (drive is None))
     if start.size == 0:

@@ -16,7 +16,7 @@ from twin.diagnose.null import ACCEPT, LINE, Thresholds, thresholds
 from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
-from twin.errors import DataError
+from twin.errors import DataError, SolveError
 from twin.evaluate import rms, squares
 from twin.measurements import Recording
 from twin.quantities import Fitted
@@ -123,6 +123,8 @@ def diagnose(
     table = identifiability(objective, base.fit, patterns, bars.material)
     found = search(objective, evidence, base, patterns, bars, progress)
     progress("verdict")
+    held_out = _HeldOut(bench, held)
+    found = replace(found, best=_predicting(found, held_out, bars.accept))
     best, dropped, small = _gate(objective, evidence, found, bars.material, progress)
     before, after = base.discrepancy.size, best.discrepancy.size
     line = Spectrum.of(bench, fitted).peak(best.fit.z.reshape(best.discrepancy.mean.shape) - best.discrepancy.mean)
@@ -130,7 +132,6 @@ def diagnose(
     added = tuple(e for e in best.effects if e not in own)
     verdict = _verdict(added, before, after, line[0], bars)
     final = base if verdict in ("noise", "unexplained") else best
-    held_out = _HeldOut(bench, held)
     too_small = {c.effect for c in small}
     claims = tuple(
         Claim(
@@ -288,6 +289,12 @@ def _probability(found: Search, effect: str, small: set[str]) -> float:
     return float(weights[inside].sum() / weights.sum())
 
 
+def _predicting(found: Search, held_out: _HeldOut, accept: float) -> Weighed:
+    """The best set that has an equilibrium in every held-out trial too: a stiff wall may leave a trial none."""
+    ranked = [found.best, *sorted(found.all, key=lambda w: accept * len(w.effects) - w.score)]
+    return next((w for w in ranked if np.isfinite(held_out.error(w.fit.model.twin))), found.base)
+
+
 class _HeldOut:
     """Errors on the held-out trials."""
 
@@ -295,8 +302,12 @@ class _HeldOut:
         self.bench, self.held = bench, list(held)
 
     def error(self, twin: Twin) -> float:
-        """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group."""
-        traces: list[Trace] = simulate(twin, self.bench, trials=self.held)
+        """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group; NaN where one has
+        no equilibrium."""
+        try:
+            traces: list[Trace] = simulate(twin, self.bench, trials=self.held)
+        except SolveError:
+            return float("nan")
         raw = [
             self.bench.measured[k] - readings(self.bench, report(twin.effects, t.true))
             for k, t in zip(self.held, traces, strict=True)

@@ -139,7 +139,7 @@ def lay(chain, t, u, length, theta, distal):
 @jit
 def pass_on(tension, law, theta, z0, s0, s, z, T):
     """Tensions T (n_disk,) by piece under that at the base, and slip states z at distal lengths s, after (z0, s0)."""
-    T[0], wrapped = tension, 0.0
+    T[0], z[0], wrapped = tension, 0.0, 0.0
     for d in range(1, T.size):
         z[d] = slip_state(z0[d], s0[d] - s[d], law.presliding)
         wrapped += z[d] * turn(theta[d])[0]

@@ -14,12 +14,12 @@ from twin.compiled import assign, dot, jit
 from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, lever
 from twin.equilibrium.linear import factorise, substitute
-from twin.equilibrium.newton import CONTRACTION, LONGEST_STEP, LOST, commit, place
+from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, commit, place
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
 STIFFEST = 1e-6  # m/N of any tendon: three taut ones on a straight robot are redundant, 4 um at 4 N decide between them
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
-STEPS = 12
+STEPS = 40
 SMALLEST = 1e-3  # of a jump
 
 
@@ -102,17 +102,17 @@ def tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU
 
 
 @jit
-def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, held, free, stretch):
-    """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N), from that at `held`;
-    their tensions are found. Where the jump is too far for Newton it is made in ever smaller parts.
+def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, last, held, free, stretch):
+    """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N); their tensions are found.
+    Where the guess q does not lead there the jump is made from `last`, which was at `held`, in ever smaller parts if need be.
 
     Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits (z, s); with parts, after each.
     """
     nt = tension.size
-    q0, T0, T1, way = q.copy(), tension.copy(), tension.copy(), np.empty(nt)
+    q0, T0, T1, way = last.copy(), tension.copy(), tension.copy(), np.empty(nt)
     if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, free, stretch) == 1:
         return 1
-    done, part = 0.0, 0.25
+    done, part = 0.0, 1.0
     while done < 1.0:
         for t in range(nt):
             way[t] = held[t] + (done + part) * (free[t] - held[t])
@@ -174,16 +174,19 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, str
 
 @jit
 def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, free, stretch):
-    """Newton on shape and tensions at once, with the chord LU while it contracts. Returns 1 and commits (z, s), or 0."""
-    nt = tension.size
-    r, none = np.empty(q.size), np.empty((0, 0))
+    """Newton on shape and tensions at once, with the chord LU while it contracts; a step that lets the residual grow is halved.
+
+    Returns 1 and commits (z, s), or 0.
+    """
+    nt, nv = tension.size, q.size
+    r, none, q0, T0, q1, T1 = np.empty(nv), np.empty((0, 0)), q.copy(), tension.copy(), q.copy(), tension.copy()
     z1, s1 = np.empty(z.shape), np.empty(s.shape)
-    before = 1e300
+    before, step, chord = 1e300, 1.0, True
     for _ in range(STEPS):
         place(model, data, chain, q)
         balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
         size = 0.0
-        for i in range(q.size):
+        for i in range(nv):
             size = max(size, abs(r[i] / chain.stiffness[i]))
         for t in range(nt):
             if by_length[t]:
@@ -194,16 +197,40 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, 
                 assign(z[t], z1[t])
                 assign(s[t], s1[t])
             return 1
-        if not size < LOST:
-            return 0
-        if not fresh[0] or size > CONTRACTION * before:
+        if not size < GROWTH * before:
+            if chord and fresh[0]:  # the fault may be the old tangent's: from the last shape with a new one
+                step = 1.0
+                assign(q, q0)
+                assign(tension, T0)
+                fresh[0], before = False, 1e300
+                continue
+            step *= 0.5
+            if step < SMALLEST:
+                return 0
+            for i in range(nv):
+                q[i] = q0[i] + step * (q1[i] - q0[i])
+            for t in range(nt):
+                tension[t] = T0[t] + step * (T1[t] - T0[t])
+            continue
+        chord = fresh[0] and size <= CONTRACTION * before
+        if not chord:
             fresh[0] = tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU, held_by)
             if not fresh[0]:
                 return 0
-        before = size
+        before, step = size, 1.0
+        assign(q0, q)
+        assign(T0, tension)
         longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch)
-        if longest < 0.0 or longest > LONGEST_STEP:
+        if longest < 0.0:
             return 0
+        assign(q1, q)
+        assign(T1, tension)
+        if longest > LONGEST_STEP:
+            step = LONGEST_STEP / longest
+            for i in range(nv):
+                q[i] = q0[i] + step * (q1[i] - q0[i])
+            for t in range(nt):
+                tension[t] = T0[t] + step * (T1[t] - T0[t])
     return 0
 
 

@@ -116,9 +116,10 @@ def run(
                 else:
                     T[t] = factor * drive.command[0, t] * (k / steps)
             if by_length:
+                assign(q1, q)
                 found = reach(
-                    model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, fresh, fine, T, drive.by_length, held, free,
-                    drive.stretch / factor,
+                    model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, fresh, fine, T, drive.by_length, q1, held,
+                    free, drive.stretch / factor,
                 )  # fmt: skip
                 assign(held, free)
             else:
@@ -159,7 +160,7 @@ def run(
             )  # fmt: skip
         elif by_length:
             status[i] = reach(
-                model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, fresh, fine, T, drive.by_length, held, free,
+                model, data, chain, rest, now_law, now_load, z, s, q, LU, held_by, fresh, fine, T, drive.by_length, q1, held, free,
                 drive.stretch / factor,
             )  # fmt: skip
             assign(held, free)
