@@ -120,6 +120,29 @@ def test_the_next_experiment_says_how_many_runs():
     assert contents(diagnosis("noise"), PROVENANCE)["next_experiment"] is None
 
 
+def test_what_the_data_can_tell_is_listed_and_never_is_null():
+    friction, delay, stretch = strictly(contents(diagnosis(), PROVENANCE))["identifiability"]
+    assert friction == {
+        "id": "tendon_friction",
+        "seen": 0.1,
+        "apart": 0.1,
+        "share": 0.8,
+        "rival": "backbone_creep",
+        "smallest": {"parameter": "mu", "value": 0.004, "unit": "1"},
+        "lacking": [],
+    }
+    assert delay["lacking"] == ["two rates of pull, ten times apart"]
+    assert stretch == {
+        "id": "tendon_elasticity",
+        "seen": None,
+        "apart": None,
+        "share": 0.0,
+        "rival": None,
+        "smallest": {"parameter": "stretch", "value": None, "unit": "m/N"},
+        "lacking": ["tendon displacements"],
+    }
+
+
 def test_provenance_repeats_the_run():
     assert PROVENANCE["seed"] == 3
     assert PROVENANCE["data_hash"] == recording().data_hash()

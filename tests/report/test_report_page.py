@@ -12,6 +12,7 @@ import pytest
 from plotly.offline import get_plotlyjs
 from small_diagnosis import SETTINGS, diagnosis, recording
 
+from twin.diagnose.identifiability import Visibility
 from twin.effects import catalogue
 from twin.report import provenance, sentence
 from twin.report.giveaway import giveaways, kind_of
@@ -27,6 +28,7 @@ SECTIONS = (
     "left",
     "attribution",
     "next",
+    "tell",
     "parameters",
     "noise",
     "notices",
@@ -151,6 +153,25 @@ def test_the_loop_is_found_where_it_is():
     (left,) = giveaways(diagnosis("unexplained"))
     assert left.variable.loop
     assert left.variable.words == g.variable.words
+
+
+def told(d) -> list[list[str]]:
+    """The cells of the table on what the data can tell, row by row."""
+    body = render(d).partition('<section id="tell">')[2].partition("</table>")[0]
+    return [[unescape(re.sub("<[^>]*>", "", cell)) for cell in re.findall("<td.*?</td>", row)] for row in body.split("<tr")[2:]]
+
+
+def test_what_the_data_can_tell_is_a_row_an_effect():
+    assert told(diagnosis()) == [
+        ["tendon friction", "0.10", "0.10", "backbone creep, 20 %", "mu 0.0040", ""],
+        ["time delay", "0.10", "0.30", "actuator lag, 94 %", "delay 0.010 s", "two rates of pull, ten times apart"],
+        ["tendon elasticity", "never: needs tendon displacements"],
+    ]
+
+
+def test_an_effect_hidden_for_no_known_reason_says_so():
+    hidden = Visibility("tendon_elasticity", np.inf, np.inf, 0.0, "", ("stretch", np.inf, "m/N"), ())
+    assert told(diagnosis(identifiability=(hidden,))) == [["tendon elasticity", "never: nothing measured here answers to it"]]
 
 
 @pytest.mark.parametrize("law", sorted(catalogue()))

@@ -8,7 +8,8 @@ from small_diagnosis import diagnosis, recording
 
 from twin.quantities import Fitted
 from twin.report import console, sentence
-from twin.report.numbers import column, number, percent, plus_minus
+from twin.report.numbers import column, number, percent, plus_minus, rough
+from twin.report.sentence import blind
 
 
 def test_explained_says_what_how_much_and_where_it_was_measured():
@@ -63,6 +64,10 @@ def test_numbers_follow_their_error():
     assert number(float("nan")) == "\N{EN DASH}"
     assert number(-0.001) == "0.00"
     assert column([0.0123, 1.5, None]) == ["0.01", "1.50", "\N{EN DASH}"]
+    assert rough(Fitted(2.034e-5, None, "m/N")) == "0.020 mm/N"
+    assert rough(Fitted(2e-5, 1e-6, "N/s")) == "0.072 N/h"
+    assert rough(Fitted(0.0253, None, "rad")) == "1.4°"
+    assert rough(Fitted(312.0, None, "N/m")) == "312 N/m"
     assert [percent(p) for p in (0.0, 0.5, 1.0)] == ["less than 1 %", "50 %", "more than 99 %"]
 
 
@@ -75,3 +80,15 @@ def test_console_prints_the_sentence_and_reads_no_markup_in_data(verdict):
     assert sentence(d) in text
     assert "[red]desk[/red]" in text
     assert ("Next experiment" in text) == (verdict != "noise")
+    assert "These data cannot show: tendon elasticity (needs tendon displacements)." in text
+
+
+def test_effects_hidden_for_one_reason_share_it_and_a_full_design_is_silent():
+    of = diagnosis().identifiability
+    backlash = replace(of[2], effect="tendon_backlash")
+    warm = replace(of[2], effect="temperature_softening", lacking=("a log of the room",))
+    words = (
+        "These data cannot show: tendon elasticity, tendon backlash (needs tendon displacements); temperature softening (needs a"
+    )
+    assert blind(diagnosis(identifiability=(*of, backlash, warm))) == f"{words} log of the room)."
+    assert blind(diagnosis(identifiability=of[:2])) is None

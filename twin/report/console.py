@@ -11,22 +11,23 @@ from twin.report.contents import KINDS, experiment_words
 from twin.report.numbers import SHOWN, plus_minus
 from twin.report.sections.before_after import rows
 from twin.report.sections.effects import table
-from twin.report.sentence import headline, sentence
+from twin.report.sentence import blind, groups, headline, sentence
 
 
 def console(diagnosis: Diagnosis) -> RenderableType:
     """The sentence, the error before and after, the effects, and the next experiment."""
     d = diagnosis
     parts: list[RenderableType] = [Text(sentence(d), style="bold"), Text("")]
-    for group in d.errors.after:
-        error = _table(f"{KINDS.get(group, group).replace('_', ' ')} error on held-out trials ({d.bench.recording.source})")
+    for group in groups(d):
+        title = f"{KINDS.get(group, group).replace('_', ' ')} error on held-out trials ({d.bench.recording.source})"
+        error = _table()
         for name, justify in (("", "left"), (f"RMS, {SHOWN[group][0]}", "right"), ("95 % confidence", "right")):
             error.add_column(name, justify=justify)  # type: ignore[arg-type]
         for row in rows(d, group):
             error.add_row(row["stage"], row["error"], row["interval"])
-        parts += [error, Text("")]
+        parts += [Text(title, style="dim"), error, Text("")]
     if d.claims:
-        effects = _table("effects in force")
+        effects = _table()
         for name, justify in (
             ("", "left"),
             ("parameters", "left"),
@@ -37,16 +38,18 @@ def console(diagnosis: Diagnosis) -> RenderableType:
         for claim, row in zip(d.claims, table(d.claims, headline(d)), strict=True):
             values = "\n".join(f"{n} = {plus_minus(f)}" for n, f in claim.parameters.items())
             effects.add_row(str(row["name"]), Text(values), str(row["probability"]), str(row["error"]))
-        parts += [effects, Text("")]
+        parts += [Text("effects in force", style="dim"), effects, Text("")]
     if d.verdict in ("partly_explained", "unexplained"):
         parts.append(Text(d.description))
     if (words := experiment_words(d)) is not None:
         parts.append(Text.assemble(("Next experiment: ", "bold"), words))
+    if (words := blind(d)) is not None:
+        parts.append(Text(words))
     if d.notices:
         count = f"{len(d.notices)} notice{'s' if len(d.notices) > 1 else ''}"
         parts.append(Text(f"{count} about the data in the report.", style="dim"))
     return Group(*parts)
 
 
-def _table(title: str) -> Table:
-    return Table(title=Text(title), title_justify="left", title_style="dim", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+def _table() -> Table:
+    return Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))

@@ -7,9 +7,10 @@ from typing import Any
 
 from twin.bench import Bench, drives
 from twin.diagnose import Claim, Diagnosis
+from twin.diagnose.identifiability import Visibility
 from twin.quantities import Fitted
 from twin.report.numbers import SHOWN, finite
-from twin.report.sentence import headline, sentence, structure_left
+from twin.report.sentence import groups, headline, sentence, structure_left
 
 FORMAT = "twin-report/1"
 KINDS = {
@@ -48,6 +49,7 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
         },
         "ambiguous": [list(effects) for effects in d.ambiguous],
         "next_experiment": experiment_words(d),
+        "identifiability": [_visibility(v) for v in d.identifiability],
         "below_materiality": [
             {"id": c.effect, "parameters": _parameters(c.parameters), "contribution": finite(c.contribution)}
             for c in d.below_materiality
@@ -82,15 +84,28 @@ def _weight(claim: Claim) -> dict[str, float | None]:
     return {"probability": finite(claim.probability), "contribution": finite(claim.contribution)}
 
 
+def _visibility(v: Visibility) -> dict[str, Any]:
+    """Amplitudes in sigmas, None where the design never shows the effect or never tells it apart."""
+    name, value, unit = v.smallest
+    return {
+        "id": v.effect,
+        "seen": finite(v.seen),
+        "apart": finite(v.apart),
+        "share": finite(v.share),
+        "rival": v.rival or None,
+        "smallest": {"parameter": name, "value": finite(value), "unit": unit},
+        "lacking": list(v.lacking),
+    }
+
+
 def _parameters(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:
     return {n: {"value": finite(f.value), "std": finite(f.std), "unit": f.unit} for n, f in parameters.items()}
 
 
 def _error(d: Diagnosis) -> dict[str, Any]:
     out = {"split": "held-out trials", "trials": labels(d, d.held_trials), **_of_group(d, headline(d))}
-    groups = list(d.errors.after)
-    if len(groups) > 1:
-        out["by_kind"] = {KINDS.get(g, g): _of_group(d, g) for g in groups}
+    if len(groups(d)) > 1:
+        out["by_kind"] = {KINDS.get(g, g): _of_group(d, g) for g in groups(d)}
     return out
 
 

@@ -16,6 +16,9 @@ FRIENDLY = {  # SI unit -> (shown unit, factor)
     "kg": ("g", 1e3),
     "Pa": ("GPa", 1e-9),
     "rad": ("°", 180.0 / math.pi),
+    "m/N": ("mm/N", 1e3),
+    "N/s": ("N/h", 3600.0),
+    "1/K": ("%/K", 1e2),
     "1": ("", 1.0),
 }
 
@@ -54,7 +57,17 @@ def plus_minus(fitted: Fitted) -> str:
     text = number(shown.value, decimals)
     if finite(shown.std) is not None:
         text += f" ± {number(shown.std, decimals)}"
-    return text + (shown.unit if shown.unit == "°" else f" {shown.unit}" if shown.unit else "")
+    return text + _suffix(shown.unit)
+
+
+def rough(fitted: Fitted) -> str:
+    """The value alone, with two significant digits, in a unit of everyday size: "0.047 mm"."""
+    shown = friendly(fitted)
+    return number(shown.value, places([shown.value], 2)) + _suffix(shown.unit)
+
+
+def _suffix(unit: str) -> str:
+    return unit if unit == "°" else f" {unit}" if unit else ""
 
 
 def column(values: Sequence[float | None], significant: int = 3) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.diagnose.null import LINE
@@ -18,8 +20,13 @@ def effect_words(identifier: str) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """The group of outputs whose error stands for the twin: markers where there are any, else the first."""
-    groups = list(diagnosis.errors.after)
-    return "marker" if "marker" in groups else groups[0]
+    after = diagnosis.errors.after
+    return "marker" if "marker" in after else next(iter(after))
+
+
+def groups(diagnosis: Diagnosis) -> list[str]:
+    """The groups of outputs, the headline first."""
+    return sorted(diagnosis.errors.after, key=lambda g: g != headline(diagnosis))
 
 
 def structure_left(diagnosis: Diagnosis) -> str | None:
@@ -50,6 +57,21 @@ def rivals(diagnosis: Diagnosis) -> list[str]:
     claimed = {c.effect for c in diagnosis.claims}
     others = [effects for effects in diagnosis.ambiguous if not claimed <= set(effects)]
     return [" with ".join(effect_words(e) for e in effects) for effects in others]
+
+
+def needs(lacking: tuple[str, ...]) -> str:
+    """What would show an effect that a design cannot."""
+    return f"needs {' and '.join(lacking)}" if lacking else "nothing measured here answers to it"
+
+
+def blind(diagnosis: Diagnosis) -> str | None:
+    """The effects that these data cannot show at any size, with what they lack; None where they can show all."""
+    lacking: dict[tuple[str, ...], list[str]] = {}
+    for v in diagnosis.identifiability:
+        if not math.isfinite(v.seen):
+            lacking.setdefault(v.lacking, []).append(effect_words(v.effect))
+    words = [f"{', '.join(names)} ({needs(why)})" for why, names in lacking.items()]
+    return f"These data cannot show: {'; '.join(words)}." if words else None
 
 
 def sentence(diagnosis: Diagnosis) -> str:

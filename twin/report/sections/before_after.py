@@ -9,16 +9,16 @@ from twin.report.contents import KINDS, labels
 from twin.report.numbers import SHOWN, number, places, upper_first
 from twin.report.plots import ACCENT, BEFORE, MEASURED, Plot, figure
 from twin.report.sections.section import Section, Story
+from twin.report.sentence import groups
 
 ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with the effects"}
 
 
 def section(story: Story) -> Section:
     d = story.diagnosis
-    groups = list(d.errors.after)
     tables = [
         {"kind": upper_first(KINDS.get(g, g).replace("_", " ")), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)}
-        for g in groups
+        for g in groups(d)
     ]
     return Section("before-after", "Before and after", "before_after.html", {"tables": tables, "trials": labels(d, d.held_trials)})
 

@@ -7,13 +7,13 @@ import numpy as np
 from twin.report.contents import KINDS, driven
 from twin.report.numbers import SHOWN, column
 from twin.report.sections.section import Section, Story
+from twin.report.sentence import groups
 
 
 def section(story: Story) -> Section:
     d = story.diagnosis
-    groups = list(dict.fromkeys(o.group for o in d.bench.outputs))
     rows = []
-    for g in groups:
+    for g in groups(d):
         j = [i for i, o in enumerate(d.bench.outputs) if o.group == g]
         sigma = SHOWN[g][1] * d.noise.sigma[j]
         low, high = column([float(sigma.min()), float(sigma.max())])
