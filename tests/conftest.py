@@ -34,7 +34,12 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Day:
         truth = None if effect is None else replace(all_effects()[effect].draw(laws), strength=strength)
         logs = run(built(robot), [] if truth is None else [truth], plan, lambda done: None)
         folder: Path = tmp_path_factory.mktemp("days") / "day"
-        write_set(folder, f"test day {seed}", plan, logs, noise, instruments)
+        write_set(
+            folder, f"test day {seed}", plan, logs, noise, instruments,
+            displacement=truth is not None and truth.seen_in == "displacement",
+            ambient=truth is not None and truth.needs_ambient,
+            exact_input=truth is not None and truth.logs_command,
+        )  # fmt: skip
         return read(folder), truth
 
     return day

@@ -189,7 +189,7 @@ def _working(title: str) -> Iterator[Callable[[str], None]]:
 
     with err.status(title) as status:
         if not is_compiled():
-            status.update("compiling the solver, once on this machine (about 15 s)")
+            status.update("compiling the solver, once on this machine (about 20 s)")
             compile_solver()
         status.update(title)
         yield lambda words: status.update(f"{title}: {words}")

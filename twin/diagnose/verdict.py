@@ -9,10 +9,11 @@ import numpy as np
 
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Model, Objective, fit
-from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Evidence, Spectrum
+from twin.diagnose.describe import components, describe, nearest, worst_channel
+from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import Experiment, next_experiment
 from twin.diagnose.identifiability import Visibility, identifiability
-from twin.diagnose.null import ACCEPT, LINE, Thresholds, thresholds
+from twin.diagnose.null import ACCEPT, Thresholds, thresholds
 from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
@@ -158,9 +159,15 @@ def diagnose(
     }
     moved = _sensitivity(bench, held, final.fit.model.twin, [predictions["after"][k] for k in held])
     floor = objective.whitener.noise.floor(bench, moved)
-    components = _components(final)
-    worst = _worst_channel(bench, fitted, final)
+    left = final.fit.z.reshape(final.discrepancy.mean.shape)
     strongest = tuple(evidence.strongest(final.discrepancy))
+    if verdict in ("noise", "explained"):
+        description = f"What is left looks like noise (smooth part {final.discrepancy.size:.2f} sigma)."
+    else:
+        description = describe(bench, fitted, left, final.discrepancy, strongest[0][0], line, bars)
+        if runners:
+            share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)
+            description += nearest((runners[0].effect, *runners[0].beside), share)
     return Diagnosis(
         verdict=verdict,
         twin=final.fit.model.twin,
@@ -174,11 +181,11 @@ def diagnose(
         noise=objective.whitener.noise,
         structure_before=before,
         structure_after=final.discrepancy.size,
-        structure=components,
+        structure=components(final.discrepancy),
         strongest=strongest,
         line=line,
-        worst_channel=worst,
-        description=_describe(verdict, components, strongest, line, worst, final.discrepancy.size),
+        worst_channel=worst_channel(bench, left),
+        description=description,
         identifiability=tuple(table),
         ambiguous=ambiguous,
         experiment=experiment,
@@ -302,8 +309,10 @@ class _HeldOut:
         self.bench, self.held = bench, list(held)
 
     def error(self, twin: Twin) -> float:
-        """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group; NaN where one has
-        no equilibrium."""
+        """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group.
+
+        NaN where one has no equilibrium.
+        """
         try:
             traces: list[Trace] = simulate(twin, self.bench, trials=self.held)
         except SolveError:
@@ -363,32 +372,3 @@ def _rival(found: Search, final: Weighed, own: tuple[str, ...]) -> Weighed | Non
         if w.effects != final.effects and set(w.effects) != set(own) and not set(final.effects) < set(w.effects):
             return w
     return None
-
-
-def _components(best: Weighed) -> dict[str, float]:
-    """RMS (sigmas) of the left-over smooth error by component, over all channels."""
-    return {c: float(np.sqrt(np.mean(v))) for c, v in zip(COMPONENTS, best.discrepancy.variance.T, strict=True)}
-
-
-def _worst_channel(bench: Bench, fitted: list[int], best: Weighed) -> str:
-    z = best.fit.z.reshape(best.discrepancy.mean.shape)
-    return bench.outputs[int(np.argmax((z**2).mean(axis=0)))].channel.name
-
-
-def _describe(
-    verdict: str,
-    components: dict[str, float],
-    strongest: Sequence[tuple[str, float]],
-    line: tuple[float, float],
-    worst: str,
-    size: float,
-) -> str:
-    """What is left, so that an engineer knows where to look."""
-    if verdict in ("noise", "explained"):
-        return f"What is left looks like noise (smooth part {size:.2f} sigma)."
-    main = max(components, key=lambda c: components[c])
-    words = f"A smooth part of {size:.2f} sigma is left. It moves mostly with {IN_WORDS[main]} ({components[main]:.2f} sigma)"
-    words += f", strongest with {strongest[0][0]!r}; it is largest in {worst}."
-    if line[0] > LINE:
-        words += f" It has a line at {line[1]:.2f} Hz."
-    return words

@@ -103,7 +103,8 @@ def tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU
 
 @jit
 def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, last, held, free, stretch):
-    """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N); their tensions are found.
+    """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N), and their tensions.
+
     Where the guess q does not lead there the jump is made from `last`, which was at `held`, in ever smaller parts if need be.
 
     Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits (z, s); with parts, after each.
