@@ -1,9 +1,8 @@
-"""What is left after the verdict: how much of it is smooth, what it moves with, and whether it has a line in its spectrum."""
+"""What is left after the verdict, in words, and what its smooth part moves with."""
 
 from __future__ import annotations
 
 from twin.diagnose.evidence import IN_WORDS
-from twin.diagnose.null import LINE
 from twin.report.numbers import column
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import structure_left
@@ -25,6 +24,5 @@ def section(story: Story) -> Section:
             "worst": d.worst_channel,
             "components": [{"name": IN_WORDS.get(c, c), "size": s} for (c, _), s in zip(parts, sizes, strict=True)],
             "strongest": [{"name": n, "size": s} for (n, _), s in zip(strongest, weights, strict=True)],
-            "line": f"{d.line[1]:.2f}" if d.line[0] > LINE else None,
         },
     )
