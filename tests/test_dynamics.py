@@ -49,11 +49,12 @@ def tips(path: Path) -> np.ndarray:
 def ramps(
     poses: list[tuple[float, float, float]], ramp: float, hold: float, rate: float = 20.0
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Times, tensions and the last sample of each hold: straight lines from pose to pose in `ramp` s, held for `hold` s."""
+    """Times, tensions and the last sample of each hold: pose to pose in `ramp` s, eased from rest to rest, held for `hold` s."""
     knots = np.append(0.0, np.cumsum([ramp, hold] * (len(poses) - 1)))
     t = np.linspace(0, knots[-1], round(knots[-1] * rate) + 1)
-    corners = np.vstack([poses[:1], np.repeat(poses[1:], 2, axis=0)])
-    T = np.stack([np.interp(t, knots, c) for c in corners.T], axis=1)
+    pose = np.arange(len(poses))
+    last, way = np.divmod(np.interp(t, knots, np.repeat(pose, 2)[1:]), 1.0)
+    T = np.stack([np.interp(last + way**2 * (3 - 2 * way), pose, c) for c in np.array(poses).T], axis=1)
     return t, T, [int(np.searchsorted(t, k - 1e-9)) for k in knots[2::2]]
 
 
@@ -79,11 +80,12 @@ def test_without_friction_it_settles_to_the_static_shape(loads: Loads) -> None:
 
 @loaded
 def test_with_friction_it_settles_to_the_static_shape_of_a_slow_pull(loads: Loads) -> None:
-    """Slip remembers how far the motion lagged the tensions, in proportion to their rate; two rates give the limit."""
-    slow, slower = missed(loads, FRICTION, 8.0), missed(loads, FRICTION, 16.0)
-    assert slower.max() < 5e-5  # m: the agreement asked for
-    # Halved rate, halved difference: what is left is the lag and nothing else (2 -+ 0.2: the explicit slip's step adds a little).
-    np.testing.assert_allclose(slow / slower, 2.0, rtol=0, atol=0.2)
+    """Slip remembers how far the motion lagged the tensions, in proportion to their rate, when they came to rest."""
+    slow, slower = missed(loads, FRICTION, 4.0), missed(loads, FRICTION, 8.0)
+    assert slow.max() < 5e-5  # m: the agreement asked for
+    # What is left is that lag and nothing else: a damping time before its end the rate of an eased ramp goes as 1 / ramp^2, and
+    # with it the lag that slip keeps (4; the static solve's 1e-7 rad are 3e-7 m of the slower ramp's 5e-7 to 4e-6).
+    assert np.all(slow / slower > 3.0)
 
 
 OBSTACLE = (-1.0, 0.0, 0.0, -0.03)  # a wall across the x axis, 30 mm away
@@ -203,9 +205,9 @@ def test_creep_in_steps_is_creep_in_statics() -> None:
     twins = [Twin(load("continuum"), {}, e) for e in ((), (catalogue()["backbone_creep"](creep[1]),))]
     without, with_it = (t.predict(slow, dynamic=False).trials[0].values["disk_8_x"] for t in twins)
     assert np.abs(with_it - without).max() > 5e-3  # m: it creeps
-    # m: the motion lags the ramps: 0.5 N/s bends the tip by 20 mm/s, 10 ms (the damping time) of that are 0.2 mm; in both alike
+    # m: the motion lags the ramps: 0.75 N/s bends the tip by 30 mm/s, 10 ms (the damping time) of that are 0.3 mm; in both alike
     plain = difference(slow)
-    assert plain < 3e-4
+    assert plain < 4e-4
     assert difference(slow, creep) < plain + 3e-5
 
 
