@@ -1,0 +1,184 @@
+"""Drive by displacement: against the drive by tension, the independent rod, and what a tendon may do (pull or be slack)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tools.bench.bench import run
+from tools.bench.design import bench_day
+from tools.bench.rod import Rod
+from twin.bench import prepare
+from twin.effects import Loads, Route
+from twin.equilibrium import TOLERANCE, Equilibrium, Path
+from twin.equilibrium.lengths import CLOSED, STIFFEST
+from twin.errors import DataError
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import load
+from twin.twin import Twin
+
+SIDEWAYS, NOWHERE = Loads(np.array([9.81, 0.0, 0.0]), 0.01), Loads(np.zeros(3))
+ALL = np.ones(3, bool)
+PAID_OUT = 2e-3  # m: a tendon this much longer than its path is slack
+SHUT = 1.01 * CLOSED * TOLERANCE  # m: the gap at which the solver stops, and rounding
+
+# Newton stops with every hinge within 1e-7 rad of balance; over 16 joint sets of a 0.12 m robot the tip is then within 1e-7 m, and
+# two solutions within twice that. The gap that counts as closed, 2e-8 m, is 1e-5 N at the 2 mm/N or more this robot gives way.
+SAME_SHAPE = 3e-7  # m
+SAME_TENSION = 3e-5  # N
+
+
+@cache
+def solver() -> Equilibrium:
+    return Equilibrium(load("continuum").build())
+
+
+def pulls(n: int = 60) -> np.ndarray:
+    """Tensions (n, 3) N in which two tendons pull and the third hangs, in turns, from rest: 3 N and back."""
+    t = np.linspace(0.0, 3.0, n)
+    level = 3.0 * np.sin(np.pi * np.minimum(t % 1.0, 1.0)) ** 2
+    T = np.zeros((n, 3))
+    for k, turn in enumerate(np.minimum(t.astype(int), 2)):
+        T[k, turn], T[k, (turn + 1) % 3] = level[k], 0.4 * level[k]
+    return T
+
+
+def displacement(path: Path, stretch: float = STIFFEST) -> np.ndarray:
+    """What motors must do (n, 3) m for a solution's tensions: the path's shortening and the stretch; slack tendons paid out."""
+    u = solver().straight_path - path.path + stretch * path.tension
+    return np.where(path.tension > 0.0, u, u - PAID_OUT)
+
+
+def by_tension(T: np.ndarray, loads: Loads, route: Route | None = None) -> Path:
+    return solver().solve(np.arange(len(T), dtype=float), T, loads, route)
+
+
+def by_length(u: np.ndarray, loads: Loads, route: Route | None = None, which: np.ndarray = ALL) -> Path:
+    path = solver().solve(np.arange(len(u), dtype=float), u, loads, route, by_length=which)
+    assert path.status.all()
+    return path
+
+
+@pytest.mark.parametrize("stretch", [STIFFEST, 5e-5, 5e-4])
+def test_the_displacements_of_tensions_give_those_tensions(stretch: float) -> None:
+    T = pulls()
+    truth = by_tension(T, SIDEWAYS)
+    found = by_length(displacement(truth, stretch), SIDEWAYS, Route(stretch=stretch))
+    np.testing.assert_allclose(found.tension, T, rtol=0, atol=SAME_TENSION)
+    np.testing.assert_allclose(found.markers, truth.markers, rtol=0, atol=SAME_SHAPE)
+
+
+@pytest.mark.parametrize("route", [Route(), Route(0.2, 4e-4), Route(0.2, 4e-4, 2e-4)], ids=["smooth", "friction", "and stretch"])
+def test_the_tensions_found_give_the_same_shape(route: Route) -> None:
+    """Without weight, from rest: so friction has one history, whichever way the robot is driven. Each tendon in turn."""
+    pulled = pulls() == pulls().max(axis=1, keepdims=True)
+    u = 12e-3 * pulls().max(axis=1, keepdims=True) / 3.0 * np.where(pulled, 1.0, -1.0)
+    found = by_length(u, NOWHERE, route)
+    assert found.tension.max() > 2.0  # N: they do pull
+    again = by_tension(found.tension, NOWHERE, route)
+    np.testing.assert_allclose(again.markers, found.markers, rtol=0, atol=SAME_SHAPE)
+    np.testing.assert_allclose(again.path, found.path, rtol=0, atol=SAME_SHAPE)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.2])
+@pytest.mark.parametrize("stretch", [STIFFEST, 2e-4])
+def test_a_tendon_pulls_at_its_length_or_is_slack(mu: float, stretch: float) -> None:
+    """T >= 0, path <= free length + stretch T, and one of the two is an equality; on motions nobody has planned."""
+    u = np.random.default_rng(1).uniform(-4e-3, 8e-3, (6, 3))
+    u = np.stack([np.interp(np.linspace(0, 5, 101), np.arange(6), c) for c in u.T], axis=1)
+    u[:, 2] = -u[:, 0] - u[:, 1] - 1e-3  # a bent robot's three displacements add up to about nothing: more would tear at it
+    found = by_length(u, SIDEWAYS, Route(mu, 4e-4, stretch))
+    gap = found.path - (solver().straight_path - u) - stretch * found.tension
+    taut = found.tension > 0.0
+    assert 0.2 < taut.mean() < 0.9  # both happen
+    assert found.tension.min() == 0.0
+    assert gap.max() < SHUT
+    assert np.abs(gap[taut]).max() < SHUT
+    assert gap[~taut].min() < -1e-4  # m: slack is slack
+
+
+def test_a_robot_with_all_tendons_paid_out_hangs_as_without_them() -> None:
+    found = by_length(np.full((5, 3), -0.05), SIDEWAYS)
+    assert not found.tension.any()
+    np.testing.assert_allclose(found.markers, by_tension(np.zeros((5, 3)), SIDEWAYS).markers, rtol=0, atol=SAME_SHAPE)
+
+
+def test_an_elastic_tendon_gives_less_of_its_displacement() -> None:
+    u = np.outer(np.linspace(0.0, 10e-3, 20), [1.0, -1.0, -1.0])
+    stiff, soft = (by_length(u, NOWHERE, Route(stretch=s)) for s in (STIFFEST, 1e-3))
+    assert (soft.tension[1:, 0] < stiff.tension[1:, 0]).all()
+    # The robot is a spring of c m/N at this tendon; in series with 1 mm/N the same travel is shared: T_soft (c + 1e-3) = T_stiff c.
+    c = u[-1, 0] / stiff.tension[-1, 0]
+    share = c / (c + 1e-3)
+    # The spring hardens as it bends (its tendon's chord comes nearer): by 3 % over this range, and 1 - share of that counts.
+    assert soft.tension[-1, 0] / stiff.tension[-1, 0] == pytest.approx(share, abs=0.03 * (1.0 - share))
+
+
+@pytest.mark.parametrize("free", [0, 1, 2])
+def test_some_tendons_by_tension_and_others_by_displacement(free: int) -> None:
+    T = pulls()
+    truth = by_tension(T, SIDEWAYS)
+    which = np.arange(3) != free
+    found = by_length(np.where(which, displacement(truth), T), SIDEWAYS, which=which)
+    np.testing.assert_array_equal(found.tension[:, free], T[:, free])
+    np.testing.assert_allclose(found.tension, T, rtol=0, atol=SAME_TENSION)
+    np.testing.assert_allclose(found.markers, truth.markers, rtol=0, atol=SAME_SHAPE)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_it_is_the_rods_bench_day(seed: int) -> None:
+    """Trials of the bench's design "by_length" run on the described rod, which shares no code with the twin."""
+    day = bench_day("by_length", np.random.default_rng(seed))
+    few = tuple(t for t in day.trials if t.name in ("slow_1", "pair_2", "wander_3"))
+    for log in run(Rod(), [], replace(day, trials=few)):
+        found = by_length(log.displacement, Loads(np.array(day.gravity), log.trial.payload))
+        assert log.tension.max() > 2.0  # N
+        # With given tensions the tip is within 0.05 % of the length (test_equilibrium); given lengths leave less to choose: 0.04 mm
+        # and 2 mN were the most over six trials. Three times that is still half of what a load cell reads to.
+        np.testing.assert_allclose(found.markers[:, : log.markers.shape[1]], log.markers, rtol=0, atol=1.2e-4)
+        np.testing.assert_allclose(found.tension, log.tension, rtol=0, atol=6e-3)
+
+
+# ---- from a recording ----------------------------------------------------------------------------------------------------
+
+
+def recording(drives: dict[str, np.ndarray], outputs: tuple[str, ...]) -> Recording:
+    n = len(next(iter(drives.values())))
+    channels = [Channel(name, "input", "N" if name.endswith("tension") else "mm") for name in drives]
+    channels += [Channel(name, "output", "N" if name.endswith("tension") else "mm") for name in outputs]
+    values = {**drives, **{name: np.zeros(n) for name in outputs}}
+    trial = Trial("one.csv", np.arange(n, dtype=float), values, {"tip_payload": 0.01})
+    return Recording("continuum", "drives", "simulation: by hand", np.array([9.81, 0.0, 0.0]), tuple(channels), (trial,))
+
+
+def test_a_mixed_set_is_predicted_and_repeats_the_one_by_tension() -> None:
+    twin = Twin.of("continuum")
+    tip, T = ("disk_8_x", "disk_8_y", "disk_8_z"), pulls()
+    of_tension = {f"tendon_{i + 1}_tension": T[:, i] for i in range(3)}
+    logged = twin.predict(recording(of_tension, (*tip, "tendon_2_displacement", "tendon_3_displacement"))).trials[0].values
+    paid_out = {f"tendon_{i}_displacement": logged[f"tendon_{i}_displacement"] - PAID_OUT * (T[:, i - 1] == 0.0) for i in (2, 3)}
+    drives = {"tendon_1_tension": T[:, 0], **paid_out}
+    again = twin.predict(recording(drives, (*tip, "tendon_2_tension", "tendon_3_tension"))).trials[0].values
+    for name in tip:
+        # m: the displacement is that of an inextensible tendon, a driven one gives STIFFEST * 3 N = 3 um, of which the tip makes
+        # up to ten times as much (0.12 m of body, 8 mm from its axis: 15).
+        np.testing.assert_allclose(again[name], logged[name], rtol=0, atol=15 * 3.0 * STIFFEST)
+    for i in (2, 3):
+        # N: the same 3 um at 2 mm/N.
+        np.testing.assert_allclose(again[f"tendon_{i}_tension"], T[:, i - 1], rtol=0, atol=3.0 * STIFFEST / 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("drives", "said"),
+    [
+        (("tendon_1_tension", "tendon_2_displacement"), "tendon 3 is not driven"),
+        (("tendon_1_tension", "tendon_2_displacement", "tendon_2_tension", "tendon_3_tension"), "tendon 2 is driven twice"),
+    ],
+)
+def test_a_tendon_driven_twice_or_not_at_all_is_refused(drives: tuple[str, ...], said: str) -> None:
+    with pytest.raises(DataError, match=said) as refused:
+        prepare(recording(dict.fromkeys(drives, np.zeros(3)), ("disk_8_x",)), load("continuum"))
+    assert "\n" not in str(refused.value)
