@@ -54,14 +54,23 @@ def describe(
         size = float(np.sqrt(2.0 * (swing**2).mean(axis=0).max()))
         words.append(f"A line at {line[1]:.2f} Hz is left, of {size:.1f} sigma in {worst_channel(bench, swing)}")
         words[-1] += _and(place(bench, swing))
-    began = change(bench, trials, z)
-    if began is not None:
-        label = {t.name: t.label for t in bench.recording.trials}
-        last, first = (bench.inputs[k] for k in began)
-        origin = bench.inputs[0].clock[0]
-        minutes = f"{(last.clock[-1] - origin) / 60:.0f} to {(first.clock[0] - origin) / 60:.0f} min into the session"
-        words.append(f"It changed at once between {label[last.name]} and {label[first.name]}, {minutes}: look for what moved then")
     return ". ".join(words) + "."
+
+
+def since(bench: Bench, trials: Sequence[int], z: np.ndarray) -> str:
+    """When the residual z (n, m) of the calibrated robot changed at once, in words; "" if it did not.
+
+    Calibrated, without effects: no known law steps once in a session, but several together may be bent into one.
+    """
+    began = change(bench, trials, z)
+    if began is None:
+        return ""
+    label = {t.name: t.label for t in bench.recording.trials}
+    last, first = (bench.inputs[k] for k in began)
+    start = bench.inputs[0].clock[0]
+    minutes = f"{(last.clock[-1] - start) / 60:.0f} to {(first.clock[0] - start) / 60:.0f} min into the session"
+    between = f"between {label[last.name]} and {label[first.name]}, {minutes}"
+    return f" The calibrated robot's error changed at once {between}: what moved then?"
 
 
 def nearest(effects: Sequence[str], share: float) -> str:
