@@ -168,8 +168,9 @@ def test_a_closed_cycle_takes_energy_and_gives_none(law: type[Effect]) -> None:
         n = len(once.time)
         T, d = true.tension[n - 1 :], true.displacement[n - 1 :]
         work = float((0.5 * (T[1:] + T[:-1]) * np.diff(d, axis=0)).sum())
-        # An elastic loop closes to the trapezoid's error, 1e-6 J with 40 samples of a 20 mJ loop; friction and creep lose more.
-        assert work > -2e-6
+        # An elastic loop closes to the trapezoid's error: 4e-6 J either way for a wall's kink between two of 40 samples (3e-7 with
+        # 160, 1e-9 with 640), 1e-9 J for the others; friction and creep lose more.
+        assert work > -5e-6
         if law.id in ("tendon_friction", "backbone_creep"):
             assert work > 1e-5
 

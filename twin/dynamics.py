@@ -76,9 +76,10 @@ def step_through(
         place(model, data, chain, q + (time[i] - now) * velocity)
         for k in range(chain.marker.size):
             marker[i, k] = chain.site[chain.marker[k]]
+        bowing = springs(chain.qpos, spring, K, chain.slender, tension[i].sum(), chain.partner, chain.coupling, chain.hand, r, none)
         for t in range(T.size):
             lay(chain, t, u, length, theta, distal)
-            path[i, t] = distal[0]
+            path[i, t] = distal[0] + bowing
         q_out[i] = chain.qpos
         place(model, data, chain, q)
         if amplitude.size and i > 0:

@@ -148,17 +148,18 @@ def pass_on(tension, law, theta, z0, s0, s, z, T):
 
 @jit
 def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
-    """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), at angles q already in MuJoCo's data.
+    """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), at angles q already in MuJoCo's data; returns what
+    the bowing of the pressed backbone takes from each tendon's path (m, negative).
 
     (z0, s0) (n_tendon, n_disk) is the slip state and distal cable length of each hole when last at rest; (z, s) is what they are
-    at q; s[:, 0] is the whole path.
+    at q; s[:, 0], which no hole needs, is dE/dT: the whole path less that.
     """
     nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
     nv, tangent = q.shape[0], J.size > 0
     pressure = 0.0
     for t in range(nt):
         pressure += tension[t]
-    springs(q, rest, chain.stiffness, chain.slender, pressure, chain.partner, chain.coupling, chain.hand, r, J)
+    bowing = springs(q, rest, chain.stiffness, chain.slender, pressure, chain.partner, chain.coupling, chain.hand, r, J)
     _add_weight(chain, load, r, J)
     if law.wall[4] > 0.0:
         wall_force(chain, law.wall, r, J)
@@ -171,6 +172,7 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
     dlog = np.empty(nv)
     for t in range(nt):
         lay(chain, t, u, length, theta, s[t])
+        s[t, 0] += bowing
         pass_on(tension[t], law, theta, z0[t], s0[t], s[t], z[t], T)
         for d in range(nd):
             b = chain.site[chain.hole[t, d + 1]]
@@ -211,3 +213,4 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
                 f = -law.mu * T[d] * dl[i]
                 for j in range(nv):
                     J[i, j] += f * dlog[j]
+    return bowing

@@ -77,23 +77,24 @@ def bendings(q, hand, phi, D):
 
 @jit
 def springs(q, rest, stiffness, slender, pressure, partner, coupling, hand, r, J):
-    """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv). `rest` is phi0 (nv,).
-
-    `slender` (nv,) is h^2 / EI (1/N; 0 for twist), `pressure` the sum of the tendons' tensions (N).
+    """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv); returns dE/dP (m), which bowing takes from all tendons'
+    lengths. `rest` is phi0 (nv,), `slender` (nv,) h^2 / EI (1/N; 0 for twist), `pressure` P the sum of the tendons' tensions (N).
     """
     nv = q.size
     phi, D, m = np.empty(nv), np.empty((hand.size, 3, 3)), np.empty(nv)
     bendings(q, hand, phi, D)
-    K = np.empty(nv)
+    K, bowing = np.empty(nv), 0.0
     for i in range(nv):
         p = partner[i]
-        K[i] = stiffness[i] * (1.0 - (pressure * slender[i]) ** 2 / BEAM_COLUMN)
+        softer = stiffness[i] * pressure * slender[i] ** 2 / BEAM_COLUMN
+        K[i] = stiffness[i] - softer * pressure
+        bowing -= softer * (phi[i] - rest[i]) ** 2
         m[i] = K[i] * (phi[i] - rest[i]) + coupling[i] * (phi[i] - rest[i] - phi[p] + rest[p])
     for j in range(hand.size):
         for b in range(3):
             r[3 * j + b] = D[j, 0, b] * m[3 * j] + D[j, 1, b] * m[3 * j + 1] + D[j, 2, b] * m[3 * j + 2]
     if J.size == 0:
-        return
+        return bowing
     for i in range(nv):
         for k in range(nv):
             J[i, k] = 0.0
@@ -117,3 +118,4 @@ def springs(q, rest, stiffness, slender, pressure, partner, coupling, hand, r, J
             for a in range(3):
                 for b in range(3):
                     J[o + a, 3 * other + b] -= D[j, c, a] * coupling[o + c] * D[other, p - 3 * other, b]
+    return bowing

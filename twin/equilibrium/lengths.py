@@ -244,10 +244,10 @@ def hold_once(model, data, chain, rest, law, load, z, s, q, LU, held_by, tension
     r, none = np.empty(q.size), np.empty((0, 0))
     z1, s1 = np.empty(z.shape), np.empty(s.shape)
     place(model, data, chain, q)
-    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
+    bowing = balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
     longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch)
     place(model, data, chain, q)
-    commit(chain, law, z, s)
+    commit(chain, law, z, s, bowing)
     return 1 if 0.0 <= longest < LONGEST_STEP else 0
 
 

@@ -162,8 +162,9 @@ def solve(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol)
 
 
 @jit
-def commit(chain, law, z, s):
-    """Advance slip states and distal lengths to the geometry in MuJoCo's data."""
+def commit(chain, law, z, s, bowing):
+    """Advance slip states and distal lengths to the geometry in MuJoCo's data, `bowing` (m) as before the step: it changes by 1e-3
+    of what the path does."""
     for t in range(z.shape[0]):
         distal = 0.0
         for d in range(z.shape[1] - 1, -1, -1):
@@ -172,6 +173,7 @@ def commit(chain, law, z, s):
             distal += np.sqrt(dot(v, v))
             z[t, d] = slip_state(z[t, d], s[t, d] - distal, law.presliding)
             s[t, d] = distal
+        s[t, 0] += bowing
 
 
 @jit
@@ -183,12 +185,12 @@ def step_once(model, data, chain, rest, tension, law, load, z, s, q, LU):
     r, none = np.empty(q.size), np.empty((0, 0))
     z1, s1 = np.empty(z.shape), np.empty(s.shape)
     place(model, data, chain, q)
-    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
+    bowing = balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
     substitute(LU, r)
     longest = 0.0
     for i in range(q.size):
         q[i] -= r[i]
         longest = max(longest, abs(r[i]))
     place(model, data, chain, q)
-    commit(chain, law, z, s)
+    commit(chain, law, z, s, bowing)
     return 1 if longest < LONGEST_STEP else 0
