@@ -15,8 +15,8 @@ from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Discrepancy
 from twin.diagnose.null import Thresholds
 
 ALIKE = 1.5  # ratio of the largest marker error to the smallest that counts as none
-ALONE = 0.6  # of the summed squares: one marker carries it (an error that grows with the square of the arc length: 0.48 at the tip)
-SUDDEN = 0.5  # of the rise along the body that happens between two neighbours: it sets in there
+ALONE = 3.0  # ratio of the largest marker error to the next: that marker alone is off (errors that grow along the body: some 8/7)
+TWICE = 2.0  # the square of both jumps at the ends of an interval over that of any other: the bending is wrong there
 SHUFFLES = 999  # orders of the trials of which none may show so clear a step: one chance in a thousand
 STEP = 0.2  # of the trials' scatter a step in time may leave; of a steady drift the best step leaves a quarter
 NEAR = 0.1  # of the held-out error a known effect must take off to be worth a hint
@@ -85,27 +85,61 @@ def _and(words: str) -> str:
     return f"; {words}" if words else ""
 
 
-def place(bench: Bench, x: np.ndarray) -> str:
-    """Which markers carry an error x (n, m), in words; "" with fewer than three of them."""
-    columns: dict[int, list[int]] = {}
+def _markers(bench: Bench) -> dict[str, list[int]]:
+    """Columns of each marker by its name, base to tip, in order of their axes."""
+    found: dict[int, list[int]] = {}
     for j, o in enumerate(bench.outputs):
         if o.group == "marker":
-            columns.setdefault(o.index, []).append(j)
+            found.setdefault(o.index, []).append(j)
+    in_order = (sorted(found[i], key=lambda j: bench.outputs[j].axis) for i in sorted(found))
+    return {bench.outputs[c[0]].channel.name.rpartition("_")[0]: c for c in in_order}
+
+
+def place(bench: Bench, x: np.ndarray) -> str:
+    """Which markers carry an error x (n, m), in words; "" with fewer than three of them."""
+    columns = _markers(bench)
     if len(columns) < 3:
         return ""
-    order = [columns[i] for i in sorted(columns)]  # base to tip
-    names = [bench.outputs[c[0]].channel.name.rpartition("_")[0] for c in order]
-    size = np.array([np.sqrt((x[:, c] ** 2).mean()) for c in order])
+    names = list(columns)
+    size = np.array([np.sqrt((x[:, c] ** 2).mean()) for c in columns.values()])
     most = int(np.argmax(size))
     if size[most] < ALIKE * size.min():
         return "it is alike along the body"
-    if size[most] ** 2 > ALONE * (size**2).sum():
+    if size[most] > ALONE * np.sort(size)[-2]:
         return f"{names[most]} alone carries most of it: check that marker"
-    rise = np.diff(size)
-    sudden = int(np.argmax(rise))
-    if rise[sudden] > SUDDEN * (size.max() - size.min()):
-        return f"it sets in between {names[sudden]} and {names[sudden + 1]}"
-    return f"it grows from {names[0]} to {names[-1]}" if size[-1] > size[0] else f"it fades from {names[0]} to {names[-1]}"
+    if most == len(names) - 1:
+        return f"it grows from {names[0]} to {names[-1]}"
+    return f"it fades from {names[0]} to {names[-1]}" if most == 0 else f"it is largest around {names[most]}"
+
+
+def where(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Sequence[np.ndarray]) -> str:
+    """The one place at which the calibrated robot bends wrongly, in words; "" if there is no such place.
+
+    `off` (n, m) is the smooth part of its error, `predicted` (n_k, m) where it should be, both SI. A chord t from marker to marker,
+    the base the first, turns by w = t x (change of `off` along it) / |t|^2. Bending that is wrong between two markers makes w jump
+    at both, whatever the rest of the body does to make up for it.
+    """
+    whole = {name: c for name, c in _markers(bench).items() if len(c) == 3}
+    if len(whole) < 4:
+        return ""
+    columns = list(whole.values())
+    seen = np.concatenate([np.isfinite(bench.measured[k][:, columns]).all(axis=(1, 2)) for k in trials])
+    t, moved = (_chords(x[:, columns][seen]) for x in (np.concatenate(list(predicted)), off))
+    turn = np.cross(t, moved) / (t**2).sum(axis=2, keepdims=True)
+    jump = (np.diff(turn, axis=1, prepend=0.0) ** 2).sum(axis=2).mean(axis=0)  # at the base and every marker but the last
+    both = np.minimum(jump[:-1], jump[1:])
+    at = int(np.argmax(both))
+    if both[at] <= TWICE * np.delete(jump, [at, at + 1]).max():
+        return ""
+    if at == 0:
+        return " The calibrated robot is off from its base on, as a whole: look at the clamp and the camera."
+    names = list(whole)
+    return f" The calibrated robot bends wrongly at one place, between {names[at - 1]} and {names[at]}."
+
+
+def _chords(x: np.ndarray) -> np.ndarray:
+    """Differences (n, marker, 3) from each marker to the next, the first from the base, which is at rest."""
+    return np.diff(x, axis=1, prepend=0.0)
 
 
 def wave(bench: Bench, trials: Sequence[int], x: np.ndarray, frequency: float) -> np.ndarray:

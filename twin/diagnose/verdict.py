@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Model, Objective, fit
-from twin.diagnose.describe import components, describe, nearest, since, worst_channel
+from twin.diagnose.describe import components, describe, nearest, since, where, worst_channel
 from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import Experiment, next_experiment
 from twin.diagnose.identifiability import Visibility, identifiability
@@ -165,6 +165,9 @@ def diagnose(
         description = f"What is left looks like noise (smooth part {final.discrepancy.size:.2f} sigma)."
     else:
         description = describe(bench, fitted, left, final.discrepancy, strongest[0][0], line, bars)
+        smooth = base.discrepancy.mean * objective.whitener.noise.sigma
+        if base.discrepancy.size > bars.left:
+            description += where(bench, fitted, smooth, [predictions["calibrated"][k] for k in fitted])
         description += since(bench, fitted, base.fit.z.reshape(left.shape))
         if runners:
             share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)

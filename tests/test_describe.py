@@ -1,0 +1,169 @@
+"""What is left, in words: the place, the line and the moment of errors that no law of the catalogue knows."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.conftest import Day
+from tests.test_design import bench as planned
+from tools.bench.design import bench_day
+from tools.bench.effects.clamp_slip import ClampSlip
+from tools.bench.effects.soft_spot import SoftSpot
+from tools.bench.effects.vibration import Vibration
+from twin.bench import Bench, prepare
+from twin.calibrate import Fit
+from twin.diagnose import Settings, calibration
+from twin.diagnose.describe import change, describe, nearest, place, since, wave, where
+from twin.diagnose.evidence import Discrepancy, Evidence, Spectrum
+from twin.diagnose.null import Thresholds
+from twin.diagnose.split import split
+from twin.measurements import Recording
+from twin.robots import load
+from twin.twin import Twin, readings, report
+
+ROBOT = load("continuum")
+
+
+# ---- on days of the bench --------------------------------------------------------------------------------------------------
+
+
+@cache
+def calibrated(recording: Recording) -> tuple[Bench, list[int], Fit, Discrepancy]:
+    """The calibrated robot's residual on the fitted trials, no effect sought."""
+    bench = prepare(recording, ROBOT)
+    fitted = split(bench, Settings().seed)[0]
+    found = calibration(recording, Twin.of(ROBOT))[0]
+    return bench, fitted, found, Evidence(bench, fitted).discrepancy(found.z)
+
+
+def residual(recording: Recording) -> tuple[Bench, list[int], np.ndarray]:
+    bench, fitted, found, discrepancy = calibrated(recording)
+    return bench, fitted, found.z.reshape(discrepancy.mean.shape)
+
+
+def told_where(recording: Recording) -> str:
+    bench, fitted, found, discrepancy = calibrated(recording)
+    at = [readings(bench, report((), t.true)) for t in found.evaluation.traces]
+    return where(bench, fitted, discrepancy.mean, at)
+
+
+def test_a_slip_of_the_clamp_is_dated(bench: Day) -> None:
+    recording, truth = bench("clamp_slip", 2.0)
+    assert isinstance(truth, ClampSlip)
+    day, fitted, z = residual(recording)
+    between = change(day, fitted, z)
+    assert between is not None
+    last, first = (day.inputs[k] for k in between)
+    assert last.clock[0] < truth.moment < first.clock[0]
+    names = [n.removesuffix(".csv") for n in (last.name, first.name)]
+    assert f"changed at once between {names[0]} and {names[1]}, " in since(day, fitted, z)
+
+
+@pytest.mark.parametrize("effect", [None, "load_cell_drift", "backbone_creep"])
+def test_a_day_on_which_nothing_slipped_has_no_moment(effect: str | None, bench: Day) -> None:
+    """Noise, a drift through the day, and a memory of seconds to minutes."""
+    assert since(*residual(bench(effect, 4.0)[0])) == ""
+
+
+def test_a_vibration_is_a_line_that_grows_to_the_tip(bench: Day) -> None:
+    recording, truth = bench("vibration", 2.0)
+    assert isinstance(truth, Vibration)
+    day, fitted, found, discrepancy = calibrated(recording)
+    z = found.z.reshape(discrepancy.mean.shape)
+    line = Spectrum.of(day, fitted).peak(z - discrepancy.mean)
+    words = describe(day, fitted, z, discrepancy, "T1", line, Thresholds())
+    said = re.search(r"^A line at ([\d.]+) Hz is left, of ([\d.]+) sigma in disk_8_(x|y); it grows from disk_1 to disk_8\.$", words)
+    assert said, words
+    # The grid's step is half a cycle in the longest trial, 103 s.
+    assert float(said[1]) == pytest.approx(truth.frequency, abs=0.5 / 103 + 0.005)
+    # 1 mm at the tip along the azimuth, in sigmas of the bench's 0.2-0.4 mm, raised by up to a half where repeats vibrate too.
+    along = max(abs(np.cos(truth.azimuth)), abs(np.sin(truth.azimuth)))
+    assert 1e-3 * along / 6e-4 < float(said[2]) < 1e-3 * along / 2e-4
+
+
+def test_a_soft_spot_is_found_where_it_is(bench: Day) -> None:
+    recording, truth = bench("soft_spot", 2.0)
+    assert isinstance(truth, SoftSpot)
+    # Interval 0 ends at disk_1.
+    assert told_where(recording).endswith(f" one place, between disk_{truth.interval} and disk_{truth.interval + 1}.")
+
+
+@pytest.mark.parametrize("effect", [None, "tendon_friction", "stiffness_gradient", "backbone_creep"])
+def test_errors_all_along_the_body_have_no_place(effect: str | None, bench: Day) -> None:
+    assert told_where(bench(effect, 4.0 if effect == "backbone_creep" else 2.0)[0]) == ""
+
+
+# ---- by hand ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def plan() -> Bench:
+    return planned(bench_day("hanging", np.random.default_rng(0)))
+
+
+def along_the_body(bench: Bench, size: np.ndarray) -> np.ndarray:
+    """An error (n, m) of these sizes at the eight disks."""
+    swing = np.sin(np.arange(bench.n_sample))[:, None]
+    return swing * size[[o.index for o in bench.outputs]]
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [
+        (np.arange(1.0, 9.0), "it grows from disk_1 to disk_8"),
+        (np.arange(1.0, 9.0) ** 2, "it grows from disk_1 to disk_8"),
+        (np.arange(8.0, 0.0, -1.0), "it fades from disk_1 to disk_8"),
+        (np.linspace(1.0, 1.4, 8), "it is alike along the body"),
+        (np.array([1.0, 2, 3, 4, 3, 2, 1, 1]), "it is largest around disk_4"),
+        (np.where(np.arange(8) == 4, 1.0, 0.1), "disk_5 alone carries most of it: check that marker"),
+    ],
+)
+def test_the_place_in_words(plan: Bench, size: np.ndarray, said: str) -> None:
+    assert place(plan, along_the_body(plan, size)) == said
+
+
+def test_a_tip_alone_has_no_place() -> None:
+    tip = planned(bench_day("tip_only", np.random.default_rng(0)))
+    assert place(tip, np.ones((tip.n_sample, 3))) == ""
+
+
+def stepped(bench: Bench, after: int, size: float, drift: float = 0.0) -> np.ndarray:
+    """Noise, with a step of `size` sigma in one channel from trial `after` on, and a drift of `drift` sigma through the day."""
+    clock = np.concatenate([i.clock for i in bench.inputs])
+    which = np.repeat(np.arange(len(bench.inputs)), [len(i.time) for i in bench.inputs])
+    z = np.random.default_rng(0).normal(size=(bench.n_sample, len(bench.outputs)))
+    z[:, 5] += size * (which >= after) + drift * clock / clock.max()
+    return z
+
+
+def test_a_step_is_dated_and_noise_and_drift_are_not(plan: Bench) -> None:
+    trials = list(range(len(plan.inputs)))
+    # A trial's mean of some 77 samples scatters by 0.11 sigma in each of 24 channels, 0.57 in all; a step of s sigma in mid-day has a
+    # variance of s^2/4 and must be four times 0.57^2 = 0.32: s above 2.3.
+    assert change(plan, trials, stepped(plan, 9, 3.5)) == (8, 9)
+    assert change(plan, trials, stepped(plan, 9, 1.5)) is None
+    assert change(plan, trials, stepped(plan, 9, 0.0)) is None
+    assert change(plan, trials, stepped(plan, 9, 0.0, drift=10.0)) is None
+    assert change(plan, trials[:3], stepped(plan, 2, 5.0)[: sum(len(i.time) for i in plan.inputs[:3])]) is None
+
+
+def test_a_wave_is_taken_out_of_noise_whatever_its_phase(plan: Bench) -> None:
+    trials = list(range(len(plan.inputs)))
+    phases = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, len(trials))
+    swing = np.concatenate([np.cos(2.0 * np.pi * 0.3 * i.time + p) for i, p in zip(plan.inputs, phases, strict=True)])
+    x = np.random.default_rng(2).normal(size=(len(swing), 2))
+    x[:, 0] += 2.0 * swing
+    found = wave(plan, trials, x, 0.3)
+    # Two parameters a trial of 70 samples and more: noise leaves sqrt(2/70) = 0.17 sigma RMS of itself.
+    assert np.sqrt(np.mean((found[:, 0] - 2.0 * swing) ** 2)) < 0.2
+    assert np.sqrt(np.mean(found[:, 1] ** 2)) < 0.2
+
+
+def test_the_nearest_effect_is_a_hint_only_where_it_helps() -> None:
+    said = " Of the known effects base tilt with contact comes nearest, but takes only 30 % off the held-out error."
+    assert nearest(("base_tilt", "contact"), 0.3) == said
+    assert nearest(("base_tilt",), 0.05) == nearest(("base_tilt",), float("nan")) == ""
