@@ -142,8 +142,8 @@ def stepped(bench: Bench, after: int, size: float, drift: float = 0.0) -> np.nda
 
 def test_a_step_is_dated_and_noise_and_drift_are_not(plan: Bench) -> None:
     trials = list(range(len(plan.inputs)))
-    # A trial's mean of some 77 samples scatters by 0.11 sigma in each of 24 channels, 0.57 in all; a step of s sigma in mid-day has a
-    # variance of s^2/4 and must be four times 0.57^2 = 0.32: s above 2.3.
+    # A trial's mean of some 77 samples scatters by 0.11 sigma in each of 24 channels, 0.57 in all; a step of s sigma in mid-day
+    # has a variance of s^2/4 and must be four times 0.57^2 = 0.32: s above 2.3.
     assert change(plan, trials, stepped(plan, 9, 3.5)) == (8, 9)
     assert change(plan, trials, stepped(plan, 9, 1.5)) is None
     assert change(plan, trials, stepped(plan, 9, 0.0)) is None
