@@ -51,7 +51,7 @@ class Scripts(HTMLParser):
     def handle_starttag(self, tag, attrs):
         self.tags.add(tag)
         self.loads += [
-            f"{tag} {k}={v}" for k, v in attrs if k in ("src", "srcset", "data") or (k == "href" and not v.startswith("#"))
+            f"{tag} {k}={v}" for k, v in attrs if k in ("src", "srcset", "data") or (k == "href" and not str(v).startswith("#"))
         ]
         self.loads += [f"{tag} {k}" for k, _ in attrs if k.startswith("on")]
         if tag == "script":
