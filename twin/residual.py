@@ -123,7 +123,7 @@ def estimate_noise(
     drive = cells if np.isfinite(cells).all() else None
     notes = []
     if pairs:
-        d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]].time) for a, b in pairs]
+        d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]].time, sensitivity[a]) for a, b in pairs]
         G, source = [sensitivity[a] for a, _ in pairs], f"{len(pairs)} pairs of repeated trials"
     else:
         d = [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual]
@@ -150,17 +150,20 @@ def estimate_noise(
     return noise, notes
 
 
-def _detrended(d: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Differences of repeats less a line in time, which absorbs drift between the two."""
+def _detrended(d: np.ndarray, time: np.ndarray, G: np.ndarray) -> np.ndarray:
+    """Differences of repeats d (n, m) less what a drift between the two makes: a line in time in each channel, and a constant
+    offset of each input, felt through its sensitivities G (n, m, n_tendon)."""
     t = (time - time[0]) / max(time[-1] - time[0], 1e-9) - 0.5
     basis = np.stack([np.ones_like(t), t], axis=1)
-    out = np.full_like(d, np.nan)
+    out, moved = np.full_like(d, np.nan), np.zeros_like(G)
     for j in range(d.shape[1]):
         ok = np.isfinite(d[:, j])
         if ok.sum() > 4:
-            fit = np.linalg.lstsq(basis[ok], d[ok, j], rcond=None)[0]
-            out[ok, j] = (d[ok, j] - basis[ok] @ fit) * np.sqrt(ok.sum() / (ok.sum() - 2))
-    return out
+            both = np.column_stack([d[ok, j], G[ok, j]])
+            both -= basis[ok] @ np.linalg.lstsq(basis[ok], both, rcond=None)[0]
+            out[ok, j], moved[ok, j] = both[:, 0] * np.sqrt(ok.sum() / (ok.sum() - 2)), both[:, 1:]
+    known = np.isfinite(out)
+    return out - moved @ np.linalg.lstsq(moved[known], out[known], rcond=None)[0]
 
 
 def _likeliest(

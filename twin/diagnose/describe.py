@@ -113,7 +113,18 @@ def place(bench: Bench, x: np.ndarray) -> str:
 
 
 def where(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Sequence[np.ndarray]) -> str:
-    """The one place at which the calibrated robot bends wrongly, in words; "" if there is no such place.
+    """The place that `misbent` finds, in words; "" if there is none."""
+    at = misbent(bench, trials, off, predicted)
+    if at is None:
+        return ""
+    if at == 0:
+        return " The calibrated robot is off from its base on, as a whole: look at the clamp and the camera."
+    names = [name for name, c in _markers(bench).items() if len(c) == 3]
+    return f" The calibrated robot bends wrongly at one place, between {names[at - 1]} and {names[at]}."
+
+
+def misbent(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Sequence[np.ndarray]) -> int | None:
+    """The chord, from 0 at the base, in which alone the calibrated robot bends wrongly; None if there is no such place.
 
     `off` (n, m) is the smooth part of its error, `predicted` (n_k, m) where it should be, both SI. A chord t from marker to marker,
     the base the first, turns by w = t x (change of `off` along it) / |t|^2. Bending that is wrong between two markers makes w jump
@@ -121,7 +132,7 @@ def where(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Seque
     """
     whole = {name: c for name, c in _markers(bench).items() if len(c) == 3}
     if len(whole) < 4:
-        return ""
+        return None
     columns = list(whole.values())
     seen = np.concatenate([np.isfinite(bench.measured[k][:, columns]).all(axis=(1, 2)) for k in trials])
     t, moved = (_chords(x[:, columns][seen]) for x in (np.concatenate(list(predicted)), off))
@@ -129,12 +140,7 @@ def where(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Seque
     jump = (np.diff(turn, axis=1, prepend=0.0) ** 2).sum(axis=2).mean(axis=0)  # at the base and every marker but the last
     both = np.minimum(jump[:-1], jump[1:])
     at = int(np.argmax(both))
-    if both[at] <= TWICE * np.delete(jump, [at, at + 1]).max():
-        return ""
-    if at == 0:
-        return " The calibrated robot is off from its base on, as a whole: look at the clamp and the camera."
-    names = list(whole)
-    return f" The calibrated robot bends wrongly at one place, between {names[at - 1]} and {names[at]}."
+    return at if both[at] > TWICE * np.delete(jump, [at, at + 1]).max() else None
 
 
 def _chords(x: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Model, Objective, fit
-from twin.diagnose.describe import components, describe, nearest, since, where, worst_channel
+from twin.diagnose.describe import change, components, describe, misbent, nearest, since, where, worst_channel
 from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import Experiment, next_experiment
 from twin.diagnose.identifiability import Visibility, identifiability
@@ -131,7 +131,11 @@ def diagnose(
     line = Spectrum.of(bench, fitted).peak(best.fit.z.reshape(best.discrepancy.mean.shape) - best.discrepancy.mean)
     own = tuple(e.id for e in twin.effects)
     added = tuple(e for e in best.effects if e not in own)
-    verdict = _verdict(added, before, after, line[0], bars)
+    predictions = {name: _predict_all(t, bench) for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin))}
+    off, z = base.discrepancy.mean * objective.whitener.noise.sigma, base.fit.z.reshape(base.discrepancy.mean.shape)
+    calibrated = [predictions["calibrated"][k] for k in fitted]
+    strange = before > bars.left and (bool(misbent(bench, fitted, off, calibrated)) or change(bench, fitted, z) is not None)
+    verdict = _verdict(added, before, after, line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
     too_small = {c.effect for c in small}
     claims = tuple(
@@ -153,10 +157,7 @@ def diagnose(
         if rival is not None:
             progress("next experiment")
             experiment = next_experiment(bench, objective.whitener.noise, final.fit, rival.fit, settings.jobs)
-    predictions = {
-        name: _predict_all(t, bench)
-        for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin), ("after", final.fit.model.twin))
-    }
+    predictions["after"] = _predict_all(final.fit.model.twin, bench)
     moved = _sensitivity(bench, held, final.fit.model.twin, [predictions["after"][k] for k in held])
     floor = objective.whitener.noise.floor(bench, moved)
     left = final.fit.z.reshape(final.discrepancy.mean.shape)
@@ -165,10 +166,8 @@ def diagnose(
         description = f"What is left looks like noise (smooth part {final.discrepancy.size:.2f} sigma)."
     else:
         description = describe(bench, fitted, left, final.discrepancy, strongest[0][0], line, bars)
-        smooth = base.discrepancy.mean * objective.whitener.noise.sigma
-        if base.discrepancy.size > bars.left:
-            description += where(bench, fitted, smooth, [predictions["calibrated"][k] for k in fitted])
-        description += since(bench, fitted, base.fit.z.reshape(left.shape))
+        description += where(bench, fitted, off, calibrated) if before > bars.left else ""
+        description += since(bench, fitted, z)
         if runners:
             share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)
             description += nearest((runners[0].effect, *runners[0].beside), share)
@@ -281,13 +280,14 @@ def _contribution(best: Weighed, without: Weighed, objective: Objective) -> floa
     return float(np.sqrt(max(0.0, fall) / objective.n))
 
 
-def _verdict(added: tuple[str, ...], before: float, after: float, line: float, bars: Thresholds) -> str:
+def _verdict(added: tuple[str, ...], before: float, after: float, line: float, bars: Thresholds, strange: bool) -> str:
+    """`strange`: the calibrated error sits at one place of the body, or began at once, as that of no known effect does."""
     left = (after > bars.left and after > SHARE * before) or after > max(MUCH, bars.left) or line > bars.line
     if not added:
         left = after > max(ALONE, bars.left) or line > bars.line
         return "unexplained" if left else "noise"
     if not left:
-        return "explained"
+        return "partly_explained" if strange else "explained"
     return "unexplained" if after > HALF * before else "partly_explained"
 
 
