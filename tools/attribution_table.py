@@ -37,7 +37,13 @@ def share(hits: list[bool]) -> str:
     return f"{sum(hits)}/{len(hits)}" + (f" {100 * sum(hits) / len(hits):.0f} %" if hits else "")
 
 
-def table(rows: list[dict]) -> str:
+def made(r: dict) -> bool:
+    """Whether every effect of the set reached at least half of the amplitude asked for; some cannot on some designs."""
+    return all(s >= 0.5 * r["amplitude"] for s in r["sigmas"])
+
+
+def table(every: list[dict]) -> str:
+    rows = [r for r in every if made(r)]
     of = {k: [r for r in rows if r["kind"] == k] for k in ("none", "one", "pair", "unknown")}
     known = [r for r in rows if r["kind"] in ("one", "pair")]
     sure = [right(r, c) for r in rows for c, p in zip(r["claims"], r["probability"], strict=True) if p >= SURE]
@@ -45,7 +51,9 @@ def table(rows: list[dict]) -> str:
     seconds = [r["seconds"] for r in rows]
     wrong_names = [bool(r["claims"]) and r["verdict"] == "explained" and not all(right(r, c) for c in r["claims"]) for r in rows]
     lines = [
-        f"sets                                        {len(rows)}: " + ", ".join(f"{len(v)} {k}" for k, v in of.items()),
+        f"sets                                        {len(rows)}: "
+        + ", ".join(f"{len(v)} {k}" for k, v in of.items())
+        + (f" ({len(every) - len(rows)} not scored: an effect that does not show on its design)" if len(every) > len(rows) else ""),
         f"false positives, no effect                  {share([false_positive(r) for r in of['none']])}",
         f"right effect first, one effect              {share([first(r) for r in of['one']])}",
         f"exact set, one effect                       {share([exact(r) for r in of['one']])}",
