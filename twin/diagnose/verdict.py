@@ -136,6 +136,8 @@ def diagnose(
     calibrated = [predictions["calibrated"][k] for k in fitted]
     strange = before > bars.left and (bool(misbent(bench, fitted, off, calibrated)) or change(bench, fitted, z) is not None)
     verdict = _verdict(added, before, after, line[0], bars, strange)
+    if added and held_out.error(best.fit.model.twin) > held_out.error(base.fit.model.twin):  # it makes unseen trials worse
+        verdict = _verdict((), before, before, line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
     too_small = {c.effect for c in small}
     claims = tuple(
