@@ -16,11 +16,12 @@ from tests.conftest import Day
 from tools.bench.effects.effect import Effect as Truth
 from twin.bench import prepare
 from twin.calibrate import Fit, fit
+from twin.diagnose import Settings
 from twin.diagnose.evidence import Evidence
 from twin.diagnose.null import ACCEPT
+from twin.diagnose.objective import objective_of
 from twin.diagnose.screen import dictionary, screen
 from twin.diagnose.search import _fuller, weigh
-from twin.diagnose.verdict import Settings, _objective
 from twin.effects import catalogue
 from twin.robots import load
 from twin.twin import Twin
@@ -99,7 +100,7 @@ def fitted_alone(bench: Day, effect: str) -> tuple[Fit, Fit, Truth]:
     robot = load("continuum")
     prepared = prepare(recording, robot)
     trials = list(range(len(prepared.inputs)))
-    start, objective, _ = _objective(prepared, Twin.of(robot), trials, Settings())
+    start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
     base = fit(objective, start, refresh=True)
     evidence = Evidence(prepared, trials)
     every = screen(objective, evidence, base, weigh(objective, evidence, base).discrepancy, dictionary(objective, base), top=99)

@@ -102,7 +102,8 @@ def run(case: Case, folder: Path) -> dict[str, object]:
         "contribution": [c.contribution for c in d.claims], "small": [c.effect for c in d.below_materiality],
         "runners_up": [c.effect for c in d.runners_up], "ambiguous": [list(a) for a in d.ambiguous],
         "calibrated": d.errors.calibrated[group], "after": d.errors.after[group], "floor": d.errors.floor[group],
-        "structure": [d.structure_before, d.structure_after], "line": d.line[0], "seconds": seconds, "samples": d.bench.n_sample,
+        "structure": [d.structure_before, d.structure_after, d.structure_unseen],
+        "line": d.line[0], "seconds": seconds, "samples": d.bench.n_sample,
         "parameters": {c.effect: {n: [f.value, f.std] for n, f in c.parameters.items()} for c in d.claims},
         "truth": truth["effects"], "scores": [[list(s), v] for s, v in d.scores[:5]], "description": d.description,
     }  # fmt: skip

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from twin.bench import Bench, drives
+from twin.bench import Bench, Inputs, drives
 
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
 SAME = (
@@ -123,7 +123,7 @@ def estimate_noise(
     drive = cells if np.isfinite(cells).all() else None
     notes = []
     if pairs:
-        d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]].time, sensitivity[a]) for a, b in pairs]
+        d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]], sensitivity[a]) for a, b in pairs]
         G, source = [sensitivity[a] for a, _ in pairs], f"{len(pairs)} pairs of repeated trials"
     else:
         d = [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual]
@@ -150,16 +150,20 @@ def estimate_noise(
     return noise, notes
 
 
-def _detrended(d: np.ndarray, time: np.ndarray, G: np.ndarray) -> np.ndarray:
-    """Differences of repeats d (n, m) less what a drift between the two makes: a line in time in each channel, and a constant
-    offset of each input, felt through its sensitivities G (n, m, n_tendon)."""
-    t = (time - time[0]) / max(time[-1] - time[0], 1e-9) - 0.5
+def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray) -> np.ndarray:
+    """Differences of repeats d (n, m) less what may have changed between the two: a line in time in each channel, and an offset
+    and a gain of each input, felt through its sensitivities G (n, m, n_tendon).
+
+    All gains together are a stiffness: a robot that was warmer, or older, the second time is not noise.
+    """
+    t = (inputs.time - inputs.time[0]) / max(inputs.time[-1] - inputs.time[0], 1e-9) - 0.5
     basis = np.stack([np.ones_like(t), t], axis=1)
-    out, moved = np.full_like(d, np.nan), np.zeros_like(G)
+    felt = np.concatenate([G, G * inputs.command[:, None, :]], axis=2)
+    out, moved = np.full_like(d, np.nan), np.zeros_like(felt)
     for j in range(d.shape[1]):
         ok = np.isfinite(d[:, j])
         if ok.sum() > 4:
-            both = np.column_stack([d[ok, j], G[ok, j]])
+            both = np.column_stack([d[ok, j], felt[ok, j]])
             both -= basis[ok] @ np.linalg.lstsq(basis[ok], both, rcond=None)[0]
             out[ok, j], moved[ok, j] = both[:, 0] * np.sqrt(ok.sum() / (ok.sum() - 2)), both[:, 1:]
     known = np.isfinite(out)

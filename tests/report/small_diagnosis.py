@@ -11,6 +11,7 @@ from twin.bench import prepare
 from twin.diagnose import Claim, Diagnosis, Errors, Settings
 from twin.diagnose.experiment import Experiment
 from twin.diagnose.identifiability import Visibility
+from twin.diagnose.null import Thresholds
 from twin.effects import named
 from twin.measurements import Channel, Recording, Trial
 from twin.quantities import Fitted
@@ -94,6 +95,8 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         ),
         structure_before=0.42,
         structure_after=0.21 if verdict == "partly_explained" else 0.02,
+        structure_unseen=0.05,
+        bars=Thresholds(),
         structure={"static": 0.01, "direction": 0.2, "rate": 0.0},
         strongest=(("direction of T2", 0.2), ("T1 T2", 0.01)),
         line=(2.0, 0.1),

@@ -73,6 +73,14 @@ def since(bench: Bench, trials: Sequence[int], z: np.ndarray) -> str:
     return f" The calibrated robot's error changed at once {between}: what moved then?"
 
 
+def unlike(unseen: float, seen: float) -> str:
+    """The smooth error (sigma) on the trials no fit has seen, beside that on those it has."""
+    return (
+        f" On the trials that no fit has seen a smooth error of {unseen:.2f} sigma is left, on the others {seen:.2f}: "
+        "what was found does not hold there."
+    )
+
+
 def nearest(effects: Sequence[str], share: float) -> str:
     """A hint: the best known explanation that was not claimed, and the share of the held-out error it takes off; "" if little."""
     if not share > NEAR:

@@ -2,98 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from twin.bench import Bench, prepare
-from twin.calibrate import Fit, Model, Objective, fit
-from twin.diagnose.describe import change, components, describe, misbent, nearest, since, where, worst_channel
+from twin.calibrate import Fit, Objective, fit
+from twin.diagnose.describe import change, components, describe, misbent, nearest, since, unlike, where, worst_channel
+from twin.diagnose.diagnosis import Claim, Diagnosis, Settings
 from twin.diagnose.evidence import Evidence, Spectrum
-from twin.diagnose.experiment import Experiment, next_experiment
-from twin.diagnose.identifiability import Visibility, identifiability
+from twin.diagnose.experiment import next_experiment
+from twin.diagnose.held_out import HeldOut
+from twin.diagnose.identifiability import identifiability
 from twin.diagnose.null import ACCEPT, Thresholds, thresholds
+from twin.diagnose.objective import objective_of
 from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
-from twin.errors import DataError, SolveError
-from twin.evaluate import rms, squares
+from twin.errors import DataError
 from twin.measurements import Recording
-from twin.quantities import Fitted
-from twin.residual import Noise, Whitener, estimate_noise
-from twin.twin import Trace, Twin, readings, report, simulate, unstable_starts
+from twin.residual import Noise
+from twin.twin import Twin, readings, report, simulate, unstable_starts
 
 SHARE = 0.3  # of the structure before: what is left counts if it is above the design's threshold and above this share
 MUCH = 0.45  # sigma of structure that counts whatever was there before
 ALONE = 0.3  # sigma of structure that counts where no effect was found: a base model may be off by less
 HALF = 0.5  # effects that leave more than this share of the structure do not explain it
+FAR = 3.0  # standard deviations of its description: a robot's parameter found further away is doubtful
 TEMPER = 20.0  # odds are exp(score / 20): the likelihood takes the laws' form for exact, which makes raw odds absurd
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a diagnosis is run: seed of the split, worker threads."""
-
-    seed: int = 0
-    jobs: int = 2
-
-
-@dataclass(frozen=True)
-class Claim:
-    """An effect in force (or a runner-up): parameters, the held-out error without it (or with it alone), its probability."""
-
-    effect: str
-    parameters: dict[str, Fitted]
-    error: float
-    probability: float
-    contribution: float = 0.0  # sigma: how far dropping it moves the fitted trials
-    beside: tuple[str, ...] = ()  # the other effects of the set a runner-up was fitted in
-
-
-@dataclass(frozen=True)
-class Errors:
-    """RMS on the held-out trials, SI, by group of outputs ("marker": Euclidean per marker); confidence intervals over trials."""
-
-    nominal: dict[str, float]
-    calibrated: dict[str, float]
-    after: dict[str, float]
-    floor: dict[str, float]
-    ci_calibrated: dict[str, tuple[float, float]]
-    ci_after: dict[str, tuple[float, float]]
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """Everything a report shows. Residuals are measured - predicted (n_k, n_output) SI, by stage, all trials in clock order."""
-
-    verdict: str
-    twin: Twin
-    calibrated: Twin
-    claims: tuple[Claim, ...]
-    runners_up: tuple[Claim, ...]
-    below_materiality: tuple[Claim, ...]
-    parameters: dict[str, Fitted]
-    unfixed: tuple[str, ...]
-    errors: Errors
-    noise: Noise
-    structure_before: float  # sigma
-    structure_after: float
-    structure: dict[str, float]  # component -> RMS in sigmas, after
-    strongest: tuple[tuple[str, float], ...]
-    line: tuple[float, float]  # z-score, Hz
-    worst_channel: str
-    description: str
-    identifiability: tuple[Visibility, ...]
-    ambiguous: tuple[tuple[str, ...], ...]
-    experiment: Experiment | None
-    bench: Bench
-    fitted_trials: tuple[int, ...]
-    held_trials: tuple[int, ...]
-    predictions: dict[str, list[np.ndarray]]
-    notices: tuple[str, ...]
-    settings: Settings
-    scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
 
 
 def diagnose(
@@ -112,7 +48,7 @@ def diagnose(
         *(f"{n}: unstable start, its shape is one of several" for n in unstable_starts(bench, nominal_traces)),
     ]
     progress("noise")
-    start, objective, notes = _objective(bench, twin, fitted, settings)
+    start, objective, notes = objective_of(bench, twin, fitted, settings)
     notices += notes
     evidence = Evidence(bench, fitted)
     progress("calibration")
@@ -124,7 +60,7 @@ def diagnose(
     table = identifiability(objective, base.fit, patterns, bars.material)
     found = search(objective, evidence, base, patterns, bars, progress)
     progress("verdict")
-    held_out = _HeldOut(bench, held)
+    held_out = HeldOut(bench, held, objective.whitener.noise)
     found = replace(found, best=_predicting(found, held_out, bars.accept))
     best, dropped, small = _gate(objective, evidence, found, bars.material, progress)
     before, after = base.discrepancy.size, best.discrepancy.size
@@ -135,10 +71,13 @@ def diagnose(
     off, z = base.discrepancy.mean * objective.whitener.noise.sigma, base.fit.z.reshape(base.discrepancy.mean.shape)
     calibrated = [predictions["calibrated"][k] for k in fitted]
     strange = before > bars.left and (bool(misbent(bench, fitted, off, calibrated)) or change(bench, fitted, z) is not None)
-    verdict = _verdict(added, before, after, line[0], bars, strange)
+    unseen, floor = held_out.structure(best.fit.model.twin)
+    verdict = _verdict(added, before, after, unseen, line[0], bars, strange)
     if added and held_out.error(best.fit.model.twin) > held_out.error(base.fit.model.twin):  # it makes unseen trials worse
-        verdict = _verdict((), before, before, line[0], bars, strange)
+        verdict = _verdict((), before, before, held_out.structure(base.fit.model.twin)[0], line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
+    if final is base and best is not base:
+        unseen, floor = held_out.structure(base.fit.model.twin)
     too_small = {c.effect for c in small}
     claims = tuple(
         Claim(
@@ -160,8 +99,6 @@ def diagnose(
             progress("next experiment")
             experiment = next_experiment(bench, objective.whitener.noise, final.fit, rival.fit, settings.jobs)
     predictions["after"] = _predict_all(final.fit.model.twin, bench)
-    moved = _sensitivity(bench, held, final.fit.model.twin, [predictions["after"][k] for k in held])
-    floor = objective.whitener.noise.floor(bench, moved)
     left = final.fit.z.reshape(final.discrepancy.mean.shape)
     strongest = tuple(evidence.strongest(final.discrepancy))
     if verdict in ("noise", "explained"):
@@ -170,6 +107,7 @@ def diagnose(
         description = describe(bench, fitted, left, final.discrepancy, strongest[0][0], line, bars)
         description += where(bench, fitted, off, calibrated) if before > bars.left else ""
         description += since(bench, fitted, z)
+        description += unlike(unseen, final.discrepancy.size) if unseen > max(MUCH, bars.left) else ""
         if runners:
             share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)
             description += nearest((runners[0].effect, *runners[0].beside), share)
@@ -182,10 +120,12 @@ def diagnose(
         below_materiality=small,
         parameters=final.fit.fitted(None),
         unfixed=tuple(final.fit.unfixed()),
-        errors=_errors(bench, held, predictions, floor, settings.seed),
+        errors=held_out.errors(predictions, floor, settings.seed),
         noise=objective.whitener.noise,
         structure_before=before,
         structure_after=final.discrepancy.size,
+        structure_unseen=unseen,
+        bars=bars,
         structure=components(final.discrepancy),
         strongest=strongest,
         line=line,
@@ -198,7 +138,7 @@ def diagnose(
         fitted_trials=tuple(fitted),
         held_trials=tuple(held),
         predictions=predictions,
-        notices=tuple(notices),
+        notices=(*notices, *_unlikely(final.fit)),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.all),
     )
@@ -209,39 +149,9 @@ def calibration(recording: Recording, twin: Twin, settings: Settings | None = No
     settings = settings or Settings()
     bench = prepare(recording, twin.robot)
     fitted, held = split(bench, settings.seed)
-    start, objective, _ = _objective(bench, twin, fitted, settings)
+    start, objective, _ = objective_of(bench, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
-    return found, f"{1e3 * _HeldOut(bench, held).error(found.model.twin):.3f} mm"
-
-
-def _objective(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
-    """A first calibration under a guessed noise, and the objective every later fit uses."""
-    measured = [bench.measured[k] for k in fitted]
-    command = [bench.inputs[k].command for k in fitted]
-    rough = np.array([{"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2}[o.group] for o in bench.outputs])
-    first = Noise(rough, np.zeros(bench.n_tendon), np.zeros(len(rough)), "start")
-    none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
-    objective = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)
-    start = fit(objective, Model.base(twin.robot, twin), tolerance=1e-3)
-    unmeasured = objective.predict(start.model.twin, start.evaluation.traces)[1]
-    sensitivity = _sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
-    noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, sensitivity)
-    return start.model, Objective(bench, fitted, Whitener(noise, measured, sensitivity, command), settings.jobs), notes
-
-
-def _sensitivity(
-    bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: list[Trace] | None = None
-) -> list[np.ndarray]:
-    """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading."""
-    out = [np.empty((*y.shape, bench.n_tendon)) for y in predicted]
-    for t in range(bench.n_tendon):
-        step = 2.0 * bench.reading[t]
-        push = step * np.eye(bench.n_tendon)[t]
-        moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
-        traces = simulate(twin, moved, trials=trials, near=near)
-        for G, y, trace in zip(out, predicted, traces, strict=True):
-            G[:, :, t] = (readings(bench, report(twin.effects, trace.true)) - y) / step
-    return out
+    return found, f"{1e3 * HeldOut(bench, held, objective.whitener.noise).error(found.model.twin):.3f} mm"
 
 
 def _gate(
@@ -282,15 +192,34 @@ def _contribution(best: Weighed, without: Weighed, objective: Objective) -> floa
     return float(np.sqrt(max(0.0, fall) / objective.n))
 
 
-def _verdict(added: tuple[str, ...], before: float, after: float, line: float, bars: Thresholds, strange: bool) -> str:
-    """`strange`: the calibrated error sits at one place of the body, or began at once, as that of no known effect does."""
-    left = (after > bars.left and after > SHARE * before) or after > max(MUCH, bars.left) or line > bars.line
+def _verdict(
+    added: tuple[str, ...], before: float, after: float, unseen: float, line: float, bars: Thresholds, strange: bool
+) -> str:
+    """From the smooth errors (sigma) before and after on the fitted trials, and after on the unseen ones.
+
+    `strange`: the calibrated error sits at one place of the body, or began at once, as that of no known effect does.
+    """
+    much = max(after, unseen) > max(MUCH, bars.left) or line > bars.line
     if not added:
-        left = after > max(ALONE, bars.left) or line > bars.line
-        return "unexplained" if left else "noise"
-    if not left:
+        return "unexplained" if much or after > max(ALONE, bars.left) else "noise"
+    if not much and not (after > bars.left and after > SHARE * before):
         return "partly_explained" if strange else "explained"
     return "unexplained" if after > HALF * before else "partly_explained"
+
+
+def _unlikely(found: Fit) -> list[str]:
+    """The robot's own parameters that were driven far from their description, in words."""
+    said = []
+    for free in found.model.free:
+        p = free.parameter
+        value = found.model.twin.values.get(p.name, p.value)
+        if free.effect is None and p.std and abs(value - p.value) > FAR * p.std:
+            how = abs(value - p.value) / p.std
+            said.append(
+                f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "
+                f"{p.value:.4g}): check it, or something else hides in it"
+            )
+    return said
 
 
 def _probability(found: Search, effect: str, small: set[str]) -> float:
@@ -302,58 +231,17 @@ def _probability(found: Search, effect: str, small: set[str]) -> float:
     return float(weights[inside].sum() / weights.sum())
 
 
-def _predicting(found: Search, held_out: _HeldOut, accept: float) -> Weighed:
+def _predicting(found: Search, held_out: HeldOut, accept: float) -> Weighed:
     """The best set that has an equilibrium in every held-out trial too: a stiff wall may leave a trial none."""
     ranked = [found.best, *sorted(found.all, key=lambda w: accept * len(w.effects) - w.score)]
     return next((w for w in ranked if np.isfinite(held_out.error(w.fit.model.twin))), found.base)
-
-
-class _HeldOut:
-    """Errors on the held-out trials."""
-
-    def __init__(self, bench: Bench, held: Sequence[int]) -> None:
-        self.bench, self.held = bench, list(held)
-
-    def error(self, twin: Twin) -> float:
-        """RMS on the held-out trials in SI: Euclidean per marker where there are markers, else of the first group.
-
-        NaN where one has no equilibrium.
-        """
-        try:
-            traces: list[Trace] = simulate(twin, self.bench, trials=self.held)
-        except SolveError:
-            return float("nan")
-        raw = [
-            self.bench.measured[k] - readings(self.bench, report(twin.effects, t.true))
-            for k, t in zip(self.held, traces, strict=True)
-        ]
-        groups = list(dict.fromkeys(o.group for o in self.bench.outputs))
-        return rms(self.bench, raw, "marker" if "marker" in groups else groups[0])
-
-
-def _errors(bench: Bench, held: list[int], predictions: dict[str, list[np.ndarray]], floor: dict[str, float], seed: int) -> Errors:
-    groups = list(dict.fromkeys(o.group for o in bench.outputs))
-    raw = {name: [bench.measured[k] - y[k] for k in held] for name, y in predictions.items()}
-    error = {name: {g: rms(bench, raw[name], g) for g in groups} for name in raw}
-    interval = {name: {g: _interval(squares(bench, raw[name], g), seed) for g in groups} for name in ("calibrated", "after")}
-    return Errors(error["nominal"], error["calibrated"], error["after"], floor, interval["calibrated"], interval["after"])
-
-
-def _interval(squares: list[np.ndarray], seed: int) -> tuple[float, float]:
-    """95 % bootstrap interval of an RMS, over whole trials and blocks of ten samples within them, since neighbours are alike."""
-    blocks = [b for s in squares for b in np.array_split(s, max(1, len(s) // 10)) if len(b)]
-    sums, counts = np.array([b.sum() for b in blocks]), np.array([len(b) for b in blocks])
-    pick = np.random.default_rng(seed).integers(len(blocks), size=(1000, len(blocks)))
-    values = np.sqrt(sums[pick].sum(axis=1) / counts[pick].sum(axis=1))
-    low, high = np.quantile(values, [0.025, 0.975])
-    return float(low), float(high)
 
 
 def _predict_all(twin: Twin, bench: Bench) -> list[np.ndarray]:
     return [readings(bench, report(twin.effects, t.true)) for t in simulate(twin, bench)]
 
 
-def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], small: set[str], held_out: _HeldOut) -> tuple[Claim, ...]:
+def _runners_up(found: Search, claimed: set[str], own: tuple[str, ...], small: set[str], held_out: HeldOut) -> tuple[Claim, ...]:
     """Effects weighed and not claimed, each in its best set, best first; `error` is that set's on the held-out trials."""
     out: dict[str, Claim] = {}
     for w in found.all:

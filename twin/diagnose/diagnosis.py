@@ -1,0 +1,82 @@
+"""What a diagnosis finds: the types that reports are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twin.bench import Bench
+from twin.diagnose.experiment import Experiment
+from twin.diagnose.identifiability import Visibility
+from twin.diagnose.null import Thresholds
+from twin.quantities import Fitted
+from twin.residual import Noise
+from twin.twin import Twin
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a diagnosis is run: seed of the split, worker threads."""
+
+    seed: int = 0
+    jobs: int = 2
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An effect in force (or a runner-up): parameters, the held-out error without it (or with it alone), its probability."""
+
+    effect: str
+    parameters: dict[str, Fitted]
+    error: float
+    probability: float
+    contribution: float = 0.0  # sigma: how far dropping it moves the fitted trials
+    beside: tuple[str, ...] = ()  # the other effects of the set a runner-up was fitted in
+
+
+@dataclass(frozen=True)
+class Errors:
+    """RMS on the held-out trials, SI, by group of outputs ("marker": Euclidean per marker); confidence intervals over trials."""
+
+    nominal: dict[str, float]
+    calibrated: dict[str, float]
+    after: dict[str, float]
+    floor: dict[str, float]
+    ci_calibrated: dict[str, tuple[float, float]]
+    ci_after: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a report shows. Residuals are measured - predicted (n_k, n_output) SI, by stage, all trials in clock order."""
+
+    verdict: str
+    twin: Twin
+    calibrated: Twin
+    claims: tuple[Claim, ...]
+    runners_up: tuple[Claim, ...]
+    below_materiality: tuple[Claim, ...]
+    parameters: dict[str, Fitted]
+    unfixed: tuple[str, ...]
+    errors: Errors
+    noise: Noise
+    structure_before: float  # sigma
+    structure_after: float
+    structure_unseen: float  # after, on the held-out trials
+    bars: Thresholds
+    structure: dict[str, float]  # component -> RMS in sigmas, after
+    strongest: tuple[tuple[str, float], ...]
+    line: tuple[float, float]  # z-score, Hz
+    worst_channel: str
+    description: str
+    identifiability: tuple[Visibility, ...]
+    ambiguous: tuple[tuple[str, ...], ...]
+    experiment: Experiment | None
+    bench: Bench
+    fitted_trials: tuple[int, ...]
+    held_trials: tuple[int, ...]
+    predictions: dict[str, list[np.ndarray]]
+    notices: tuple[str, ...]
+    settings: Settings
+    scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())

@@ -1,0 +1,44 @@
+"""What every fit of a diagnosis minimises: the residual of the fitted trials made white by a noise found from the data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.bench import Bench
+from twin.calibrate import Model, Objective, fit
+from twin.diagnose.diagnosis import Settings
+from twin.residual import Noise, Whitener, estimate_noise
+from twin.twin import Trace, Twin, readings, report, simulate
+
+
+def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
+    """A first calibration under a guessed noise, and the objective every later fit uses."""
+    measured = [bench.measured[k] for k in fitted]
+    command = [bench.inputs[k].command for k in fitted]
+    rough = np.array([{"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2}[o.group] for o in bench.outputs])
+    first = Noise(rough, np.zeros(bench.n_tendon), np.zeros(len(rough)), "start")
+    none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
+    rough_fit = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)
+    start = fit(rough_fit, Model.base(twin.robot, twin), tolerance=1e-3)
+    unmeasured = rough_fit.predict(start.model.twin, start.evaluation.traces)[1]
+    G = sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
+    noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, G)
+    return start.model, Objective(bench, fitted, Whitener(noise, measured, G, command), settings.jobs), notes
+
+
+def sensitivity(
+    bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: list[Trace] | None = None
+) -> list[np.ndarray]:
+    """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading."""
+    out = [np.empty((*y.shape, bench.n_tendon)) for y in predicted]
+    for t in range(bench.n_tendon):
+        step = 2.0 * bench.reading[t]
+        push = step * np.eye(bench.n_tendon)[t]
+        moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
+        traces = simulate(twin, moved, trials=trials, near=near)
+        for G, y, trace in zip(out, predicted, traces, strict=True):
+            G[:, :, t] = (readings(bench, report(twin.effects, trace.true)) - y) / step
+    return out
