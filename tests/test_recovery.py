@@ -83,6 +83,7 @@ COMPARED: dict[str, Compare] = {
         0.03 * t.strength * np.array(t.share), [v[f"share_{i}_{j}"] for i in (1, 2, 3) for j in (1, 2, 3) if i != j], OTHER,
     ),
     "temperature_softening": lambda t, v: (0.005 * t.strength, v["rate"], SAME),
+    "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
     "tendon_backlash": lambda t, v: (1e-4 * t.strength, v["gap"], OTHER),  # swaps sides by another law there
     "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
     "contact": lambda t, v: (1.0, 1.0 if v["stiffness"] > 0 else 0.0, SAME),  # another obstacle there: that it is found counts

@@ -133,7 +133,7 @@ def _trial(
     command = np.where(by_length, driving.displacement, driving.tension)
     stiffness = np.ones(n)
     for effect in twin.effects:
-        stiffness = stiffness * effect.soften(inputs.temperature)
+        stiffness = stiffness * effect.soften(inputs.temperature, inputs.clock)
     path = solver.solve(inputs.time, command, loads, route, creep, delayed, near, keep, tolerance, by_length, stiffness, once)
     if not path.status.all():
         bad = int(np.flatnonzero(path.status == 0)[0])

@@ -5,7 +5,7 @@ A law acts in the places below, in the order of the signal, and in no other. Sta
     command   reported input -> true input      (a load cell that misreads: the inverse of its `sense`)
     drive     command -> what the motors do     (lag, saturation, play)
     edit      the body                          (stiffness, rest shape, routing)
-    soften    temperature -> its stiffness
+    soften    temperature, time -> its stiffness
     surround  the loads on it                   (gravity, payload, a wall)
     route     along the tendon                  (friction, stretch)
     deform    slow change of the rest shape     (creep)
@@ -163,8 +163,8 @@ class Effect(ABC):
     def edit(self, body: Any) -> None:
         """Change the body (a `twin.robots.Body`) before it is compiled."""
 
-    def soften(self, temperature: np.ndarray) -> np.ndarray | float:
-        """Stiffness of the body over that at its reference temperature, at `temperature` (n,) K."""
+    def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray | float:
+        """Stiffness of the body over that described, at `temperature` (n,) K, `clock` (n,) s after the first trial's start."""
         return 1.0
 
     def surround(self, loads: Loads) -> Loads:

@@ -16,7 +16,7 @@ class TemperatureSoftening(Effect):
 
     Source: first-order Taylor expansion. Silicone and nylon lose 0.2-1 % per kelvin near room temperature; superelastic NiTi gains.
 
-    >>> TemperatureSoftening(rate=0.01).soften(np.array([296.15, 306.15])).round(3).tolist()
+    >>> TemperatureSoftening(rate=0.01).soften(np.array([296.15, 306.15]), np.zeros(2)).round(3).tolist()
     [1.0, 0.9]
     """
 
@@ -25,5 +25,5 @@ class TemperatureSoftening(Effect):
     guesses = ({"rate": 0.005},)
     moves_with = "the room's temperature"
 
-    def soften(self, temperature: np.ndarray) -> np.ndarray:
+    def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
         return np.maximum(SOFTEST, 1.0 - self["rate"] * (temperature - REFERENCE))
