@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from twin import robots
-from twin.bench import prepare
+from twin.bench import ROOM, Inputs, prepare
 from twin.diagnose import Claim, Diagnosis, Errors, Settings
 from twin.diagnose.experiment import Experiment
 from twin.diagnose.identifiability import Visibility
 from twin.diagnose.null import Thresholds
-from twin.effects import named
+from twin.effects import Loads, named
 from twin.measurements import Channel, Recording, Trial
 from twin.quantities import Fitted
 from twin.residual import Noise
@@ -23,7 +23,10 @@ SIGMA = 2.5e-4  # m
 SETTINGS = Settings(seed=3, jobs=1)
 
 
-EXPERIMENT = Experiment("pull tendon 3 to 2.0 N and release it", 10.0, 3, (("tendon_friction",), ("backbone_creep",)))
+PULL = Inputs(
+    "pull", np.zeros(1), np.zeros(1), np.zeros((1, 3)), np.zeros(3, bool), np.full(1, ROOM), Loads(np.array([0, 0, 9.81]))
+)
+EXPERIMENT = Experiment("pull tendon 3 to 2.0 N and release it", PULL, 10.0, 3, (("tendon_friction",), ("backbone_creep",)))
 
 
 def recording(

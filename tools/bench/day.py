@@ -10,7 +10,7 @@ import numpy as np
 
 from tools.bench.amplitude import Scale, scaled
 from tools.bench.bench import run
-from tools.bench.design import bench_day
+from tools.bench.design import Trial, bench_day
 from tools.bench.effects import Effect, all_effects
 from tools.bench.nuisance import built
 from tools.bench.sensors import Noise
@@ -31,9 +31,11 @@ def make_set(
     ambient: bool = False,
     coloured: bool = False,
     mismatch: str = "built",
+    more: Sequence[Trial] = (),
     progress: Callable[[str], None] = lambda what: None,
 ) -> list[tuple[Effect, float]]:
-    """Write the set; returns each effect as scaled and the sigmas it leaves. `mismatch` is one of MISMATCH."""
+    """Write the set; returns each effect as scaled and the sigmas it leaves. `mismatch` is one of MISMATCH; `more` trials are
+    run when the day is over."""
     known = all_effects()
     # Streams of their own, so that adding an effect changes neither robot nor day.
     robot, motions, instruments, laws = (np.random.default_rng([seed, n]) for n in range(4))
@@ -44,6 +46,7 @@ def make_set(
     for name in effects:
         progress(f"scaling {name}")
         found.append(scaled(known[name].draw(laws), amplitude, Scale(rod, day, noise)))
+    day = replace(day, trials=(*day.trials, *more))
     chosen = [effect for effect, _ in found]
     unnamed = [replace(known[n].draw(laws), strength=s) for n, s in UNNAMED.items()] if mismatch == "rough" else []
     logs = run(rod, [*chosen, *unnamed], day, lambda done: progress(f"trial {done} of {len(day.trials)}"))

@@ -21,9 +21,11 @@ RATE = 2.0  # samples a second
 
 @dataclass(frozen=True)
 class Experiment:
-    """A trial in words, the separation T of one run of it, how many runs reach T = 25, and the sets of effects it separates."""
+    """A trial in words and as commands, the separation T of one run of it, how many runs reach T = 25, and the sets of effects it
+    separates."""
 
     words: str
+    trial: Inputs
     separation: float
     repeats: int
     between: tuple[tuple[str, ...], tuple[str, ...]]
@@ -84,16 +86,16 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         objective = Objective(imagined, [0], whitener, jobs)
         try:
             at = objective.evaluate(b.model)
-            apart.append((words, objective, at, objective.evaluate(a.model).z - at.z))
+            apart.append((words, inputs, objective, at, objective.evaluate(a.model).z - at.z))
         except SolveError:
             continue
     best: Experiment | None = None
-    for words, objective, at, d in sorted(apart, key=lambda trial: -float(trial[3] @ trial[3])):
+    for words, inputs, objective, at, d in sorted(apart, key=lambda trial: -float(trial[-1] @ trial[-1])):
         if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it
             break
         T = _separation(objective, b, at, d)
         if best is None or best.separation < T:
-            best = Experiment(words, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))), rivals)
+            best = Experiment(words, inputs, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))), rivals)
     return best if best is not None and best.repeats <= 50 else None
 
 

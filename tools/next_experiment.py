@@ -1,0 +1,93 @@
+"""Does the next experiment settle the doubt? Poor designs of the bench, diagnosed, the proposed trial run on the same built robot,
+diagnosed again.
+
+    python -m tools.next_experiment --out results/ [--sets 12] [--seed 3000]
+
+A day lacks one thing (payloads, rates, tendons, ...) and has one effect, drawn among those that what it lacks confuses. The bench,
+not the twin, runs the proposed trial, as often as proposed and twice at least (no repeated trial is ever held out), at most five
+times. Printed: what was claimed and what else was possible, before and after.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from tools.attribution_table import right
+from tools.bench.day import make_set
+from tools.bench.design import Trial
+from twin.bench import Inputs, prepare
+from twin.diagnose import Diagnosis, Settings, diagnose
+from twin.diagnose.design import shortcomings
+from twin.errors import TwinError
+from twin.measurements import read
+from twin.robots import load
+from twin.twin import Twin
+
+DESIGNS = ("one_payload", "one_rate", "one_tendon", "loading_only", "tip_only")
+MOST = 5  # runs of the proposed trial
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--sets", type=int, default=12)
+    parser.add_argument("--seed", type=int, default=3000)
+    args = parser.parse_args()
+    rows = [row for k in range(args.sets) if (row := settle(args.out, args.seed + k, DESIGNS[k % len(DESIGNS)])) is not None]
+    doubtful = [r for r in rows if r[0]]
+    print(
+        f"{len(rows)} sets, {len(doubtful)} left in doubt; of these right first before {sum(r[1] for r in doubtful)}, after "
+        f"{sum(r[2] for r in doubtful)}; the doubt settled in {sum(r[3] for r in doubtful)}"
+    )
+
+
+def settle(out: Path, seed: int, design: str) -> tuple[bool, bool, bool, bool] | None:
+    """(doubt, right before, right after, doubt settled) of one set; None where it cannot be made or read."""
+    rng = np.random.default_rng(seed)
+    folder = out / f"doubt_{seed}"
+    try:
+        make_set(folder, [], seed=seed, design=design)
+        gaps = shortcomings(prepare(read(folder), load("continuum")))
+        confused = sorted(set.union(*(hidden for _, hidden in gaps)) - {"temperature_softening", "actuator_saturation"})
+        effect = str(rng.choice(confused))
+        make_set(folder, [effect], seed=seed, design=design)
+        before = _diagnosed(folder, seed)
+        print(f"{seed} {design}: {effect}\n  before: {_words(before)}", flush=True)
+        proposed = before.experiment
+        if not before.ambiguous or proposed is None:
+            return False, _first(before, effect), _first(before, effect), False
+        runs = min(MOST, max(2, proposed.repeats))
+        print(f"  {runs} times: {proposed.words}", flush=True)
+        make_set(folder, [effect], seed=seed, design=design, more=[_trial(proposed.trial, n, before) for n in range(runs)])
+        after = _diagnosed(folder, seed)
+        print(f"  after:  {_words(after)}", flush=True)
+    except TwinError as error:
+        print(f"{seed} {design}: {error}", flush=True)
+        return None
+    return True, _first(before, effect), _first(after, effect), not after.ambiguous
+
+
+def _trial(proposed: Inputs, n: int, of: Diagnosis) -> Trial:
+    start = max(float(i.clock[-1]) for i in of.bench.inputs) + 60.0 + n * (60.0 + float(proposed.time[-1]))
+    gravity = tuple(float(g) for g in proposed.loads.gravity)
+    return Trial(f"proposed_{n + 1}", proposed.loads.payload, proposed.time, proposed.time, proposed.command, start, gravity)  # type: ignore[arg-type]
+
+
+def _diagnosed(folder: Path, seed: int) -> Diagnosis:
+    return diagnose(read(folder), Twin.of(load("continuum")), Settings(seed=seed, jobs=1))
+
+
+def _first(d: Diagnosis, effect: str) -> bool:
+    return bool(d.claims) and right({"true": [effect]}, d.claims[0].effect)
+
+
+def _words(d: Diagnosis) -> str:
+    claimed = " + ".join(c.effect for c in d.claims) or "-"
+    return f"{d.verdict} {claimed}" + "".join(f"; or {' + '.join(s)}" for s in d.ambiguous)
+
+
+if __name__ == "__main__":
+    main()
