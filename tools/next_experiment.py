@@ -3,9 +3,10 @@ diagnosed again.
 
     python -m tools.next_experiment --out results/ [--sets 12] [--seed 3000]
 
-A day lacks one thing (payloads, rates, tendons, ...) and has one effect, drawn among those that what it lacks confuses. The bench,
-not the twin, runs the proposed trial, as often as proposed and twice at least (no repeated trial is ever held out), at most five
-times. Printed: what was claimed and what else was possible, before and after.
+A day lacks one thing (payloads, rates, tendons, ...) and has one effect of 1 sigma, drawn among the six that the table of what
+these data can tell calls hardest to tell apart. The bench, not the twin, runs the proposed trial, as often as proposed and twice at
+least (no repeated trial is ever held out), at most five times. Printed: what was claimed and what else was possible, before and
+after.
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ import numpy as np
 from tools.attribution_table import right
 from tools.bench.day import make_set
 from tools.bench.design import Trial
-from twin.bench import Inputs, prepare
+from twin.bench import Inputs
 from twin.diagnose import Diagnosis, Settings, diagnose
-from twin.diagnose.design import shortcomings
 from twin.errors import TwinError
 from twin.measurements import read
 from twin.robots import load
 from twin.twin import Twin
 
 DESIGNS = ("one_payload", "one_rate", "one_tendon", "loading_only", "tip_only")
+AMPLITUDE = 1.0  # sigma
+HARDEST = 6  # effects
 MOST = 5  # runs of the proposed trial
 
 
@@ -50,10 +52,9 @@ def settle(out: Path, seed: int, design: str) -> tuple[bool, bool, bool, bool] |
     folder = out / f"doubt_{seed}"
     try:
         make_set(folder, [], seed=seed, design=design)
-        gaps = shortcomings(prepare(read(folder), load("continuum")))
-        confused = sorted(set.union(*(hidden for _, hidden in gaps)) - {"temperature_softening", "actuator_saturation"})
-        effect = str(rng.choice(confused))
-        make_set(folder, [effect], seed=seed, design=design)
+        visible = [v for v in _diagnosed(folder, seed).identifiability if np.isfinite(v.apart)]
+        effect = str(rng.choice([v.effect for v in sorted(visible, key=lambda v: v.share)[:HARDEST]]))
+        make_set(folder, [effect], AMPLITUDE, seed, design)
         before = _diagnosed(folder, seed)
         print(f"{seed} {design}: {effect}\n  before: {_words(before)}", flush=True)
         proposed = before.experiment
@@ -61,7 +62,7 @@ def settle(out: Path, seed: int, design: str) -> tuple[bool, bool, bool, bool] |
             return False, _first(before, effect), _first(before, effect), False
         runs = min(MOST, max(2, proposed.repeats))
         print(f"  {runs} times: {proposed.words}", flush=True)
-        make_set(folder, [effect], seed=seed, design=design, more=[_trial(proposed.trial, n, before) for n in range(runs)])
+        make_set(folder, [effect], AMPLITUDE, seed, design, more=[_trial(proposed.trial, n, before) for n in range(runs)])
         after = _diagnosed(folder, seed)
         print(f"  after:  {_words(after)}", flush=True)
     except TwinError as error:
