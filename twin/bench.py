@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,13 +12,20 @@ from twin.measurements import Channel, Recording, Trial
 from twin.robots import Robot
 
 ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
-READING = {"tendon_tension": 0.01, "tendon_displacement": 2e-5}  # N, m: what such a reading is typically good for
+# What a reading that drives a tendon is typically good for: N, m, A, V
+READING = {"tendon_tension": 0.01, "tendon_displacement": 2e-5, "sma_current": 3e-3, "sma_voltage": 1.5e-3}
+HEATING = ("sma_current", "sma_voltage")  # what drives a tendon through an SMA spring
+SCALARS = {  # kind of an output channel -> group
+    "tendon_tension": "tension", "tendon_displacement": "displacement", "sma_temperature": "temperature",
+    "sma_resistance": "resistance",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Inputs:
     """One trial as the twin is driven: time and clock (n,) s, reported command (n, n_tendon) in N or, for tendons
-    `by_length` (n_tendon,), displacement in m, temperature (n,) K, its loads."""
+    `by_length` (n_tendon,), displacement in m, or for those `by_current` the current of their SMA spring in A, constant from one
+    time to the next; temperature (n,) K of the room, its loads."""
 
     name: str
     time: np.ndarray
@@ -27,6 +34,7 @@ class Inputs:
     by_length: np.ndarray
     temperature: np.ndarray
     loads: Loads
+    by_current: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
 
 
 @dataclass(frozen=True)
@@ -34,7 +42,7 @@ class Output:
     """One output channel the robot can predict: where it stands in a trial's signals."""
 
     channel: Channel
-    group: str  # "marker", "displacement" or "tension"
+    group: str  # "marker" or a value of SCALARS
     index: int  # marker or tendon, from 0
     axis: int  # 0, 1, 2 for x, y, z; 0 for a scalar
 
@@ -60,9 +68,15 @@ class Bench:
         return self.inputs[0].by_length
 
     @property
+    def by_current(self) -> np.ndarray:
+        """(n_tendon,) whether a tendon is pulled by an SMA spring that a current heats."""
+        return np.broadcast_to(self.inputs[0].by_current, self.by_length.shape)
+
+    @property
     def reading(self) -> np.ndarray:
-        """(n_tendon,) what one reading of the driving channels is typically good for, N or m."""
-        return np.where(self.by_length, READING["tendon_displacement"], READING["tendon_tension"])
+        """(n_tendon,) what one reading of the driving channels is typically good for, N, m or A."""
+        held = np.where(self.by_length, READING["tendon_displacement"], READING["tendon_tension"])
+        return np.where(self.by_current, READING["sma_current"], held)
 
     @property
     def n_sample(self) -> int:
@@ -79,7 +93,9 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
         f"input {c.name} does not drive robot {robot.name!r} and is not used" for c in recording.inputs() if c.name not in driving
     ]
     by_length = np.array([c.kind == "tendon_displacement" for c in driven])
-    outputs, unknown = _outputs(recording, robot, n_tendon)
+    by_current = np.array([c.kind in HEATING for c in driven])
+    amperes = _amperes(robot, driven)
+    outputs, unknown = _outputs(recording, robot, by_current)
     if not outputs:
         raise DataError(f"{_where(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
     notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
@@ -97,10 +113,11 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
                 trial.name,
                 trial.time,
                 clocks[k],
-                command,
+                command * amperes,
                 by_length,
                 _temperature(recording, trial),
                 _loads(recording, trial, robot),
+                by_current,
             )
         )
         measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
@@ -117,14 +134,15 @@ def _where(recording: Recording) -> str:
 
 
 def _drives(recording: Recording, robot: Robot, n_tendon: int) -> list[Channel]:
-    """The channel that drives each tendon: its tension or its displacement. Raises DataError where one is missing or doubled."""
+    """The channel that drives each tendon: its tension, its displacement, or current or voltage of its SMA spring. Raises DataError
+    where one is missing or doubled."""
     drives = []
     for i in range(1, n_tendon + 1):
         found = [c for c in recording.inputs() if c.kind in READING and c.index == i]
         if not found:
             raise DataError(
                 f"{_where(recording)}: the inputs do not determine robot {robot.name!r}: tendon {i} is not driven; give "
-                f"tendon_{i}_tension or tendon_{i}_displacement the role 'input'"
+                f"tendon_{i}_tension, tendon_{i}_displacement or sma_{i}_current the role 'input'"
             )
         if len(found) > 1:
             raise DataError(
@@ -134,15 +152,29 @@ def _drives(recording: Recording, robot: Robot, n_tendon: int) -> list[Channel]:
     return drives
 
 
-def _outputs(recording: Recording, robot: Robot, n_tendon: int) -> tuple[tuple[Output, ...], list[str]]:
+def _amperes(robot: Robot, driven: list[Channel]) -> np.ndarray:
+    """(n_tendon,) factor from each driving reading to what it does: volts drive currents I = U / R.
+
+    Raises DataError for a robot without springs.
+    """
+    if not any(c.kind in HEATING for c in driven):
+        return np.ones(len(driven))
+    resistance = robot.springs(len(driven)).resistance
+    return np.array([1.0 / R if c.kind == "sma_voltage" else 1.0 for c, R in zip(driven, resistance, strict=True)])
+
+
+def _outputs(recording: Recording, robot: Robot, by_current: np.ndarray) -> tuple[tuple[Output, ...], list[str]]:
     markers = list(robot.build().markers)
     found, unknown = [], []
     for channel in recording.outputs():
         name = channel.name.rpartition("_")[0]
         if channel.axis is not None and name in markers:
             found.append(Output(channel, "marker", markers.index(name), "xyz".index(channel.axis)))
-        elif channel.kind in READING and channel.index is not None and channel.index <= n_tendon:
-            found.append(Output(channel, channel.kind.removeprefix("tendon_"), channel.index - 1, 0))
+        elif channel.kind in SCALARS and channel.index is not None and channel.index <= len(by_current):
+            group = SCALARS[channel.kind]
+            known = group in ("tension", "displacement") or by_current[channel.index - 1]
+            found += [Output(channel, group, channel.index - 1, 0)] if known else []
+            unknown += [] if known else [channel.name]
         else:
             unknown.append(channel.name)
     return tuple(found), unknown

@@ -130,7 +130,8 @@ class Dynamics:
             np.array(time, float), np.maximum(tension, 0.0, order="C"), marker, path, q,
         )  # fmt: skip
         finite = np.isfinite(marker).all(axis=(1, 2))
-        return Path(np.array(tension), marker, path, q, np.where(finite, DIRECT, 0), start.started, slip, distal, start.LU)
+        no_springs, status = np.full((n, nt), np.nan), np.where(finite, DIRECT, 0)
+        return Path(np.array(tension), marker, path, q, no_springs, status, start.started, slip, distal, start.LU)
 
 
 def _loaded(body: Body, loads: Loads, scale: float) -> Body:

@@ -11,8 +11,14 @@ from twin.bench import Bench, prepare
 from twin.measurements import Recording
 from twin.twin import Twin, is_dynamic, readings, report, simulate
 
-UNIT = {"marker": ("mm", 1e3), "displacement": ("mm", 1e3), "tension": ("N", 1.0)}
-KIND = {"marker": "position", "displacement": "tendon_displacement", "tension": "tendon_tension"}
+UNIT = {
+    "marker": ("mm", 1e3), "displacement": ("mm", 1e3), "tension": ("N", 1.0), "temperature": ("K", 1.0),
+    "resistance": ("ohm", 1.0),
+}  # fmt: skip
+KIND = {
+    "marker": "position", "displacement": "tendon_displacement", "tension": "tendon_tension", "temperature": "sma_temperature",
+    "resistance": "sma_resistance",
+}  # fmt: skip
 
 
 def squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:

@@ -145,7 +145,8 @@ def estimate_noise(
     if pairs:
         noise = replace(noise, rho=_correlation(noise, d, G, member))
     if not np.isfinite(cells).all():
-        said = ", ".join(f"{1e3 * d:.3g} {'mm' if b else 'mN'}" for d, b in zip(drive, bench.by_length, strict=True))
+        units = np.where(bench.by_length, "mm", np.where(bench.by_current, "mA", "mN"))
+        said = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
         notes.append(f"no noise declared for the inputs: estimated as {said} from the data")
     return noise, notes
 

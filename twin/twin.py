@@ -11,7 +11,7 @@ import numpy as np
 from twin.bench import Bench, Inputs, prepare
 from twin.dynamics import Dynamics
 from twin.effects import Creep, Effect, Loads, Route, Signals, named
-from twin.equilibrium import TOLERANCE, Equilibrium, Path
+from twin.equilibrium import TOLERANCE, Equilibrium, Heating, Path
 from twin.errors import SolveError
 from twin.measurements import Recording
 from twin.quantities import Values
@@ -70,7 +70,7 @@ def is_dynamic(bench: Bench) -> bool:
     period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static motion.
     """
     period = 1.0 / first_mode(bench.robot)
-    if bench.by_length.any():  # lengths are held by static solves only
+    if _is_held(bench):
         return False
     for trial in bench.inputs:
         dt = np.diff(trial.time)
@@ -83,6 +83,11 @@ def is_dynamic(bench: Bench) -> bool:
         if np.any((span > 0.3) & (slope > 0.8 * span / period)):
             return True
     return False
+
+
+def _is_held(bench: Bench) -> bool:
+    """Whether motors or springs hold some tendon's length, which static solves alone do."""
+    return bool(bench.by_length.any() or bench.by_current.any())
 
 
 def simulate(
@@ -98,7 +103,7 @@ def simulate(
     body = twin.robot.build(twin.values)
     for effect in twin.effects:
         effect.edit(body)
-    solver = Dynamics(body) if dynamic else Equilibrium(body)
+    solver = Dynamics(body) if dynamic and not _is_held(bench) else Equilibrium(body)
     creep, route = _merged_creep(twin.effects), _merged_route(twin.effects)
     wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
@@ -118,10 +123,10 @@ def _trial(
     twin: Twin, solver: Equilibrium | Dynamics, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray, near: Path | None,
     keep: bool, tolerance: float, once: bool,
 ) -> Trace:  # fmt: skip
-    n, by_length = len(inputs.time), inputs.by_length
+    n, by_length, by_current = len(inputs.time), inputs.by_length, np.broadcast_to(inputs.by_current, inputs.by_length.shape)
     driving = Signals(
-        inputs.time, inputs.clock, np.where(by_length, 0.0, inputs.command), np.where(by_length, inputs.command, 0.0),
-        np.zeros((n, 0, 3)), inputs.temperature, by_length,
+        inputs.time, inputs.clock, np.where(by_length | by_current, 0.0, inputs.command), np.where(by_length, inputs.command, 0.0),
+        np.zeros((n, 0, 3)), inputs.temperature, by_length, by_current, np.where(by_current, inputs.command, 0.0),
     )  # fmt: skip
     for effect in reversed(twin.effects):
         driving = effect.command(driving)
@@ -130,14 +135,23 @@ def _trial(
     loads: Loads = inputs.loads
     for effect in twin.effects:
         loads = effect.surround(loads)
-    command = np.where(by_length, driving.displacement, driving.tension)
+    command = np.where(by_length, driving.displacement, np.where(by_current, driving.current, driving.tension))
     stiffness = np.ones(n)
     for effect in twin.effects:
         stiffness = stiffness * effect.soften(inputs.temperature, inputs.clock)
-    path = solver.solve(inputs.time, command, loads, route, creep, delayed, near, keep, tolerance, by_length, stiffness, once)
+    if isinstance(solver, Equilibrium):
+        heating = _heating(twin, inputs.temperature, by_current) if by_current.any() else None
+        path = solver.solve(
+            inputs.time, command, loads, route, creep, delayed, near, keep, tolerance, by_length, stiffness, once, heating
+        )  # fmt: skip
+    else:
+        path = solver.solve(inputs.time, command, loads, route, creep, delayed, stiffness=stiffness)
     if not path.status.all():
         bad = int(np.flatnonzero(path.status == 0)[0])
-        pull = ", ".join(f"{1e3 * c:.2f} mm" if b else f"{c:.2f} N" for c, b in zip(command[bad], by_length, strict=True))
+        pull = ", ".join(
+            f"{1e3 * c:.2f} mm" if b else f"{c:.2f} {'A' if a else 'N'}"
+            for c, b, a in zip(command[bad], by_length, by_current, strict=True)
+        )  # fmt: skip
         hint = "; displacements may pull against each other" if by_length.any() else ""
         raise SolveError(
             f"{inputs.name}: no static equilibrium at sample {bad + 1} (t = {inputs.time[bad]:.3g} s, tendons {pull}, payload "
@@ -146,9 +160,16 @@ def _trial(
     shortening = solver.straight_path - path.path + route.stretch * path.tension
     true = Signals(
         inputs.time, inputs.clock, path.tension, np.where(by_length, driving.displacement, shortening), path.markers,
-        inputs.temperature, by_length,
+        inputs.temperature, by_length, by_current, driving.current, path.temperature,
     )  # fmt: skip
     return Trace(true, path)
+
+
+def _heating(twin: Twin, ambient: np.ndarray, by_current: np.ndarray) -> Heating:
+    spring = twin.robot.springs(len(by_current), twin.values)
+    for effect in twin.effects:
+        spring = effect.spring(spring)
+    return Heating(by_current, ambient, spring)
 
 
 def _merged_creep(effects: tuple[Effect, ...]) -> Creep:
@@ -172,6 +193,9 @@ def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
 def readings(bench: Bench, seen: Signals) -> np.ndarray:
     """The bench's output channels of one trial's signals, (n, n_output)."""
     of = {"marker": seen.markers, "displacement": seen.displacement[..., None], "tension": seen.tension[..., None]}
+    if bench.by_current.any():
+        resistance = np.broadcast_to(bench.robot.springs(bench.n_tendon).resistance, seen.warmth.shape)
+        of |= {"temperature": seen.warmth[..., None], "resistance": resistance[..., None]}
     return np.stack([of[o.group][:, o.index, o.axis] for o in bench.outputs], axis=1)
 
 

@@ -69,7 +69,7 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
             loads = replace(like.loads, payload=payload, force=np.zeros(3))
             label = f"{motion}, tip payload {1e3 * payload:.0f} g"
             warm = np.full(len(time), like.temperature[0])
-            out.append((label, Inputs(label, time, last + 60.0 + time, command, bench.by_length, warm, loads)))
+            out.append((label, Inputs(label, time, last + 60.0 + time, command, bench.by_length, warm, loads, bench.by_current)))
     return out
 
 

@@ -13,12 +13,14 @@ from twin.diagnose.diagnosis import Settings
 from twin.residual import Noise, Whitener, estimate_noise
 from twin.twin import Trace, Twin, readings, report, simulate
 
+ROUGHLY = {"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3}  # noise, SI, by group
+
 
 def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
     """A first calibration under a guessed noise, and the objective every later fit uses."""
     measured = [bench.measured[k] for k in fitted]
     command = [bench.inputs[k].command for k in fitted]
-    rough = np.array([{"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2}[o.group] for o in bench.outputs])
+    rough = np.array([ROUGHLY[o.group] for o in bench.outputs])
     first = Noise(rough, np.zeros(bench.n_tendon), np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
     rough_fit = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)
@@ -32,9 +34,12 @@ def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings
 def sensitivity(
     bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: list[Trace] | None = None
 ) -> list[np.ndarray]:
-    """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading."""
-    out = [np.empty((*y.shape, bench.n_tendon)) for y in predicted]
-    for t in range(bench.n_tendon):
+    """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading.
+
+    None to a spring's current: its errors from row to row are averaged over the minute of heating, and leave a tenth of a marker's.
+    """
+    out = [np.zeros((*y.shape, bench.n_tendon)) for y in predicted]
+    for t in np.flatnonzero(~bench.by_current):
         step = 2.0 * bench.reading[t]
         push = step * np.eye(bench.n_tendon)[t]
         moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))

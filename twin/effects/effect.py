@@ -8,6 +8,7 @@ A law acts in the places below, in the order of the signal, and in no other. Sta
     soften    temperature, time -> its stiffness
     surround  the loads on it                   (gravity, payload, a wall)
     route     along the tendon                  (friction, stretch)
+    spring    the SMA springs that pull         (heat loss, phase change)
     deform    slow change of the rest shape     (creep)
     sense     true output -> reported output    (frame, delay, drift)
 
@@ -25,6 +26,7 @@ import numpy as np
 
 from twin.errors import TwinError
 from twin.quantities import Parameter, Values, overrides
+from twin.springs import Spring
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Signals:
     """The quantities of one trial that sensors see, true or reported; batch (sample) first.
 
     time (n,) s in the trial; clock (n,) s since the first trial; tension (n, n_tendon) N at the base; displacement (n, n_tendon) m
-    at the motor; markers (n, n_marker, 3) m; temperature (n,) K; by_length (n_tendon,): driven by displacement, else by tension.
+    at the motor; markers (n, n_marker, 3) m; temperature (n,) K of the room; by_length (n_tendon,): driven by displacement, else by
+    tension or, where by_current (n_tendon,), through an SMA spring by its current (n, n_tendon) A; warmth (n, n_tendon) K, theirs.
     On the way in (`command`, `drive`) what does not drive a tendon is zero.
     """
 
@@ -71,6 +74,9 @@ class Signals:
     markers: np.ndarray
     temperature: np.ndarray
     by_length: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
+    by_current: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
+    current: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
+    warmth: np.ndarray = field(default_factory=lambda: np.full((1, 1), np.nan))
 
     def with_(self, **changes: np.ndarray) -> Signals:
         return replace(self, **changes)
@@ -172,6 +178,9 @@ class Effect(ABC):
 
     def route(self) -> Route:
         return Route()
+
+    def spring(self, spring: Spring) -> Spring:
+        return spring
 
     def deform(self) -> Creep:
         return Creep()

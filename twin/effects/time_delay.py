@@ -35,4 +35,12 @@ class TimeDelay(Effect):
             return reported
         then = np.clip(t - self["delay"], t[0], t[-1])
         pull, travel = PchipInterpolator(t, reported.tension), PchipInterpolator(t, reported.displacement)
-        return reported.with_(tension=pull(then), displacement=travel(then))
+        return reported.with_(tension=pull(then), displacement=travel(then), current=self._heating(reported))
+
+    def _heating(self, reported: Signals) -> np.ndarray:
+        """Currents, which hold from row to row, as shifted: over each row the one that heats as much. None flows before the log."""
+        t = reported.time
+        edges = np.append(t, 2 * t[-1] - t[-2])
+        heat = np.cumsum(np.diff(edges)[:, None] * reported.current**2, axis=0)
+        shifted = [np.interp(edges - self["delay"], edges, column) for column in np.vstack([0 * heat[:1], heat]).T]
+        return np.sqrt(np.maximum(np.diff(np.stack(shifted, axis=1), axis=0), 0.0) / np.diff(edges)[:, None])

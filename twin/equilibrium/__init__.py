@@ -20,23 +20,35 @@ from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.lengths import STIFFEST
 from twin.equilibrium.trial import Drive, run
 from twin.robots import Body, available, hinge_pairs, load
+from twin.springs.spring import Spring, no_springs
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
 
 NOT_FOUND, DIRECT, FOLLOWED = 0, 1, 2  # status of a solve
 
-__all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Path", "compile_solver", "is_compiled"]
+__all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Heating", "Path", "compile_solver", "is_compiled"]
+
+
+@dataclass(frozen=True)
+class Heating:
+    """SMA springs that pull the tendons `which` (n_tendon,), in surroundings at `ambient` (n,) K."""
+
+    which: np.ndarray
+    ambient: np.ndarray
+    spring: Spring
 
 
 @dataclass(frozen=True)
 class Path:
     """The equilibria of one trial: base tension (n, n_tendon) N, markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad,
-    status (n,), `started`; slip states and distal tendon lengths (n_tendon, n_disk) at its end."""
+    temperature of springs (n, n_tendon) K, status (n,), `started`; slip states and distal tendon lengths (n_tendon, n_disk) at its
+    end."""
 
     tension: np.ndarray
     markers: np.ndarray
     path: np.ndarray
     q: np.ndarray
+    temperature: np.ndarray
     status: np.ndarray
     started: int
     slip: np.ndarray
@@ -98,13 +110,15 @@ class Equilibrium:
         self, time: np.ndarray, command: np.ndarray, loads: Loads, route: Route | None = None, creep: Creep | None = None,
         delayed: np.ndarray | None = None, near: Path | None = None, keep: bool = False, tolerance: float = TOLERANCE,
         by_length: np.ndarray | None = None, stiffness: np.ndarray | None = None, once: bool = False,
+        heating: Heating | None = None,
     ) -> Path:  # fmt: skip
         """Equilibria for commands (n, n_tendon) at times (n,) s, in the order of `twin.equilibrium.trial`.
 
-        A command is a base tension in N or, for the tendons of `by_length` (n_tendon,), a displacement in m. `delayed`
-        (n_element, nv) holds the creep strains and is advanced in place. `stiffness` (n,) scales the body's. `near`, a solution
-        with LU of a neighbouring problem on the same samples, speeds the solve up; with `once` one Newton step a sample is taken
-        from it. Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before.
+        A command is a base tension in N, for the tendons of `by_length` (n_tendon,) a displacement in m, for those of `heating` a
+        current in A that holds from one time to the next. `delayed` (n_element, nv) holds the creep strains and is advanced in
+        place. `stiffness` (n,) scales the body's. `near`, a solution with LU of a neighbouring problem on the same samples, speeds
+        the solve up; with `once` one Newton step a sample is taken from it. Where no equilibrium was found the sample's status is
+        NOT_FOUND and its shape is the one before.
         """
         n, nt = command.shape
         nv = self.model.nv
@@ -113,19 +127,25 @@ class Equilibrium:
         if delayed is None:
             delayed = np.zeros((amplitude.size, nv))
         by_length = np.zeros(nt, bool) if by_length is None else by_length
+        heating = heating or Heating(np.zeros(nt, bool), np.zeros(n), no_springs(nt))
         drive = Drive(
             time=np.array(time, float),
             command=np.where(by_length, command, np.maximum(command, 0.0)),
             by_length=np.array(by_length, bool),
             straight=self.straight_path,
-            stretch=max(float(route.stretch), STIFFEST),
+            stretch=float(route.stretch),
+            least_stretch=STIFFEST,
             stiffness=np.ones(n) if stiffness is None else np.array(stiffness, float),
+            by_spring=np.array(heating.which, bool),
+            ambient=np.array(heating.ambient, float),
+            spring=Spring(*(np.array(v, float) for v in heating.spring)),
         )
         out = Path(
             tension=np.empty((n, nt)),
             markers=np.empty((n, self.chain.marker.size, 3)),
             path=np.empty((n, nt)),
             q=np.empty((n, nv)),
+            temperature=np.empty((n, nt)),
             status=np.empty(n, np.int64),
             started=0,
             slip=np.zeros((nt, self.chain.disk.size)),
@@ -156,6 +176,7 @@ class Equilibrium:
             out.tension,
             out.markers,
             out.path,
+            out.temperature,
             out.status,
         )
         return replace(out, started=int(started))

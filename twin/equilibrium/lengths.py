@@ -2,11 +2,17 @@
 
 For each such tendon   T >= 0,   gap = path(T) - free length - stretch T <= 0,   T gap = 0.
 
+An SMA spring holds its tendon in the same way: on each linear piece Y = Y_0 + slope (e - e_0) of its law (twin/springs/force.py),
+at an elongation e = e_start + path - straight path - stretch T, it is a tendon of free length path - stretch T - Y/slope whose
+stretch is 1/slope more, so gap = (Y - T)/slope. The piece is taken anew at every step (semi-smooth Newton: all pieces rise with e).
+
 Newton on shape and tensions at once: dpath_i/dT_j = -A_i J^-1 B_j with A_i = dpath_i/dq, B_j = dr/dT_j and J the tangent of the
 balance; which tendons are taut is settled on the linear problem.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,12 +21,57 @@ from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, lever
 from twin.equilibrium.linear import factorise, substitute
 from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, commit, place
+from twin.springs.force import piece
+from twin.springs.spring import Spring
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
 STIFFEST = 1e-6  # m/N of any tendon: three taut ones on a straight robot are redundant, 4 um at 4 N decide between them
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
 STEPS = 40
 SMALLEST = 1e-3  # of a jump
+
+
+class Held(NamedTuple):
+    """Tendons held at lengths, by motors or by springs, (n_tendon,) each. Tensions count times `factor`, as in `trial.softened`."""
+
+    which: np.ndarray  # whether a tendon is held, and not pulled with a given tension
+    by_spring: np.ndarray  # whether a spring holds it
+    free: np.ndarray  # m
+    stretch: np.ndarray  # m/N
+    straight: np.ndarray  # m, path lengths on the straight robot
+    elastic: float  # m/N, stretch of the tendon alone
+    factor: np.ndarray  # (1,)
+    spring: Spring
+    temperature: np.ndarray  # K, of the springs
+    elongation: np.ndarray  # m, of the springs when they last were at rest
+    tension: np.ndarray  # N, theirs then
+
+
+@jit
+def elongation(held, t, path, tension):
+    """Elongation (m) of the spring that pulls tendon t at a path length (m) and a tension."""
+    return held.spring.initial_elongation[t] + path - held.straight[t] - held.elastic * tension / held.factor[0]
+
+
+@jit
+def linearise(held, s, tension):
+    """Free length and stretch of the tendons that springs hold, from the piece of their law they are on; s[t, 0] is the path."""
+    for t in range(tension.size):
+        if held.by_spring[t]:
+            e = elongation(held, t, s[t, 0], tension[t])
+            Y, slope = piece(held.spring, t, held.temperature[t], e, held.elongation[t], held.tension[t])
+            elastic = held.elastic / held.factor[0]
+            held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
+            held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
+
+
+@jit
+def remember(held, s, tension):
+    """The springs come to rest: their elongations and tensions become those their law goes on from."""
+    for t in range(tension.size):
+        if held.by_spring[t]:
+            held.elongation[t] = elongation(held, t, s[t, 0], tension[t])
+            held.tension[t] = tension[t] / held.factor[0]
 
 
 @jit
@@ -102,25 +153,28 @@ def tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU
 
 
 @jit
-def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, last, held, free, stretch):
-    """Equilibrium with the tendons of `by_length` at lengths `free` (n_tendon,) m plus their stretch (m/N), and their tensions.
+def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held, last, free, temperature):
+    """Equilibrium with the tendons that motors hold at lengths `free` (n_tendon,) m and the springs at `temperature` (n_tendon,) K,
+    and all tensions.
 
-    Where the guess q does not lead there the jump is made from `last`, which was at `held`, in ever smaller parts if need be.
+    Where the guess q does not lead there the jump is made from `last`, which was at held.free and held.temperature, in ever smaller
+    parts if need be. held.free and held.temperature follow.
 
-    Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits (z, s); with parts, after each.
+    Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits (z, s); with parts, after each. The springs'
+    memory is left to `remember`.
     """
     nt = tension.size
-    q0, T0, T1, way = last.copy(), tension.copy(), tension.copy(), np.empty(nt)
-    if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, free, stretch) == 1:
+    q0, T0, T1, free0, warm0 = last.copy(), tension.copy(), tension.copy(), held.free.copy(), held.temperature.copy()
+    move(held, free0, warm0, free, temperature, 1.0)
+    if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held) == 1:
         return 1
     done, part = 0.0, 1.0
     while done < 1.0:
-        for t in range(nt):
-            way[t] = held[t] + (done + part) * (free[t] - held[t])
-            tension[t] = T0[t]
+        move(held, free0, warm0, free, temperature, done + part)
+        assign(tension, T0)
         assign(q, q0)
         fresh[0] = False
-        if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, way, stretch) == 1:
+        if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held) == 1:
             done += part
             part = min(2.0 * part, 1.0 - done)
             assign(q0, q)
@@ -128,6 +182,7 @@ def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol,
         else:
             part *= 0.5
             if part < SMALLEST:
+                move(held, free0, warm0, free, temperature, 1.0)
                 for t in range(nt):
                     tension[t] = T1[t]
                 return 0
@@ -135,7 +190,16 @@ def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol,
 
 
 @jit
-def advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch):
+def move(held, free0, warm0, free, warm, share):
+    """Sets held.free and held.temperature on the way from (free0, warm0) to (free, warm)."""
+    for t in range(free.size):
+        if not held.by_spring[t]:
+            held.free[t] = free0[t] + share * (free[t] - free0[t])
+        held.temperature[t] = warm0[t] + share * (warm[t] - warm0[t])
+
+
+@jit
+def advance(chain, law, z1, s1, q, r, LU, held_by, tension, held):
     """One Newton step on shape and tensions together, with the `tangent` (LU, held_by) and the balance's (r, z1, s1) at q.
 
     Returns the longest change of a hinge (rad), negative where the lengths have no solution.
@@ -144,7 +208,7 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, str
     A, B, C, gap, dT = np.empty((nt, nv)), np.empty((nt, nv)), np.empty((nt, nt)), np.empty(nt), np.empty(nt)
     pulls(chain, law, z1, A, B)
     for t in range(nt):
-        gap[t] = s1[t, 0] - free[t] - stretch * tension[t]
+        gap[t] = s1[t, 0] - held.free[t] - held.stretch[t] * tension[t]
         if held_by[t]:
             for i in range(nv):
                 r[i] += PULL * gap[t] * B[t, i]
@@ -154,12 +218,12 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, str
     for j in range(nt):
         if held_by[j]:
             for i in range(nv):
-                B[j, i] *= 1.0 - PULL * stretch
+                B[j, i] *= 1.0 - PULL * held.stretch[j]
         substitute(LU, B[j])
         for i in range(nt):
             C[i, j] = dot_n(A[i], B[j])
-        C[j, j] += stretch
-    if not settle(C, gap, tension, by_length, dT):
+        C[j, j] += held.stretch[j]
+    if not settle(C, gap, tension, held.which, dT):
         return -1.0
     longest = 0.0
     for i in range(nv):
@@ -174,7 +238,7 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, str
 
 
 @jit
-def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, by_length, free, stretch):
+def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held):
     """Newton on shape and tensions at once, with the chord LU while it contracts; a step that lets the residual grow is halved.
 
     Returns 1 and commits (z, s), or 0.
@@ -189,9 +253,10 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, 
         size = 0.0
         for i in range(nv):
             size = max(size, abs(r[i] / chain.stiffness[i]))
+        linearise(held, s1, tension)
         for t in range(nt):
-            if by_length[t]:
-                gap = s1[t, 0] - free[t] - stretch * tension[t]
+            if held.which[t]:
+                gap = s1[t, 0] - held.free[t] - held.stretch[t] * tension[t]
                 size = max(size, (abs(gap) if tension[t] > 0.0 else gap) / CLOSED)
         if size < tol:
             for t in range(nt):
@@ -215,13 +280,13 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, 
             continue
         chord = fresh[0] and size <= CONTRACTION * before
         if not chord:
-            fresh[0] = tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU, held_by)
+            fresh[0] = tangent(model, data, chain, rest, law, load, z, s, q, tension, held.which, LU, held_by)
             if not fresh[0]:
                 return 0
         before, step = size, 1.0
         assign(q0, q)
         assign(T0, tension)
-        longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch)
+        longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, held)
         if longest < 0.0:
             return 0
         assign(q1, q)
@@ -236,7 +301,7 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, 
 
 
 @jit
-def hold_once(model, data, chain, rest, law, load, z, s, q, LU, held_by, tension, by_length, free, stretch):
+def hold_once(model, data, chain, rest, law, load, z, s, q, LU, held_by, tension, held):
     """One Newton step on shape and tensions from a neighbouring solution with the factors LU of its tangent. Commits (z, s).
 
     Returns 1, or 0 where lost.
@@ -245,7 +310,8 @@ def hold_once(model, data, chain, rest, law, load, z, s, q, LU, held_by, tension
     z1, s1 = np.empty(z.shape), np.empty(s.shape)
     place(model, data, chain, q)
     bowing = balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
-    longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, by_length, free, stretch)
+    linearise(held, s1, tension)
+    longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, held)
     place(model, data, chain, q)
     commit(chain, law, z, s, bowing)
     return 1 if 0.0 <= longest < LONGEST_STEP else 0

@@ -17,6 +17,8 @@ KINDS = {
     "marker": "position",
     "displacement": "tendon_displacement",
     "tension": "tendon_tension",
+    "temperature": "sma_temperature",
+    "resistance": "sma_resistance",
 }  # group of outputs -> kind in the report
 
 
@@ -143,5 +145,6 @@ def _noise(d: Diagnosis) -> dict[str, Any]:
 
 
 def driven(bench: Bench) -> list[str]:
-    """What drives each tendon: "tension" or "displacement"."""
-    return ["displacement" if b else "tension" for b in bench.by_length]
+    """What drives each tendon: "tension", "displacement" or "current"."""
+    held = zip(bench.by_length, bench.by_current, strict=True)
+    return ["displacement" if length else "current" if current else "tension" for length, current in held]

@@ -39,7 +39,7 @@ def variables(bench: Bench) -> Iterator[tuple[str, Variable]]:
     every, no = np.ones(n, bool), np.zeros(n)
     for t in range(bench.n_tendon):
         side = np.where(np.abs(slope[:, t]) > still[t], np.sign(slope[:, t]), 0.0)
-        what, unit = ("displacement", "mm") if bench.by_length[t] else ("tension", "N")
+        what, unit = ("displacement", "mm") if bench.by_length[t] else ("current", "A") if bench.by_current[t] else ("tension", "N")
         title, which, shown = f"{what} of tendon {t + 1} ({unit})", f"in which tendon {t + 1} pulls hardest", strongest == t
         yield "loop", Variable(title, pull[:, t], side, shown, True, which)
         yield "tension", Variable(title, pull[:, t], no, shown, False, which)

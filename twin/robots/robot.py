@@ -17,6 +17,7 @@ from twin.errors import DataError, UnknownNameError
 from twin.quantities import Parameter, Values, overrides, si_factor, si_unit
 from twin.robots.body import Body
 from twin.robots.toml_file import opened
+from twin.springs import PARAMETERS, Spring, springs_of
 
 FORMAT = "twin-robot/1"
 
@@ -52,6 +53,10 @@ class Robot:
         """The MuJoCo body at the given parameter values, nominal where none is given. Raises TwinError for a bad name."""
         family = importlib.import_module(f"twin.robots.{self.family}")
         return family.build(self.structure, overrides(self.parameters, values or {}))
+
+    def springs(self, n: int, values: Values | None = None) -> Spring:
+        """The SMA springs of n tendons at the given parameter values. Raises DataError where the robot describes none."""
+        return springs_of(overrides(self.parameters, values or {}), n)
 
 
 def models_folder() -> Path:
@@ -115,7 +120,7 @@ def _check(robot: Robot) -> None:
         raise DataError(f"gravity is {robot.gravity.tolist()}; three finite numbers are needed")
     if importlib.util.find_spec(f"twin.robots.{robot.family}") is None:
         raise DataError(f"no family named {robot.family!r}; a family is a module of twin.robots, as 'continuum'")
-    units = importlib.import_module(f"twin.robots.{robot.family}").UNITS
+    units = importlib.import_module(f"twin.robots.{robot.family}").UNITS | PARAMETERS
     for p in robot.parameters:
         needed = units.get(p.name, units.get(p.name.rpartition("_")[0]))
         if needed is not None and p.unit != needed:

@@ -1,0 +1,65 @@
+"""SMA cooling: the springs lose heat to their surroundings faster or slower than described."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from twin.effects.effect import Effect, Signals, Start
+from twin.quantities import Parameter
+from twin.springs import Spring
+
+
+class SmaCooling(Effect):
+    """Heat loss of spring i: h_i = factor share_i (h + forced) (1 + rate (T_a - 23 degC)), h the described one (W/K).
+
+    `factor` is what still or moving air does to all springs, `share` a draught on one side, `forced` a loss that depends on neither
+    elongation nor heat, `rate` surroundings that carry off more when warm.
+
+    Source: Newton's law of cooling. A fan doubles to quintuples the loss of a thin wire (forced against free convection, Churchill
+    and Bernstein 1977), a tube around the spring halves it.
+
+    >>> from twin.robots import load
+    >>> plain = load("continuum").springs(3)
+    >>> (1e3 * SmaCooling(factor=1.5, share_2=2.0).spring(plain).loss).round(3).tolist()
+    [2.226, 4.452, 2.226]
+    """
+
+    id = "sma_cooling"
+    parameters = (
+        Parameter("factor", 1.0, "1", 0.2, 5.0, "half in a tube, up to five times in a fan's wind", scale=0.05),
+        Parameter("forced", 0.0, "W/K", -1e-3, 1e-2, "a draught's; described: 2-5 mW/K", scale=2e-4, std=1e-3),
+        Parameter("rate", 0.0, "1/K", -0.1, 0.1, "air's properties: 0.002; a ventilated room: ours", scale=0.01, std=0.03),
+    )
+    per_tendon = (Parameter("share", 1.0, "1", 0.2, 5.0, "springs beside each other: tens of per cent", scale=0.05, std=0.3),)
+    richer = ("forced", "rate", "share_1", "share_2", "share_3")
+    moves_with = "the heat of the springs, so the time held"
+
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Of all springs, then of each alone; nowhere without springs."""
+        driven = _heated(predicted, n_tendon)
+        if not driven.any():
+            return
+        for factor in (1.3, 0.75):
+            yield Start({"factor": factor}, ("factor",))
+        for i in np.flatnonzero(driven) + 1:
+            yield Start({f"share_{i}": 1.3}, (f"share_{i}",))
+
+    def spring(self, spring: Spring) -> Spring:
+        more = self["factor"] * self.each("share")
+        return spring._replace(
+            loss=more * (spring.loss + self["forced"]),
+            loss_warm=more * spring.loss_warm,
+            loss_warm_2=more * spring.loss_warm_2,
+            loss_open=more * spring.loss_open,
+            loss_open_2=more * spring.loss_open_2,
+            loss_warm_open=more * spring.loss_warm_open,
+            loss_surroundings=spring.loss_surroundings + self["rate"],
+        )
+
+
+def _heated(predicted: list[Signals], n_tendon: int) -> np.ndarray:
+    """(n_tendon,) whether a current drives the tendon in some trial."""
+    return np.any([np.broadcast_to(s.by_current, n_tendon) for s in predicted], axis=0)

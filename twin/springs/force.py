@@ -1,0 +1,59 @@
+"""Tension of an SMA spring: a rate-independent operator on its elongation, between two branches that move with temperature.
+
+    s_Sm = max(s_start, k (T - M_s)),  s_Fm = max(s_finish, k (T - M_f)),  e_Sm = s_Sm / E_A,  e_Fm = s_Fm / E_M + e_in
+    s_Sa = k (T - A_s),                s_Fa = k (T - A_f),                 e_Fa = s_Fa / E_A,  e_Sa = s_Sa / E_M + e_in
+
+    upper(e) = s_Fm + (s_Fm - s_Sm) / (e_Fm - e_Sm) (e - e_Fm)        to martensite, while pulled or cooled
+    lower(e) = s_Fa + (s_Fa - s_Sa) / (e_Fa - e_Sa) (e - e_Fa)        back to austenite, while let go or heated
+    Y = max(E_M (e - e_in), min(E_A e, upper, max(lower, s_prev + E_M (e - e_prev))))
+    s = max(0, Y)
+
+Inside the loop the spring answers with E_M from where it last was. Every piece of Y rises with e, so a spring is at each moment a
+taut or slack tendon held at a length, with a stretch 1/slope of its own.
+
+Source: Kolyvas and Tzes, J. Intell. Mater. Syst. Struct. 2018, doi 10.1177/1045389X18770880 (their code's operator).
+"""
+
+from __future__ import annotations
+
+from twin.compiled import jit
+
+FLATTEST = 1e-3  # of E_M: the least slope of a plateau
+
+
+@jit
+def branches(spring, t, temperature):
+    """Force (N) at zero elongation and slope (N/m) of the upper and of the lower branch of spring t at `temperature` (K)."""
+    k, e_in = spring.force_per_kelvin[t], spring.transformation_elongation[t]
+    EA, EM = spring.austenite_stiffness[t], spring.martensite_stiffness[t]
+    start = max(spring.detwinning_start[t], k * (temperature - spring.martensite_start[t]))
+    finish = max(spring.detwinning_finish[t], k * (temperature - spring.martensite_finish[t]))
+    slope_up = sloped(start, finish, finish / EM + e_in - start / EA, FLATTEST * EM)
+    upper = finish - slope_up * (finish / EM + e_in)
+    begin = k * (temperature - spring.austenite_start[t])
+    end = k * (temperature - spring.austenite_finish[t])
+    slope_down = sloped(end, begin, begin / EM + e_in - end / EA, FLATTEST * EM)
+    return upper, slope_up, end - slope_down * end / EA, slope_down
+
+
+@jit
+def sloped(low, high, length, least):
+    """(high - low) / length (N/m), and `least` where that is less or the length none."""
+    return max(least, (high - low) / length) if length > 0.0 else least
+
+
+@jit
+def piece(spring, t, temperature, elongation, last_elongation, last_tension):
+    """Y (N) and its slope (N/m) at an elongation (m); a negative Y is a slack spring."""
+    EA, EM = spring.austenite_stiffness[t], spring.martensite_stiffness[t]
+    upper, slope_up, lower, slope_down = branches(spring, t, temperature)
+    Y, slope = EM * (elongation - last_elongation) + last_tension, EM
+    if lower + slope_down * elongation > Y:
+        Y, slope = lower + slope_down * elongation, slope_down
+    if upper + slope_up * elongation < Y:
+        Y, slope = upper + slope_up * elongation, slope_up
+    if EA * elongation < Y:
+        Y, slope = EA * elongation, EA
+    if EM * (elongation - spring.transformation_elongation[t]) > Y:
+        Y, slope = EM * (elongation - spring.transformation_elongation[t]), EM
+    return Y, slope
