@@ -24,10 +24,12 @@ Day = Callable[..., tuple[Recording, Effect | None]]
 
 @pytest.fixture(scope="session")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Day:
-    """bench(effect, strength=2, seed=5, design="hanging") -> (the day as logged, the effect as it was or None)."""
+    """bench(effect, strength=2, seed=5, design="hanging", displacement=False) -> (the day as logged, the effect or None)."""
 
     @cache
-    def day(effect: str | None, strength: float = 2.0, seed: int = 5, design: str = "hanging") -> tuple[Recording, Effect | None]:
+    def day(
+        effect: str | None, strength: float = 2.0, seed: int = 5, design: str = "hanging", displacement: bool = False
+    ) -> tuple[Recording, Effect | None]:
         robot, motions, instruments, laws = (np.random.default_rng([seed, n]) for n in range(4))
         plan = bench_day(design, motions)
         noise = Noise.draw(instruments, coloured=False)
@@ -36,7 +38,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Day:
         folder: Path = tmp_path_factory.mktemp("days") / "day"
         write_set(
             folder, f"test day {seed}", plan, logs, noise, instruments,
-            displacement=truth is not None and truth.seen_in == "displacement",
+            displacement=displacement or (truth is not None and truth.seen_in == "displacement"),
             ambient=truth is not None and truth.needs_ambient,
             exact_input=truth is not None and truth.logs_command,
         )  # fmt: skip

@@ -104,7 +104,7 @@ def simulate(
     for effect in twin.effects:
         effect.edit(body)
     solver = Dynamics(body) if dynamic and not _is_held(bench) else Equilibrium(body)
-    creep, route = _merged_creep(twin.effects), _merged_route(twin.effects)
+    creep, route = _merged_creep(twin.effects), merged_route(twin.effects)
     wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.model.nv))
@@ -177,7 +177,7 @@ def _merged_creep(effects: tuple[Effect, ...]) -> Creep:
     return Creep(tuple(a for c in creeps for a in c.amplitude), tuple(t for c in creeps for t in c.time))
 
 
-def _merged_route(effects: tuple[Effect, ...]) -> Route:
+def merged_route(effects: tuple[Effect, ...]) -> Route:
     routes = [e.route() for e in effects]
     rubbing = next((r for r in routes if r.mu > 0.0), Route())
     return replace(rubbing, stretch=sum(r.stretch for r in routes))

@@ -3,6 +3,7 @@
 engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic energy
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
+move.py     from one equilibrium to another
 trial.py    a trial, sample by sample
 """
 

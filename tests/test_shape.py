@@ -1,0 +1,82 @@
+"""Shape sensing on the independent bench: the error, its error bar, and a payload nobody declared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import Day
+from twin.bench import Bench, prepare
+from twin.calibrate import fit
+from twin.diagnose import Settings
+from twin.diagnose.objective import objective_of
+from twin.effects import Loads, named
+from twin.errors import TwinError
+from twin.robots import load
+from twin.shape import TensionShape
+from twin.twin import Twin
+
+
+@pytest.fixture(scope="module")
+def rubbing(bench: Day) -> tuple[Twin, Bench]:
+    """A bench day with friction and tendon displacements, and the twin fitted to it with all payloads declared."""
+    recording, _ = bench("tendon_friction", 2.0, 5, "sideways", True)
+    prepared = prepare(recording, load("continuum"))
+    start, objective, _ = objective_of(prepared, Twin.of(load("continuum")), list(range(len(prepared.inputs))), Settings())
+    base = fit(objective, start, refresh=True)
+    return fit(objective, base.model.with_effect("tendon_friction", {"mu": 0.1}, ("mu", "presliding"), 3)).model.twin, prepared
+
+
+def columns(bench: Bench, group: str) -> list[int]:
+    return [j for j, o in enumerate(bench.outputs) if o.group == group]
+
+
+def sensed(twin: Twin, bench: Bench, k: int, guess: float) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
+    """Errors and error bars (n, 24) m of trial k sensed with a guessed payload, and the payload found last."""
+    inputs, measured = bench.inputs[k], bench.measured[k]
+    sense = TensionShape(twin, replace(inputs.loads, payload=guess), {"payload": 0.01, "tendon_friction.mu": 0.02})
+    seen, markers = columns(bench, "displacement"), columns(bench, "marker")
+    got = [sense.update(T, y[seen] if seen else None) for T, y in zip(inputs.command, measured, strict=True)]
+    error = np.array([g.markers[:8].ravel() for g in got]) - measured[:, markers]
+    return error, np.array([g.std[:8].ravel() for g in got]), got[-1].found["payload"]
+
+
+def test_unknown_payloads_are_estimated_along_and_the_shape_is_right(rubbing: tuple[Twin, Bench]) -> None:
+    """0, 10 and 20 g, each sensed from a guess of 10 +- 10 g, friction known to 0.02: mean error at most 1 mm, noise and all."""
+    twin, bench = rubbing
+    for k in (next(k for k, i in enumerate(bench.inputs) if i.loads.payload == p) for p in (0.0, 0.01, 0.02)):
+        error, bar, (payload, std) = sensed(twin, bench, k, 0.01)
+        distance = np.linalg.norm(error.reshape(-1, 8, 3), axis=2)
+        assert np.nanmean(distance) < 1e-3
+        assert abs(payload - bench.inputs[k].loads.payload) < 1e-3  # kg: what 0.1 mm of a tendon's travel is worth
+        assert std < 5e-4
+        spread = np.sqrt(np.nanmean((error / np.hypot(bar, 2.5e-4)) ** 2))
+        assert 0.7 < spread < 1.5  # the error bar and the camera's noise make up the error
+
+
+def test_without_displacements_the_error_bar_says_what_is_not_known(rubbing: tuple[Twin, Bench]) -> None:
+    """Ten grams too many, which tensions alone cannot tell: a centimetre off, and the bar is as long."""
+    twin, bench = rubbing
+    blind = replace(bench, outputs=tuple(o if o.group == "marker" else replace(o, group="other") for o in bench.outputs))
+    k = next(k for k, i in enumerate(bench.inputs) if i.loads.payload == 0.0)
+    error, bar, (payload, std) = sensed(twin, blind, k, 0.01)
+    assert (payload, std) == pytest.approx((0.01, 0.01))
+    assert np.sqrt(np.nanmean(error[:, 21:] ** 2)) > 3e-3
+    assert 0.5 < np.sqrt(np.nanmean(error**2) / np.mean(bar**2)) < 2.0
+
+
+def test_the_error_bar_grows_with_doubt_and_with_load() -> None:
+    twin = Twin(load("continuum"), {}, (named("tendon_friction")({"mu": 0.1}, 3),))
+    loads = Loads(np.array([0.0, 0.0, 9.81]))
+
+    def tip_bar(tension: float, doubt: float) -> float:
+        return float(np.linalg.norm(TensionShape(twin, loads, {"tendon_friction.mu": doubt}).update(tension * np.eye(3)[0]).std[7]))
+
+    assert tip_bar(1.0, 0.02) < tip_bar(3.0, 0.02) < tip_bar(3.0, 0.05)
+
+
+def test_a_doubt_about_nothing_is_refused() -> None:
+    with pytest.raises(TwinError, match=r"no number 'tendon_friction.mu' in this twin; doubts may be about payload, backbone"):
+        TensionShape(Twin(load("continuum")), Loads(np.zeros(3)), {"tendon_friction.mu": 0.1})

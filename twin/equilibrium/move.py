@@ -1,0 +1,193 @@
+"""From one equilibrium to another, with the friction met on the way; and how the tip answers to tensions.
+
+Tensions change together along a straight line from those of now to those wanted. A robot's state is (T, q, z, s): base tensions,
+hinge angles, slip states and distal tendon lengths.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.compiled import assign, jit
+from twin.equilibrium.chain import lever
+from twin.equilibrium.lengths import pulls
+from twin.equilibrium.linear import substitute
+from twin.equilibrium.newton import is_minimum, place, solve
+
+TRIALS = 25  # Gauss-Newton steps of `seek`
+CORRECTIONS = 6  # of its answer, the way there considered
+DAMPING = 1e-3  # m/N: of a step, against directions in which all tendons pull against each other and the tip hardly moves
+STALLED = 0.9  # of the error: a step that leaves more has found the nearest point, if the one before did too
+
+
+@jit
+def move(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh):
+    """Advance the state (T, q, z, s) to tensions `goal` (n_tendon,) N in equal parts of at most `stride` N; 0 where lost."""
+    nt, longest = T.size, 0.0
+    start = T.copy()
+    for t in range(nt):
+        longest = max(longest, abs(goal[t] - T[t]))
+    parts = max(1, int(np.ceil(longest / stride)))
+    before, last = q.copy(), q.copy()
+    for k in range(1, parts + 1):
+        for t in range(nt):
+            T[t] = start[t] + (goal[t] - start[t]) * (k / parts)
+        assign(last, q)
+        if k > 1:
+            for i in range(q.size):
+                q[i] = 2.0 * q[i] - before[i]
+        assign(before, last)
+        if solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol) == 0:
+            return 0
+    return 1
+
+
+@jit
+def answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gradient):
+    """dx/dT (n_tendon, n_site, 3) m/N of the sites, each moved by the `below` (n_site,) first hinges, at an equilibrium.
+
+        LU (nv, nv) then holds the factors of its tangent.
+    dq/dT_t = -J^-1 dr/dT_t. False where the shape is unstable.
+    """
+    nt, nv = T.size, q.size
+    A, B = np.empty((nt, nv)), np.empty((nt, nv))
+    if not is_minimum(model, data, chain, rest, T, law, load, z, s, q, LU):
+        return False
+    pulls(chain, law, z, A, B)
+    for t in range(nt):
+        substitute(LU, B[t])
+        for k in range(site.size):
+            x = chain.site[site[k]]
+            for a in range(3):
+                gradient[t, k, a] = 0.0
+            for i in range(below[k]):
+                v = lever(chain.axis[i], x, chain.anchor[i])
+                for a in range(3):
+                    gradient[t, k, a] -= v[a] * B[t, i]
+    return True
+
+
+@jit
+def seek(model, data, chain, rest, law, load, target, used, limit, tol, near, T0, q0, z0, s0, T, q, z, s, LU):
+    """Tensions T of the tendons in `used` (n_tendon,), between 0 and `limit` N, whose tip comes nearest to `target` (3,) m when
+    pulled at once from the state (T0, q0, z0, s0); T and q hold a first guess. Returns the distance (m), negative where lost.
+
+    Bounded, damped Gauss-Newton, its steps halved while they lead away.
+    """
+    nt = T.size
+    gradient, error, fresh = np.empty((nt, 1, 3)), np.empty(3), np.zeros(1, np.bool_)
+    site, below = chain.disk[-1:], np.full(1, q.size)
+    best_T, best_q, dT = T.copy(), q.copy(), np.zeros(nt)
+    best, share, slow = 1e300, 1.0, 0
+    free = np.empty(nt, np.bool_)
+    for _ in range(TRIALS):
+        for t in range(nt):
+            assign(z[t], z0[t])
+            assign(s[t], s0[t])
+        found = solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol)
+        place(model, data, chain, q)
+        tip = chain.site[chain.disk[-1]]
+        size = 0.0
+        for a in range(3):
+            error[a] = target[a] - tip[a]
+            size += error[a] * error[a]
+        size = np.sqrt(size)
+        if found == 0 or size > best:
+            share *= 0.5
+            if share < 1e-3:
+                break
+            for t in range(nt):
+                T[t] = min(limit, max(0.0, best_T[t] + share * dT[t]))
+            assign(q, best_q)
+            fresh[0] = False
+            continue
+        slow = slow + 1 if size > STALLED * best else 0
+        best, share = size, 1.0
+        assign(best_T, T)
+        assign(best_q, q)
+        if size < near or slow > 1 or not answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gradient):
+            break
+        fresh[0] = True
+        for t in range(nt):
+            free[t] = used[t]
+        step(gradient[:, 0], error, T, limit, free, dT)
+        moved = 0.0
+        for t in range(nt):
+            new = min(limit, max(0.0, T[t] + dT[t]))
+            moved = max(moved, abs(new - T[t]))
+            T[t] = new
+        if moved < 1e-7:
+            break
+    assign(T, best_T)
+    assign(q, best_q)
+    return best if best < 1e299 else -1.0
+
+
+@jit
+def step(gradient, error, T, limit, free, dT):
+    """The Gauss-Newton step dT of the free tendons; one that would leave [0, limit] from its end of it is held there."""
+    nt = T.size
+    for _ in range(nt + 1):
+        A = np.zeros((nt, nt))
+        for i in range(nt):
+            dT[i] = 0.0
+            if not free[i]:
+                A[i, i] = 1.0
+                continue
+            for a in range(3):
+                dT[i] += gradient[i, a] * error[a]
+            A[i, i] = DAMPING**2
+            for j in range(nt):
+                if free[j]:
+                    for a in range(3):
+                        A[i, j] += gradient[i, a] * gradient[j, a]
+        dT[:] = np.linalg.solve(A, dT)
+        held = False
+        for i in range(nt):
+            if free[i] and ((T[i] <= 0.0 and dT[i] < 0.0) or (T[i] >= limit and dT[i] > 0.0)):
+                free[i] = False
+                held = True
+        if not held:
+            return
+
+
+@jit
+def refine(model, data, chain, rest, law, load, target, used, limit, tol, near, stride, T0, q0, z0, s0, T, q, z, s, LU):
+    """As `seek`, from its answer T, but moving as `move` does, in parts of `stride` N, whose friction is the one that counts.
+
+    Returns the distance (m), negative where lost.
+    """
+    nt = T.size
+    gradient, error, fresh = np.empty((nt, 1, 3)), np.empty(3), np.zeros(1, np.bool_)
+    site, below = chain.disk[-1:], np.full(1, q.size)
+    goal, dT, best_T, best = T.copy(), np.zeros(nt), T.copy(), 1e300
+    free = np.empty(nt, np.bool_)
+    for _ in range(CORRECTIONS):
+        assign(T, T0)
+        assign(q, q0)
+        for t in range(nt):
+            assign(z[t], z0[t])
+            assign(s[t], s0[t])
+        fresh[0] = False
+        if move(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh) == 0:
+            break
+        place(model, data, chain, q)
+        tip = chain.site[chain.disk[-1]]
+        size = 0.0
+        for a in range(3):
+            error[a] = target[a] - tip[a]
+            size += error[a] * error[a]
+        size = np.sqrt(size)
+        if size >= best:
+            break
+        best = size
+        assign(best_T, T)
+        if size < near or not answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gradient):
+            break
+        for t in range(nt):
+            free[t] = used[t]
+        step(gradient[:, 0], error, T, limit, free, dT)
+        for t in range(nt):
+            goal[t] = min(limit, max(0.0, T[t] + dT[t]))
+    assign(T, best_T)
+    return best if best < 1e299 else -1.0

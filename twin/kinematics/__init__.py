@@ -1,0 +1,11 @@
+"""Tensions to shape and back, with the friction a robot's tendons have met so far.
+
+robot.py       a twin under its loads: forward kinematics, step by step
+inverse.py     the tensions for a wanted tip, by sectors or in general
+tip_wrench.py  the reference of Peng et al.: a rod under a tip wrench
+"""
+
+from twin.kinematics.inverse import Reach, inverse
+from twin.kinematics.robot import LoadedRobot, Shape
+
+__all__ = ["LoadedRobot", "Reach", "Shape", "inverse"]
