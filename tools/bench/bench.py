@@ -17,6 +17,7 @@ from tools.bench.rod import Creep, Rod, follow
 
 RAMP = 2.0  # s
 NODES = 3  # Gauss nodes per interval: the tip is within 2e-3 mm of the converged one at the fullest loads
+COLD = 16  # steps in which gravity and payload come on where springs pull
 STRIDE = (0.25, 1e-3)  # N or m, largest step of the drive between two equilibria
 
 
@@ -29,6 +30,8 @@ class Log:
     markers: np.ndarray  # (n, N, 3) m
     displacement: np.ndarray  # (n, T) m, motor side
     ambient: np.ndarray  # (n,) degC
+    current: np.ndarray  # (n, T) A, where springs pull; else (0, T)
+    temperature: np.ndarray  # (n, T) degC, of springs; else (0, T)
 
 
 def run(rod: Rod, effects: Sequence[Effect], day: Day, progress: Callable[[int], None] = lambda done: None) -> list[Log]:
@@ -54,6 +57,8 @@ def run(rod: Rod, effects: Sequence[Effect], day: Day, progress: Callable[[int],
 
 
 def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial: Trial, creep: Creep | None) -> Log:
+    if day.by_current:
+        return _run_heated(situation, effects, day, trial)
     delivered = trial.command
     for effect in effects:
         delivered = effect.deliver(trial.fine, delivered)
@@ -109,7 +114,40 @@ def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial:
             tension = np.stack([np.interp(trial.time, trial.fine, column) for column in trial.command.T], axis=1)
     for effect in effects:
         tension = effect.read(clock, tension)
-    return Log(trial, tension, markers, displacement, ambient)
+    none = np.zeros((0, tension.shape[1]))
+    return Log(trial, tension, markers, displacement, ambient, none, none)
+
+
+def _run_heated(situation: Situation, effects: Sequence[Effect], day: Day, trial: Trial) -> Log:
+    """A trial in which currents, constant from row to row, heat springs; from cold springs and the unloaded straight robot."""
+    current = np.stack([np.interp(trial.time, trial.fine, column) for column in trial.command.T], axis=1)
+    lead = 2 * COLD - 1
+    clock = trial.start + trial.time
+    ambient = day.ambient(clock)
+    softness = np.ones(len(clock))
+    for effect in effects:
+        softness = softness * effect.soften(clock, ambient)
+    shape = follow(
+        situation.rod,
+        np.vstack([np.zeros((lead, current.shape[1])), current]),
+        gravity=situation.gravity,
+        payload=situation.payload,
+        weight=np.minimum(np.arange(1, len(clock) + lead + 1) / COLD, 1.0),
+        softness=np.append(np.full(lead, softness[0]), softness),
+        dt=np.append(np.zeros(lead + 1), np.diff(trial.time)),
+        mu=situation.mu,
+        stroke=situation.stroke,
+        fields=situation.fields,
+        springs=situation.springs,
+        ambient=np.append(np.full(lead, ambient[0]), ambient),
+        stretch=situation.stretch,
+        keep=np.arange(len(clock) + lead) >= lead,
+        nodes=NODES,
+    )
+    markers, tension = shape.markers, shape.tension[:, 0]
+    for effect in effects:
+        markers, tension = effect.observe(clock, ambient, markers), effect.read(clock, tension)
+    return Log(trial, tension, markers, shape.displacement, ambient, current, shape.temperature)
 
 
 def _milestones(time: np.ndarray, drive: np.ndarray, stride: float) -> np.ndarray:
@@ -124,6 +162,8 @@ def _milestones(time: np.ndarray, drive: np.ndarray, stride: float) -> np.ndarra
 
 def as_described(rod: Rod, logs: Sequence[Log], day: Day) -> list[Log]:
     """What the same built robot would log without any effect, driven by the logged inputs."""
-    inputs = [log.displacement if day.by_length else np.maximum(log.tension, 0.0) for log in logs]
+    inputs = [
+        log.current if day.by_current else log.displacement if day.by_length else np.maximum(log.tension, 0.0) for log in logs
+    ]
     trials = tuple(replace(log.trial, fine=log.trial.time, command=c) for log, c in zip(logs, inputs, strict=True))
     return run(rod, [], replace(day, trials=trials))

@@ -2,7 +2,8 @@
 
 The default holds what a diagnosis needs: slow and fast pulls in three directions with inner loops, pulls of two tendons,
 random combined pulls, steps of 0.45 s, holds of more than 60 s, payloads of 0, 10 and 20 g, a circle repeated four times
-through the day, all in random order. The poor designs each leave one of these out; by_length commands displacements.
+through the day, all in random order. The poor designs each leave one of these out; by_length commands displacements; by_current
+heats springs, each alone, in pairs and in turns, with pauses in which they cool.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from tools.bench.rod import Rod, follow
 
 POOR = ("no_repeats", "time_ordered", "loading_only", "one_payload", "one_rate", "one_tendon", "tip_only")
-DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR, "by_length")
+DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR, "by_length", "by_current")
 TENDONS = 3
 RATE = 50.0  # Hz of the fine command
 STEP = 0.45  # s, the fastest step
@@ -26,7 +27,7 @@ class Trial:
     payload: float  # kg, declared
     time: np.ndarray  # (n,) s, of the log's rows
     fine: np.ndarray  # (m,) s
-    command: np.ndarray  # (m, T) at the fine times, linear in between: base tension in N, or displacement in m
+    command: np.ndarray  # (m, T) at the fine times, linear in between: base tension in N, displacement in m, or current in A
     start: float = 0.0  # s on the common clock
     gravity: tuple[float, float, float] | None = None  # overrides the day's
 
@@ -38,6 +39,7 @@ class Day:
     room: np.ndarray  # (2, k): clock (s) and ambient temperature (degC), linear in between
     tip_only: bool = False
     by_length: bool = False  # the motors command tendon displacements
+    by_current: bool = False  # currents heat SMA springs
 
     def ambient(self, clock: np.ndarray) -> np.ndarray:
         return np.interp(clock, self.room[0], self.room[1])
@@ -111,6 +113,8 @@ def bench_day(design: str, rng: np.random.Generator) -> Day:
     sideways = tuple(float(g) for g in 9.81 * sign * np.eye(3)[axis])
     top = rng.uniform(3.0, 3.9)
     slow, fast = (60.0, 60.0) if design == "one_rate" else (80.0, 9.0)
+    if design == "by_current":
+        return _schedule(design, rng, *_heatings(rng), 3, (0.0, 0.0, 9.81) if hanging else sideways, sideways)
     trials = []
     for i in range(TENDONS):
         trials += [
@@ -132,6 +136,26 @@ def bench_day(design: str, rng: np.random.Generator) -> Day:
         trials += [_trial(rng, f"pull_{n}", 0.01 * (n % 3), *_pull(rng, [0], top, slow), True) for n in range(1, 18)]
         circle = replace(trials[0], name="repeat")
     return _schedule(design, rng, trials, circle, repeats, (0.0, 0.0, 9.81) if hanging else sideways, sideways)
+
+
+def _heatings(rng: np.random.Generator) -> tuple[list[Trial], Trial]:
+    """Trials of some two minutes in currents, and the one that is repeated."""
+
+    def trial(name: str, payload: float, level: np.ndarray, duration: float) -> Trial:
+        return _trial(rng, name, payload, *_plateaus(np.linspace(0.0, duration, len(level) + 1)[:-1], level, duration), False)
+
+    trials = []
+    for i in range(TENDONS):
+        alone, pair = np.zeros((6, TENDONS)), np.zeros((6, TENDONS))
+        alone[:, i] = rng.uniform(0.85, 1.1) * np.array([1.0, 0.6, 1.0, 0.0, 1.1, 0.0])
+        pair[[0, 1, 3], i] = rng.uniform(0.8, 1.1, 3)
+        pair[[1, 2, 4], (i + 1) % TENDONS] = rng.uniform(0.8, 1.1, 3)
+        trials += [trial(f"heat_{i + 1}", 0.0, alone, 120.0), trial(f"pair_{i + 1}", 0.01 * (i % 3), pair, 120.0)]
+    for n, payload in enumerate((0.0, 0.01, 0.02, 0.0, 0.01)):
+        level = rng.uniform(0.6, 1.2, (7, TENDONS)) * (rng.random((7, TENDONS)) < 0.5)
+        trials.append(trial(f"wander_{n + 1}", payload, level, 140.0))
+    turns = 1.0 * np.eye(TENDONS)[np.arange(6) % TENDONS]
+    return trials, trial("turns", 0.01, turns, 120.0)
 
 
 def _schedule(
@@ -166,7 +190,7 @@ def _schedule(
     room = np.stack([knots, 23.0 + rng.uniform(-2.0, 2.0) + rng.uniform(-4.0, 4.0, len(knots))])
     if design == "by_length":
         timed = [_in_displacements(t, gravity) for t in timed]
-    return Day(tuple(timed), gravity, room, design == "tip_only", design == "by_length")
+    return Day(tuple(timed), gravity, room, design == "tip_only", design == "by_length", design == "by_current")
 
 
 def _in_displacements(trial: Trial, gravity: tuple[float, float, float]) -> Trial:

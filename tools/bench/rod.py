@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tools.bench.frames import gauss_mesh
+from tools.bench.heated import Heat, march_heated
 from tools.bench.march import Creep, NoEquilibrium, Path, Record, march
+from tools.bench.springs import Springs
 from tools.bench.statics import Body, Load
 from tools.bench.tendons import IWAN_SPREAD, Friction
 
@@ -87,9 +89,10 @@ class Shape:
     tension: np.ndarray  # (m, N, T) N, of every segment, base to tip
     curvature: np.ndarray  # (m, N, G, 3) 1/m at the Gauss nodes
     moment: np.ndarray  # (m, N, G, 3) N m carried by the rod, base frame
+    temperature: np.ndarray  # (m, T) degC, of springs; (0, T) without
 
     def __getitem__(self, row: int | slice) -> Shape:
-        return Shape(**{name: value[row] for name, value in vars(self).items()})
+        return Shape(**{name: value[row] if len(value) else value for name, value in vars(self).items()})
 
 
 def straight_lengths(rod: Rod) -> np.ndarray:
@@ -101,7 +104,7 @@ def straight_lengths(rod: Rod) -> np.ndarray:
 
 def follow(
     rod: Rod,
-    drive: ArrayLike,  # (n, T) base tension in N; with by_length the tendon's free length minus its straight length, m
+    drive: ArrayLike,  # (n, T) base tension in N; by_length: the tendon's free length minus its straight length, m; springs: A
     *,
     gravity: ArrayLike = (0.0, 0.0, 9.81),
     payload: float = 0.0,
@@ -115,6 +118,8 @@ def follow(
     fields: np.ndarray = NO_FIELDS,
     share: ArrayLike | None = None,  # (N, T) tension of a segment over the base tension, on top of friction
     by_length: bool = False,
+    springs: Springs | None = None,  # that pull the tendons, heated by the drive's currents, each from its row to the next
+    ambient: ArrayLike = 23.0,  # (n,) degC, around them
     stretch: float = 0.0,  # m/N, elasticity of a tendon between motor and tip
     keep: ArrayLike | None = None,  # (n,) rows to return; all
     nodes: int = 4,  # Gauss nodes per interval; tip within 2e-4 mm with 4, 2e-3 mm with 3, at the fullest loads
@@ -146,11 +151,16 @@ def follow(
     )  # fmt: skip
     friction = Friction(float(mu), stroke * IWAN_SPREAD, np.zeros((N - 1, T, len(IWAN_SPREAD))), np.zeros((N - 1, T)))
     path = Path(drive, _series(weight, n, 1.0), _series(softness, n, 1.0), _series(dt, n, 0.0))
-    march(gauss_mesh(nodes), body, load, friction, creep, path, record)
+    temperature = np.zeros((0, T))
+    if springs is None:
+        march(gauss_mesh(nodes), body, load, friction, creep, path, record)
+    else:
+        heat = Heat(drive, _series(ambient, n, 23.0), path.weight, path.softness, path.dt)
+        temperature = march_heated(gauss_mesh(nodes), body, load, friction, springs, heat, record, float(stretch))
     disks, rotations = record.disk_r[:, 1:], record.disk_R[:, 1:]
     markers = disks + rod.marker_offset[:, None] * rotations[..., 2]
     slack = straight_lengths(rod) - record.length
-    return Shape(disks, rotations, markers, record.length, slack, record.tension, record.curvature, record.moment)
+    return Shape(disks, rotations, markers, record.length, slack, record.tension, record.curvature, record.moment, temperature)
 
 
 def _series(value: ArrayLike | None, n: int, default: float) -> np.ndarray:

@@ -15,6 +15,8 @@ class Noise:
     marker: float = 0.25e-3  # m per coordinate
     displacement: float = 0.02e-3  # m
     ambient: float = 0.1  # K
+    current: float = 3e-3  # A
+    spring: float = 0.5  # K, of a spring's temperature
     colour: float = 0.0  # of the markers
     tails: float = np.inf  # of the markers
     hidden: float = 0.005  # share of markers that are missing

@@ -49,7 +49,7 @@ def write_set(
             lines.append(f"noise = {sigma:.4g}")
 
     for i in range(tendons):
-        role = "output" if day.by_length else "input"
+        role = "output" if day.by_length or day.by_current else "input"
         channel(f"tendon_{i + 1}_tension", role, "N", None if exact_input else noise.load_cell)
     for k in shown:
         for axis in "xyz":
@@ -59,8 +59,13 @@ def write_set(
         for i in range(tendons):
             role = "input" if day.by_length else "output"
             channel(f"tendon_{i + 1}_displacement", role, "mm", 1e3 * noise.displacement)
-    if ambient:
+    if ambient or day.by_current:
         channel("ambient_temperature", "context", "degC", noise.ambient)
+    if day.by_current:
+        for i in range(tendons):
+            channel(f"sma_{i + 1}_current", "input", "A", noise.current)
+        for i in range(tendons):
+            channel(f"sma_{i + 1}_temperature", "output", "degC", noise.spring)
 
     for log in logs:
         file = f"{log.trial.name}.csv"
@@ -76,9 +81,13 @@ def write_set(
         if displacement:
             columns.append(1e3 * travel)
             formats += ["%.4f"] * tendons
-        if ambient:
+        if ambient or day.by_current:
             columns.append((log.ambient + noise.ambient * rng.normal(size=len(log.ambient)))[:, None])
             formats.append("%.2f")
+        if day.by_current:
+            columns.append(log.current + noise.current * rng.normal(size=log.current.shape))
+            columns.append(log.temperature + noise.spring * rng.normal(size=log.temperature.shape))
+            formats += ["%.4f"] * tendons + ["%.2f"] * tendons
         _write_csv(folder / file, np.hstack(columns), formats, [n[8:-1] for n in lines if n.startswith("name = ")])
     (folder / "measurements.toml").write_text("\n".join(lines) + "\n")
 

@@ -34,12 +34,16 @@ class Experiment:
 def menu(bench: Bench) -> list[tuple[str, Inputs]]:
     """Trials this robot could run, within the commands already used; payload up to three times as much, at most 30 g.
 
-    Where displacements are commanded, the tendons that do not pull are paid out, so that they are slack.
+    Where displacements are commanded, the tendons that do not pull are paid out, so that they are slack. Springs that currents heat
+    cool within a minute: what is fast to a motor they would not feel.
     """
     n = bench.n_tendon
     top = np.max([i.command.max(axis=0) for i in bench.inputs], axis=0)
     top = np.where(bench.by_length, np.max(top[bench.by_length], initial=0.0), np.max(top[~bench.by_length], initial=0.0))
-    words = [f"{1e3 * x:.1f} mm" if b else f"{x:.1f} N" for x, b in zip(top, bench.by_length, strict=True)]
+    words = [
+        f"{1e3 * x:.1f} mm" if length else f"{x:.1f} {'A' if current else 'N'}"
+        for x, length, current in zip(top, bench.by_length, bench.by_current, strict=True)
+    ]
     heaviest = max(i.loads.payload for i in bench.inputs)
     payloads = sorted({0.0, min(0.03, max(0.01, 3.0 * heaviest))})
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
@@ -53,9 +57,11 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
     hold = np.concatenate([[0.0], np.full(60, 0.75)])
     for i in range(n):
         alone = np.eye(n)[i]
-        add(f"pull tendon {i + 1} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
-        add(f"pull tendon {i + 1} to {words[i]} and release it, fast (4 s)", 4.0, *np.outer(alone, up_down))
-        add(f"step tendon {i + 1} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
+        what, fast = (f"spring {i + 1}", 40.0) if bench.by_current[i] else (f"tendon {i + 1}", 4.0)
+        pull = f"heat {what} with up" if bench.by_current[i] else f"pull {what}"
+        add(f"{pull} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
+        add(f"{pull} to {words[i]} and release it, fast ({fast:.0f} s)", fast, *np.outer(alone, up_down))
+        add(f"step {what} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
     turns = np.linspace(0, 4 * np.pi, 80)
     circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
     if not bench.by_length.any():

@@ -11,6 +11,7 @@ from twin.bench import Bench
 from twin.calibrate import Model, Objective, fit
 from twin.diagnose.diagnosis import Settings
 from twin.residual import Noise, Whitener, estimate_noise
+from twin.springs.heat import memory
 from twin.twin import Trace, Twin, readings, report, simulate
 
 ROUGHLY = {"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3}  # noise, SI, by group
@@ -36,14 +37,20 @@ def sensitivity(
 ) -> list[np.ndarray]:
     """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading.
 
-    None to a spring's current: its errors from row to row are averaged over the minute of heating, and leave a tenth of a marker's.
+    A spring averages the errors of its current over its time constant tau: of white ones from row to row, dt apart, it feels
+    sqrt(dt / (2 tau)) of a constant one.
     """
     out = [np.zeros((*y.shape, bench.n_tendon)) for y in predicted]
-    for t in np.flatnonzero(~bench.by_current):
+    felt = np.ones((len(out), bench.n_tendon))
+    if bench.by_current.any():
+        rows = np.array([[np.median(np.diff(bench.inputs[k].time))] for k in trials])
+        averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * memory(bench.robot.springs(bench.n_tendon)))))
+        felt = np.where(bench.by_current, averaged, felt)
+    for t in range(bench.n_tendon):
         step = 2.0 * bench.reading[t]
         push = step * np.eye(bench.n_tendon)[t]
         moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
         traces = simulate(twin, moved, trials=trials, near=near)
-        for G, y, trace in zip(out, predicted, traces, strict=True):
-            G[:, :, t] = (readings(bench, report(twin.effects, trace.true)) - y) / step
+        for G, y, trace, share in zip(out, predicted, traces, felt[:, t], strict=True):
+            G[:, :, t] = share * (readings(bench, report(twin.effects, trace.true)) - y) / step
     return out

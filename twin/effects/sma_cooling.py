@@ -12,7 +12,8 @@ from twin.springs import Spring
 
 
 class SmaCooling(Effect):
-    """Heat loss of spring i: h_i = factor share_i (h + forced) (1 + rate (T_a - 23 degC)), h the described one (W/K).
+    """Heat loss of spring i: h_i = factor s_i (h + forced) (1 + rate (T_a - 23 degC)), h the described one (W/K), s_i = share_i
+    over the shares' geometric mean.
 
     `factor` is what still or moving air does to all springs, `share` a draught on one side, `forced` a loss that depends on neither
     elongation nor heat, `rate` surroundings that carry off more when warm.
@@ -22,8 +23,8 @@ class SmaCooling(Effect):
 
     >>> from twin.robots import load
     >>> plain = load("continuum").springs(3)
-    >>> (1e3 * SmaCooling(factor=1.5, share_2=2.0).spring(plain).loss).round(3).tolist()
-    [2.226, 4.452, 2.226]
+    >>> (SmaCooling(factor=1.5, share_2=2.0).spring(plain).loss / plain.loss).round(3).tolist()
+    [1.191, 2.381, 1.191]
     """
 
     id = "sma_cooling"
@@ -45,10 +46,11 @@ class SmaCooling(Effect):
         for factor in (1.3, 0.75):
             yield Start({"factor": factor}, ("factor",))
         for i in np.flatnonzero(driven) + 1:
-            yield Start({f"share_{i}": 1.3}, (f"share_{i}",))
+            yield Start({"factor": 1.3 ** (1.0 / n_tendon), f"share_{i}": 1.3}, ("factor", f"share_{i}"))
 
     def spring(self, spring: Spring) -> Spring:
-        more = self["factor"] * self.each("share")
+        shares = self.each("share")
+        more = self["factor"] * shares / np.exp(np.mean(np.log(shares)))
         return spring._replace(
             loss=more * (spring.loss + self["forced"]),
             loss_warm=more * spring.loss_warm,

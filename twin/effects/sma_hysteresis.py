@@ -37,10 +37,11 @@ class SmaHysteresis(Effect):
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """A wider loop, a narrower one, and one moved; nowhere without springs."""
+        """A wider loop, a narrower one, and both moved; nowhere without springs."""
         if any(s.by_current.any() for s in predicted):
-            for values in ({"width": 4.0}, {"width": -4.0}, {"width": 1.0, "shift": 3.0}, {"width": 1.0, "shift": -3.0}):
-                yield Start(values, ("width", "shift"))
+            for width in (4.0, -4.0):
+                for shift in (1.0, -1.0):
+                    yield Start({"width": width, "shift": shift}, ("width", "shift"))
 
     def spring(self, spring: Spring) -> Spring:
         up, down = self["shift"] + 0.5 * self["width"], self["shift"] - 0.5 * self["width"]

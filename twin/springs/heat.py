@@ -16,8 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from twin.compiled import jit
+from twin.springs.spring import Spring
 
 LEAST_LOSS = 1e-5  # W/K: the fitted polynomial falls below zero some 200 K above ambient; hot springs there heat on, finitely
+WARM = 40.0  # K, half way to the end of the phase change
 REFERENCE = 296.15  # K, of the surroundings the loss is quoted in
 
 
@@ -28,6 +30,12 @@ def loss(spring, t, above, elongation, ambient):
     h = spring.loss[t] + above * (spring.loss_warm[t] + above * spring.loss_warm_2[t] + y * spring.loss_warm_open[t])
     h += y * (spring.loss_open[t] + y * spring.loss_open_2[t])
     return max(LEAST_LOSS, h * (1.0 + spring.loss_surroundings[t] * (ambient - REFERENCE)))
+
+
+def memory(spring: Spring) -> np.ndarray:
+    """Time (s) over which each spring averages its heat, WARM above the surroundings: capacity over loss."""
+    h = [loss(spring, t, WARM, float(spring.initial_elongation[t]), REFERENCE) for t in range(len(spring.capacity))]
+    return spring.capacity / np.array(h)
 
 
 @jit

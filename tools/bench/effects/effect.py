@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tools.bench.rod import NO_FIELDS, Rod
+from tools.bench.springs import Springs
 
 
 @dataclass
@@ -24,6 +25,7 @@ class Situation:
     fields: np.ndarray = field(default_factory=NO_FIELDS.copy)
     latency: float = 0.0  # s by which outputs are logged late
     stretch: float = 0.0  # m/N, felt where the motor drives by length
+    springs: Springs = field(default_factory=Springs)  # that pull where the day is driven by currents
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class Effect:
     seen_in: ClassVar[str] = "marker"  # the output whose change sets the amplitude: marker | displacement
     seen_by_length: ClassVar[str] = "marker"  # the same where the motors command displacements: marker | tension
     needs_ambient: ClassVar[bool] = False
+    by_current: ClassVar[bool] = False  # seen only where springs pull
     logs_command: ClassVar[bool] = False  # the input logged is the commanded tension, not the load cell
 
     @classmethod
