@@ -13,6 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.conftest import Day
+from tools.bench.effects import all_effects
 from tools.bench.effects.effect import Effect as Truth
 from twin.bench import prepare
 from twin.calibrate import Fit, fit
@@ -86,6 +87,11 @@ COMPARED: dict[str, Compare] = {
     "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
     "tendon_backlash": lambda t, v: (1e-4 * t.strength, v["gap"], OTHER),  # swaps sides by another law there
     "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
+    "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),
+    # Starts and finishes of the phases move by different amounts there: their means are what this law knows.
+    "sma_hysteresis": lambda t, v: (
+        2.1 * t.strength * np.array([1.0, -t.below]), [v["shift"] + 0.5 * v["width"], v["shift"] - 0.5 * v["width"]], SAME,
+    ),
     "contact": lambda t, v: (1.0, 1.0 if v["stiffness"] > 0 else 0.0, SAME),  # another obstacle there: that it is found counts
 }  # fmt: skip
 
@@ -96,7 +102,8 @@ def _differ(x: np.ndarray) -> np.ndarray:
 
 def fitted_alone(bench: Day, effect: str) -> tuple[Fit, Fit, Truth]:
     """Base and base + effect fitted to a day with that effect."""
-    recording, truth = bench(effect, STRENGTH.get(effect, 2.0))
+    design = "by_current" if all_effects()[effect].by_current else "hanging"
+    recording, truth = bench(effect, STRENGTH.get(effect, 2.0), design=design)
     assert truth is not None
     robot = load("continuum")
     prepared = prepare(recording, robot)

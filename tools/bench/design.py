@@ -147,14 +147,14 @@ def _heatings(rng: np.random.Generator) -> tuple[list[Trial], Trial]:
     trials = []
     for i in range(TENDONS):
         alone, pair = np.zeros((6, TENDONS)), np.zeros((6, TENDONS))
-        alone[:, i] = rng.uniform(0.85, 1.1) * np.array([1.0, 0.6, 1.0, 0.0, 1.1, 0.0])
-        pair[[0, 1, 3], i] = rng.uniform(0.8, 1.1, 3)
-        pair[[1, 2, 4], (i + 1) % TENDONS] = rng.uniform(0.8, 1.1, 3)
+        alone[:, i] = rng.uniform(1.1, 1.3) * np.array([1.0, 0.6, 1.0, 0.0, 1.05, 0.0])
+        pair[[0, 1, 3], i] = rng.uniform(0.9, 1.3, 3)
+        pair[[1, 2, 4], (i + 1) % TENDONS] = rng.uniform(0.9, 1.3, 3)
         trials += [trial(f"heat_{i + 1}", 0.0, alone, 120.0), trial(f"pair_{i + 1}", 0.01 * (i % 3), pair, 120.0)]
     for n, payload in enumerate((0.0, 0.01, 0.02, 0.0, 0.01)):
-        level = rng.uniform(0.6, 1.2, (7, TENDONS)) * (rng.random((7, TENDONS)) < 0.5)
+        level = rng.uniform(0.7, 1.4, (7, TENDONS)) * (rng.random((7, TENDONS)) < 0.5)
         trials.append(trial(f"wander_{n + 1}", payload, level, 140.0))
-    turns = 1.0 * np.eye(TENDONS)[np.arange(6) % TENDONS]
+    turns = 1.25 * np.eye(TENDONS)[np.arange(6) % TENDONS]
     return trials, trial("turns", 0.01, turns, 120.0)
 
 

@@ -29,8 +29,8 @@ class SmaHysteresis(Effect):
     parameters = (
         Parameter("width", 0.0, "K", -20.0, 40.0, "wires: 10-50 K between the branches; described: 25", scale=1.0),
         Parameter("shift", 0.0, "K", -25.0, 25.0, "10 K for 0.1 % of nickel", scale=1.0),
-        Parameter("spread", 1.0, "1", 0.3, 3.0, "of the flanks; textbook wires: 5-30 K against 14-17 K", scale=0.1, std=0.5),
-        Parameter("plateau", 1.0, "1", 0.5, 2.0, "with heat treatment: tens of per cent", scale=0.05, std=0.3),
+        Parameter("spread", 1.0, "1", 0.3, 3.0, "of the flanks; textbook wires: 5-30 K against 14-17 K", scale=0.1, std=0.3),
+        Parameter("plateau", 1.0, "1", 0.5, 2.0, "with heat treatment: per cents", scale=0.05, std=0.1),
     )
     richer = ("spread", "plateau")
     moves_with = "the direction of travel of the springs (hysteresis loop)"

@@ -1,0 +1,321 @@
+"""SMA springs: the laws alone against closed forms and thermodynamics; with the robot against solutions found another way."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+
+from tools.bench.rod import Rod, follow
+from tools.bench.springs import GF, Springs
+from twin.bench import prepare
+from twin.effects import Loads, Route, named
+from twin.equilibrium import Equilibrium, Heating
+from twin.errors import DataError
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import load
+from twin.springs import Spring, pull
+from twin.springs.heat import LEAST_LOSS, heated, loss
+from twin.twin import Twin, readings, report, simulate
+
+ROOM = 296.15  # K
+HANGING, SIDEWAYS = Loads(np.array([0.0, 0.0, 9.81]), 0.01), Loads(np.array([9.81, 0.0, 0.0]), 0.02)
+ALL = np.ones(3, bool)
+
+
+@cache
+def robot() -> Equilibrium:
+    return Equilibrium(load("continuum").build())
+
+
+def springs(n: int = 3) -> Spring:
+    return load("continuum").springs(n)
+
+
+def drive(time: np.ndarray, current: np.ndarray, loads: Loads, route: Route | None = None, spring: Spring | None = None):
+    path = robot().solve(time, current, loads, route, heating=Heating(ALL, np.full(len(time), ROOM), spring or springs()))
+    assert path.status.all()
+    assert path.started == 1
+    return path
+
+
+def turns(time: np.ndarray, hot: float = 1.25) -> np.ndarray:
+    """Currents (n, 3): each spring in turn for 20 s, then a rest."""
+    return hot * (np.minimum(time[:, None] // 20.0, 4.0) == np.arange(3))
+
+
+# ---- heat ----------------------------------------------------------------------------------------------------------------
+
+
+def test_the_heat_step_is_exact_where_the_loss_is_constant() -> None:
+    spring = springs(1)._replace(loss_warm=np.zeros(1), loss_warm_2=np.zeros(1), loss_warm_open=np.zeros(1))
+    h, c, R = loss(spring, 0, 0.0, 9e-3, ROOM), 0.1155, 0.45
+    for dt in (0.02, 1.0, 300.0):
+        found = heated(spring, 0, ROOM + 12.0, 9e-3, 0.9, ROOM, dt)
+        end = R * 0.9**2 / h
+        assert found - ROOM == pytest.approx(end + (12.0 - end) * np.exp(-h * dt / c), rel=1e-12)
+
+
+def test_first_law() -> None:
+    """c dT = (R I^2 - h (T - T_a)) dt over 60 s of heating and 60 s of cooling, each term summed by itself."""
+    spring, dt = springs(1), 0.02
+    time = np.arange(0.0, 120.0, dt)
+    current = np.where(time < 60.0, 1.0, 0.0)
+    elongation = 9e-3 - 3e-3 * np.sin(time / 20.0) ** 2
+    T, _ = pull(spring, time, current[None], elongation[None], ROOM)
+    lost = [loss(spring, 0, x - ROOM, e, ROOM) * (x - ROOM) for x, e in zip(T[0], elongation, strict=True)]
+    inflow = 0.45 * (current[:-1] ** 2).sum() * dt
+    outflow = float(np.sum(0.5 * (np.array(lost)[1:] + np.array(lost)[:-1])) * dt)
+    # The step holds h: of first order, 3e-4 of 27 J at 20 ms.
+    assert inflow - outflow == pytest.approx(0.1155 * (T[0, -1] - T[0, 0]), abs=3e-4 * inflow)
+
+
+def test_halving_the_step_halves_the_error_against_the_differential_equation() -> None:
+    spring = springs(1)
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        return (0.45 * 1.1**2 - loss(spring, 0, x[0] - ROOM, 9e-3, ROOM) * (x[0] - ROOM)) / np.array([0.1155])
+
+    exact = solve_ivp(rate, (0.0, 30.0), [ROOM], rtol=1e-10, atol=1e-10).y[0, -1]
+    error = []
+    for n in (30, 60, 120, 240):
+        time = np.linspace(0.0, 30.0, n + 1)
+        error.append(pull(spring, time, np.full((1, n + 1), 1.1), np.full((1, n + 1), 9e-3), ROOM)[0][0, -1] - exact)
+    ratio = np.array(error[:-1]) / np.array(error[1:])
+    np.testing.assert_allclose(ratio, 2.0, atol=0.1)
+    assert abs(error[-1]) < 0.5  # K at 0.125 s
+
+
+def test_it_heats_on_finitely_where_the_fitted_loss_is_negative() -> None:
+    time = np.arange(0.0, 400.0, 0.5)
+    T, s = pull(springs(1), time, np.full((1, len(time)), 3.0), np.full((1, len(time)), 9e-3), ROOM)
+    assert loss(springs(1), 0, 500.0, 9e-3, ROOM) == LEAST_LOSS
+    assert np.isfinite(T).all()
+    assert np.isfinite(s).all()
+
+
+# ---- force ---------------------------------------------------------------------------------------------------------------
+
+
+def along(temperature: np.ndarray, elongation: np.ndarray, spring: Spring | None = None) -> np.ndarray:
+    """Tension (n,) N at given temperatures (n,) K and elongations (n,) m: heat without inertia holds the spring there."""
+    spring = (spring or springs(1))._replace(capacity=np.array([1e-12]), loss=np.array([1.0]), resistance=np.array([1e-9]))
+    zero = {name: np.zeros(1) for name in ("loss_warm", "loss_warm_2", "loss_open", "loss_open_2", "loss_warm_open")}
+    spring = spring._replace(**zero)
+    n = len(temperature)
+    time = np.arange(n, dtype=float)
+    ambient = np.append(temperature[1:], temperature[-1])[None]  # the temperature a step ends at
+    ambient[0, 0] = temperature[1] if n > 1 else temperature[0]
+    return pull(spring, time, np.zeros((1, n)), elongation[None], ambient)[1][0]
+
+
+def by_the_source(temperature: np.ndarray, elongation: np.ndarray) -> np.ndarray:
+    """Tension (n,) N after the bench's own code of the law."""
+    now, out = Springs(), []
+    for T, e in zip(temperature, elongation, strict=True):
+        now = now.at(T - 273.15).rested(np.full(3, 1e3 * e))
+        out.append(GF * now.force[0])
+    return np.array(out)
+
+
+def test_it_is_the_sources_operator() -> None:
+    rng = np.random.default_rng(2)
+    T = np.repeat(rng.uniform(290.0, 400.0, 400), 3)
+    e = rng.uniform(-2e-3, 34e-3, 1200)
+    T[:2] = T[0]
+    np.testing.assert_allclose(along(T, e), by_the_source(T, e), rtol=0, atol=1e-9)  # N: rounding
+
+
+@pytest.mark.parametrize("celsius", [25.0, 75.0, 95.0, 130.0])
+def test_a_loop_of_elongation_takes_energy(celsius: float) -> None:
+    """Work on the spring over closed loops of elongation at one temperature, the second time round: lost, never gained."""
+    e = 1e-3 * (10.0 + 9.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 4001)))
+    s = along(np.full(len(e), 273.15 + celsius), e)[2000:]
+    work = float((0.5 * (s[1:] + s[:-1]) * np.diff(e[2000:])).sum())
+    assert work > 1e-3  # J, of some 20 mJ; a trapezoid's error at 2000 steps is 1e-7
+
+
+def test_a_loop_of_temperature_under_a_weight_lifts_late() -> None:
+    """Heating and cooling at a held length: the tension follows later both ways, so the loop runs clockwise and closes."""
+    T = 273.15 + 75.0 + 40.0 * np.sin(np.linspace(0.0, 6.0 * np.pi, 6001))
+    s = along(T, np.full(len(T), 9e-3))
+    np.testing.assert_allclose(s[4001:], s[2001:-2000], rtol=0, atol=1e-12)
+    T, s = T[2001:4002], s[2001:4002]
+    assert float((0.5 * (s[1:] + s[:-1]) * np.diff(T)).sum()) < -5.0  # N K: some 25 K wide and 2 N high
+
+
+def test_minor_loops_stay_inside_the_major_one() -> None:
+    cold_to_hot = 273.15 + np.concatenate([np.linspace(20.0, 140.0, 2001), np.linspace(140.0, 20.0, 2001)])
+    major = along(np.concatenate([cold_to_hot, cold_to_hot]), np.full(8004, 9e-3))[4002:]
+    up, down = major[:2001], major[2001:][::-1]
+    grid = cold_to_hot[:2001]
+    inner = 273.15 + 80.0 + 30.0 * np.cos(np.linspace(0.0, 60.0, 5000)) * np.linspace(1.0, 0.1, 5000)
+    s = along(np.concatenate([cold_to_hot, inner]), np.full(4002 + 5000, 9e-3))[4002:]
+    rounding = 0.104 * 0.06  # N: the grid is 0.06 K wide, and a branch climbs by 10.6 gf/K at most
+    assert (s > np.interp(inner, grid, up) - rounding).all()
+    assert (s < np.interp(inner, grid, down) + rounding).all()
+    assert ((s > np.interp(inner, grid, up) + 0.1) & (s < np.interp(inner, grid, down) - 0.1)).any()
+
+
+def test_a_batch_is_its_springs_one_by_one() -> None:
+    rng = np.random.default_rng(0)
+    time, current, e = np.arange(0.0, 50.0, 0.5), rng.uniform(0.0, 1.3, (5, 100)), rng.uniform(0.0, 12e-3, (5, 100))
+    T, s = pull(springs(5), time, current, e, ROOM)
+    for k in range(5):
+        alone = pull(springs(1), time, current[k : k + 1], e[k : k + 1], ROOM)
+        assert np.array_equal(alone[0][0], T[k])
+        assert np.array_equal(alone[1][0], s[k])
+
+
+# ---- with the robot ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("loads", [HANGING, SIDEWAYS], ids=["hanging", "sideways"])
+def test_body_and_springs_meet_where_another_solver_finds_them(loads: Loads) -> None:
+    """Tensions that are the law's at the body's lengths under them: found by scipy's root, sample by sample, from the drive by
+    tension and the bench's law."""
+    time = np.arange(0.0, 100.0, 4.0)
+    found = drive(time, turns(time), loads)
+    straight = robot().straight_path
+    weight = np.arange(1, 9) / 8.0  # gravity and payload come on in steps, as in `twin.equilibrium.trial`
+    now = Springs().at(ROOM - 273.15)
+    for i in range(-len(weight), len(time)):
+        part = Loads(loads.gravity * (weight[i] if i < 0 else 1.0), loads.payload)
+        if i > 0:
+            now = now.stepped(turns(time)[i - 1], ROOM - 273.15, 4.0)
+
+        def elongation(T: np.ndarray, part: Loads = part) -> np.ndarray:
+            return 9.0 + 1e3 * (robot().solve(np.zeros(1), np.maximum(T, 0.0)[None], part).path[0] - straight)
+
+        def lacks(T: np.ndarray, now: Springs = now, elongation=elongation) -> np.ndarray:
+            return np.maximum(0.0, GF * now.pull(elongation(T))) - T
+
+        start = GF * now.force if i < 0 else found.tension[i] + 1e-3
+        T = root(lacks, start, method="hybr", options={"xtol": 1e-10, "eps": 1e-6}).x
+        assert np.abs(lacks(T)).max() < 2e-5
+        now = now.rested(elongation(T))
+        if i >= 0:
+            # 1e-4 N: lengths are closed to 2e-8 m in either solver, 16 uN at the springs' 785 N/m, and add up over the samples
+            np.testing.assert_allclose(found.tension[i], T, rtol=0, atol=1e-4)
+            np.testing.assert_allclose(found.temperature[i] - 273.15, now.temperature, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1])
+def test_it_is_the_rod_with_springs(mu: float) -> None:
+    """The bench's rod and springs share no code with the twin's; its friction slides from the first 1e-6 m."""
+    time = np.arange(0.0, 100.0, 0.5)
+    found = drive(time, turns(time), SIDEWAYS, Route(mu, 2e-5))
+    lead = 15
+    truth = follow(
+        Rod(), np.vstack([np.zeros((lead, 3)), turns(time)]), gravity=SIDEWAYS.gravity, payload=SIDEWAYS.payload, mu=mu,
+        stroke=2e-5, weight=np.minimum(np.arange(1, len(time) + lead + 1) / 8.0, 1.0),
+        dt=np.append(np.zeros(lead + 1), np.diff(time)),
+        springs=Springs(), ambient=ROOM - 273.15, keep=np.arange(len(time) + lead) >= lead,
+    )  # fmt: skip
+    assert np.ptp(truth.markers[:, -1], axis=0).max() > 5e-3  # m: they do move it
+    error = np.linalg.norm(found.markers[:, :8] - truth.markers, axis=2)
+    # 0.01 mm is what the description is good for; pre-sliding is another law there, for which 0.05 mm
+    assert np.sqrt(np.mean(error**2)) < (1e-5 if mu == 0.0 else 5e-5)
+    np.testing.assert_allclose(found.temperature - 273.15, truth.temperature, rtol=0, atol=2e-3 if mu == 0.0 else 0.05)
+
+
+def test_steps_of_20_ms_are_stable_and_converge() -> None:
+    end = []
+    for dt in (0.02, 0.25, 0.5, 1.0):
+        time = np.arange(0.0, 60.0 + dt / 2, dt)
+        path = drive(time, turns(time), HANGING)
+        assert np.abs(np.diff(path.markers[:, -1], axis=0)).max() < 3e-3 * max(dt, 0.05) / 0.25  # m: it does not jump
+        end.append(path.temperature[-1])
+    error = [float(np.abs(T - end[0]).max()) for T in end[1:]]
+    assert error[0] < 0.6 * error[1] < 0.36 * error[2]
+    assert error[0] < 0.5  # K at 0.25 s
+
+
+def test_random_currents_always_find_their_equilibrium() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(12):
+        dt = rng.choice([0.02, 0.5, 2.0])
+        time = np.arange(0.0, 100.0, dt)
+        level = rng.uniform(0.0, 1.6, (8, 3)) * (rng.random((8, 3)) < 0.5)
+        loads = Loads(9.81 * np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0]), 0.01)
+        path = drive(time, level[(8 * np.arange(len(time))) // len(time)], loads, Route(rng.choice([0.0, 0.15]), 4e-4, 5e-5))
+        assert path.tension.min() >= 0.0
+
+
+# ---- from a recording ----------------------------------------------------------------------------------------------------
+
+OUTPUTS = ("disk_8_x", "disk_8_y", "disk_8_z", "tendon_1_tension", "tendon_1_displacement")
+
+
+def recording(drives: dict[str, np.ndarray], time: np.ndarray, extra: tuple[str, ...] = ("sma_1_temperature", "sma_1_resistance")):
+    units = {"current": "A", "voltage": "V", "tension": "N", "displacement": "mm", "temperature": "degC", "resistance": "ohm"}
+    channels = [Channel(name, "input", units[name.rpartition("_")[2]]) for name in drives]
+    said = [name for name in (*OUTPUTS, *extra) if name not in drives]
+    channels += [Channel(name, "output", units.get(name.rpartition("_")[2], "mm")) for name in said]
+    values = {**{name: np.zeros(len(time)) for name in (*OUTPUTS, *extra)}, **drives}
+    trial = Trial("one.csv", time, values, {"tip_payload": 0.01, "ambient_temperature": ROOM})
+    return Recording("continuum", "springs", "simulation: by hand", np.array([9.81, 0.0, 0.0]), tuple(channels), (trial,))
+
+
+def test_currents_and_voltages_drive_the_same() -> None:
+    time = np.arange(0.0, 60.0, 0.5)
+    I = turns(time)
+    twin = Twin.of("continuum")
+    amperes = twin.predict(recording({f"sma_{i + 1}_current": I[:, i] for i in range(3)}, time)).trials[0].values
+    volts = twin.predict(recording({f"sma_{i + 1}_voltage": 0.45 * I[:, i] for i in range(3)}, time)).trials[0].values
+    for name in (*OUTPUTS, "sma_1_temperature"):
+        np.testing.assert_allclose(volts[name], amperes[name], rtol=1e-9, atol=1e-9)
+    assert amperes["sma_1_temperature"].max() > 350.0
+    assert (amperes["sma_1_resistance"] == 0.45).all()
+
+
+def test_a_spring_beside_two_given_tensions() -> None:
+    """One spring and two tensions: the spring's tension, given as a tension too, holds the same shape."""
+    time = np.arange(0.0, 60.0, 0.5)
+    pulled = {f"tendon_{i}_tension": np.full(len(time), 0.5) for i in (2, 3)}
+    twin = Twin.of("continuum")
+    mixed = twin.predict(recording({"sma_1_current": turns(time)[:, 0], **pulled}, time)).trials[0].values
+    drives = {"tendon_1_tension": mixed["tendon_1_tension"], **pulled}
+    again = twin.predict(recording(drives, time, ()), dynamic=False).trials[0].values
+    assert np.ptp(mixed["tendon_1_tension"]) > 0.3
+    for name in OUTPUTS[:3]:
+        np.testing.assert_allclose(again[name], mixed[name], rtol=0, atol=3e-7)  # m: two solutions of one shape, as in test_lengths
+
+
+def test_a_spring_that_is_not_driven_tells_nothing() -> None:
+    time = np.arange(0.0, 5.0)
+    bench = prepare(recording({f"tendon_{i}_tension": np.zeros(5) for i in (1, 2, 3)}, time), load("continuum"))
+    assert {o.group for o in bench.outputs} == {"marker", "displacement"}
+    assert any("sma_1_temperature is not predicted" in notice for notice in bench.notices)
+    predicted = [t.true for t in simulate(Twin.of("continuum"), bench)]
+    assert not list(named("sma_cooling").starts(predicted, 3))
+    assert not list(named("sma_hysteresis").starts(predicted, 3))
+
+
+def test_a_robot_without_springs_says_so() -> None:
+    time = np.arange(0.0, 5.0)
+    bare = load("continuum")
+    bare = type(bare)(**{**vars(bare), "parameters": tuple(p for p in bare.parameters if not p.name.startswith("springs."))})
+    with pytest.raises(DataError, match=r"no SMA springs.*displacements"):
+        prepare(recording({f"sma_{i}_current": np.zeros(5) for i in (1, 2, 3)}, time), bare)
+
+
+def test_a_draught_and_a_wider_loop_do_what_they_say() -> None:
+    time = np.arange(0.0, 60.0, 0.5)
+    bench = prepare(recording({f"sma_{i + 1}_current": turns(time)[:, i] for i in range(3)}, time), load("continuum"))
+
+    def predicted(*effects):
+        twin = Twin(bench.robot, {}, effects)
+        return readings(bench, report(effects, simulate(twin, bench)[0].true))
+
+    names = [o.channel.name for o in bench.outputs]
+    T, pulls = names.index("sma_1_temperature"), names.index("tendon_1_tension")
+    plain = predicted()
+    windy = predicted(named("sma_cooling")(factor=1.5))
+    assert (windy[1:, T] < plain[1:, T]).all()
+    late = predicted(named("sma_hysteresis")(shift=5.0, width=0.0))
+    np.testing.assert_allclose(late[:, T], plain[:, T], atol=3.0)  # K: it cools a little otherwise at another elongation
+    assert late[:40, pulls].max() < plain[:40, pulls].max() - 0.1  # N: it needs more heat
