@@ -8,6 +8,8 @@ hinges and wall, implicitly, so that none of them bounds the step; it damps: 2 %
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 
@@ -62,13 +64,13 @@ def step_through(
             route_tension(chain, T, law, z, s, ctrl, motor)
             if taken % REFRESH == 0:
                 pressure = T.sum()
-                springs(chain.qpos, spring, K, chain.slender, pressure, chain.partner, chain.coupling, chain.hand, r, none)
+                springs(chain.qpos, spring, chain, pressure, r, none)
                 for k in range(nv):
                     p = chain.partner[k]
                     native = K[k] * (chain.qpos[k] - spring[k]) + chain.coupling[k] * (
                         chain.qpos[k] - chain.qpos[p] - fixed[k] + fixed[p]
                     )
-                    applied[k] = native - r[k] + dot(force, lever(chain.axis[k], chain.site[tip], chain.anchor[k]))
+                    applied[k] = native - r[k] + dot(force, lever(chain, k, chain.site[tip]))
             taken += 1
             mj_step(model, data)
             now += step
@@ -76,14 +78,14 @@ def step_through(
         place(model, data, chain, q + (time[i] - now) * velocity)
         for k in range(chain.marker.size):
             marker[i, k] = chain.site[chain.marker[k]]
-        bowing = springs(chain.qpos, spring, K, chain.slender, tension[i].sum(), chain.partner, chain.coupling, chain.hand, r, none)
+        bowing = springs(chain.qpos, spring, chain, tension[i].sum(), r, none)
         for t in range(T.size):
             lay(chain, t, u, length, theta, distal)
             path[i, t] = distal[0] + bowing
         q_out[i] = chain.qpos
         place(model, data, chain, q)
         if amplitude.size and i > 0:
-            bendings(q, chain.hand, r, D)
+            bendings(q, chain, r, D)
             for k in range(nv):
                 r[k] -= spring[k]
             advance_creep(delayed, r, amplitude, retardation, time[i] - time[i - 1])
@@ -140,7 +142,7 @@ def _loaded(body: Body, loads: Loads, scale: float) -> Body:
     spec = body.spec.copy()
     for joint in spec.joints:
         joint.stiffness = scale * joint.stiffness
-    for one, other in hinge_pairs(body):
+    for one, other in hinge_pairs(body) if body.bows else ():
         stiffness = 0.5 * COUPLING * (spec.joint(one).stiffness[0] + spec.joint(other).stiffness[0])
         spring = spec.add_tendon(name=f"{one}-{other}")
         spring.stiffness = [stiffness, 0, 0]
@@ -158,4 +160,4 @@ def _loaded(body: Body, loads: Loads, scale: float) -> Body:
         site = spec.site(body.tip)
         mass = site.parent.add_body(name="payload", pos=site.pos, mass=loads.payload, inertia=[1e-9, 1e-9, 1e-9])
         mass.ipos, mass.explicitinertial = [0, 0, 0], True
-    return Body(spec, body.joints, body.tendons, body.markers, body.disks, body.tip, body.length)
+    return replace(body, spec=spec)

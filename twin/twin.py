@@ -15,7 +15,7 @@ from twin.equilibrium import TOLERANCE, Equilibrium, Heating, Path
 from twin.errors import SolveError
 from twin.measurements import Recording
 from twin.quantities import Values
-from twin.robots import Robot, load
+from twin.robots import Frame, Robot, load
 
 
 @dataclass(frozen=True)
@@ -115,13 +115,13 @@ def simulate(
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
         close = near[position].path if near is not None and len(near) == len(run) else None
-        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep, tolerance, once)
+        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep, tolerance, once, body.frame)
     return [traces[k] for k in (run if keep else wanted)]
 
 
 def _trial(
     twin: Twin, solver: Equilibrium | Dynamics, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray, near: Path | None,
-    keep: bool, tolerance: float, once: bool,
+    keep: bool, tolerance: float, once: bool, frame: Frame,
 ) -> Trace:  # fmt: skip
     n, by_length, by_current = len(inputs.time), inputs.by_length, np.broadcast_to(inputs.by_current, inputs.by_length.shape)
     driving = Signals(
@@ -158,9 +158,10 @@ def _trial(
             f"{loads.payload * 1e3:.3g} g); check the loads' units and directions{hint}"
         )
     shortening = solver.straight_path - path.path + route.stretch * path.tension
+    travel = np.where(by_length, driving.displacement, shortening)
     true = Signals(
-        inputs.time, inputs.clock, path.tension, np.where(by_length, driving.displacement, shortening), path.markers,
-        inputs.temperature, by_length, by_current, driving.current, path.temperature,
+        inputs.time, inputs.clock, path.tension, travel, frame.reported(path.markers), inputs.temperature,
+        by_length, by_current, driving.current, path.temperature,
     )  # fmt: skip
     return Trace(true, path)
 
@@ -211,6 +212,7 @@ def first_mode(robot: Robot) -> float:
     """
     body = robot.build()
     model = body.spec.compile()
-    stiffness = float(model.jnt_stiffness.reshape(model.nv, -1)[0, 0]) * body.joints[0].length
+    first = body.joints[0]
+    stiffness = float(model.jnt_stiffness.reshape(model.nv, -1)[model.joint(first.bend_x).id, 0]) * first.length
     per_length = float(model.body_mass.sum()) / body.length
     return 1.875**2 / (2 * math.pi * body.length**2) * math.sqrt(stiffness / per_length)

@@ -21,7 +21,7 @@ def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings
     """A first calibration under a guessed noise, and the objective every later fit uses."""
     measured = [bench.measured[k] for k in fitted]
     command = [bench.inputs[k].command for k in fitted]
-    rough = np.array([ROUGHLY[o.group] for o in bench.outputs])
+    rough = np.array([o.channel.noise or ROUGHLY[o.group] for o in bench.outputs])
     first = Noise(rough, np.zeros(bench.n_tendon), np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
     rough_fit = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)

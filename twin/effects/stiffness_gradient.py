@@ -7,7 +7,7 @@ from twin.quantities import Parameter
 
 
 class StiffnessGradient(Effect):
-    """EI(s) = EI (1 + gradient (s/L - 1/2)), and GJ alike; s is the distance from the base.
+    """EI(s) = EI (1 + gradient (s/L - 1/2)), and GJ (and EA, where it stretches) alike; s is the distance from the base.
 
     Source: first-order Taylor expansion of EI(s) about the middle. A ground or tempered wire; a casting that cured from one end.
 
@@ -23,7 +23,7 @@ class StiffnessGradient(Effect):
     def edit(self, body) -> None:
         for at in body.joints:
             factor = 1.0 + self["gradient"] * (at.arclength - 0.5)
-            for name in (at.bend_x, at.bend_y, at.twist):
+            for name in (at.bend_x, at.bend_y, at.twist, *((at.slide,) if at.slide else ())):
                 joint = body.spec.joint(name)
                 joint.stiffness = joint.stiffness * factor
                 joint.damping = joint.damping * factor

@@ -3,7 +3,7 @@
 engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic energy
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
-move.py     from one equilibrium to another
+move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
 trial.py    a trial, sample by sample
 """
 
@@ -69,17 +69,21 @@ class Equilibrium:
         self.model = model = body.spec.compile()
         self.data = data = mujoco.MjData(model)
         site = np.vectorize(lambda name: model.site(name).id, otypes=[np.int64])
-        hole = site(np.array(body.tendons))
+        hole, disk = site(np.array(body.tendons)), site(np.array(body.disks))
         stiffness = model.jnt_stiffness.reshape(model.nv, -1)[:, 0].copy()
-        partner = np.empty(model.nv, np.int64)
-        for one, other in hinge_pairs(body):
-            a, b = model.joint(one).dofadr[0], model.joint(other).dofadr[0]
+        dof = {model.joint(i).name: model.joint(i).dofadr[0] for i in range(model.njnt)}
+        partner, coupling, slender = np.arange(model.nv), np.zeros(model.nv), np.zeros(model.nv)
+        unit, hinge, twists = np.ones(model.nv), np.ones(model.nv), np.zeros(model.nv, bool)
+        for one, other in hinge_pairs(body) if body.bows else ():
+            a, b = dof[one], dof[other]
             partner[a], partner[b] = b, a
-        slender = np.zeros(model.nv)
+            coupling[[a, b]] = COUPLING * 0.5 * (stiffness[a] + stiffness[b])
         for at in body.joints:
-            for hinge in (at.bend_x, at.bend_y):
-                i = model.joint(hinge).dofadr[0]
-                slender[i] = 4.0 * at.length / stiffness[i]
+            twists[dof[at.twist]] = True
+            if at.slide is not None:
+                unit[dof[at.slide]], hinge[dof[at.slide]] = at.length, 0.0
+            for bend in (at.bend_x, at.bend_y) if body.bows else ():
+                slender[dof[bend]] = 4.0 * at.length / stiffness[dof[bend]]
         hinges = np.zeros(model.nbody, np.int64)  # from the base up to and with each body
         for b in range(1, model.nbody):
             hinges[b] = hinges[model.body_parentid[b]] + model.body_dofnum[b]
@@ -91,16 +95,21 @@ class Equilibrium:
             site=data.site_xpos,
             qpos=data.qpos,
             stiffness=stiffness,
+            unit=unit,
+            hinge=hinge,
+            twists=twists,
             slender=slender,
             partner=partner,
-            coupling=COUPLING * 0.5 * (stiffness + stiffness[partner]),
-            hand=np.linalg.det(model.jnt_axis.reshape(-1, 3, 3)),
+            coupling=coupling,
+            bends=np.array([min(dof[at.bend_x], dof[at.bend_y]) for at in body.joints], np.int64),
+            slide=np.array([dof[at.slide] for at in body.joints if at.slide is not None], np.int64),
+            hand=np.linalg.det(model.jnt_axis[hinge > 0.0].reshape(-1, 3, 3)),
             body=moved_by,
             mass=model.body_subtreemass[moved_by].copy(),
             hole=hole,
-            disk=site(np.array(body.disks)),
+            disk=disk,
             marker=site(np.array(list(body.markers.values()))),
-            first=hinges[model.site_bodyid[hole[0]]],
+            first=np.concatenate([[0], hinges[model.site_bodyid[disk]]]),
         )
         self.spring = model.qpos_spring.copy()
         mujoco.mj_kinematics(model, data)
@@ -149,8 +158,8 @@ class Equilibrium:
             temperature=np.empty((n, nt)),
             status=np.empty(n, np.int64),
             started=0,
-            slip=np.zeros((nt, self.chain.disk.size)),
-            distal=np.zeros((nt, self.chain.disk.size)),
+            slip=np.zeros((nt, self.chain.hole.shape[1] - 1)),
+            distal=np.zeros((nt, self.chain.hole.shape[1] - 1)),
             LU=np.empty((n, nv, nv) if keep else (0, nv, nv)),
         )
         started = run(

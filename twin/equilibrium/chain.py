@@ -1,4 +1,4 @@
-"""The balance of forces of a hinge chain pulled by tendons, and its exact tangent.
+"""The balance of forces of a chain of hinges (and slides) pulled by tendons, and its exact tangent.
 
 Energy of the chain without friction, with elastic energy E_el (elastic.py), tendon segments l_d under tension T_d,
 masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
@@ -8,7 +8,8 @@ masses m at x, a dead force F at the tip, and disks at a distance `gap` from a w
 `balance` returns r = dE/dq with T_d the tensions that friction leaves, and J = dr/dq. A segment's length depends only on
 the hinges of its own disk interval, so its geometric stiffness is a small block; gravity's Hessian follows from one vector a
 hinge, n_i = a_i x M_i (C_i - p_i) (M_i, C_i mass and centre of everything distal of hinge i at p_i with axis a_i), since turning
-hinge j <= i turns n_i with it; friction adds an unsymmetric rank-one block a segment.
+hinge j <= i turns n_i with it (a slide moves along its a_i and turns nothing); friction adds an unsymmetric rank-one block a
+segment.
 """
 
 from __future__ import annotations
@@ -25,22 +26,27 @@ from twin.equilibrium.elastic import springs
 class Chain(NamedTuple):
     """The compiled model as the solver sees it; the first five are views of MuJoCo's arrays and move with it."""
 
-    anchor: np.ndarray  # (nv, 3) hinge positions, m
-    axis: np.ndarray  # (nv, 3) hinge axes
+    anchor: np.ndarray  # (nv, 3) joint positions, m
+    axis: np.ndarray  # (nv, 3) joint axes
     centre: np.ndarray  # (nbody, 3) centre of mass of each subtree, m
     site: np.ndarray  # (nsite, 3) m
-    qpos: np.ndarray  # (nv,) rad
-    stiffness: np.ndarray  # (nv,) N m/rad
+    qpos: np.ndarray  # (nv,) rad; m of slides
+    stiffness: np.ndarray  # (nv,) N m/rad; N/m
+    unit: np.ndarray  # (nv,) what counts as one: 1 rad; the length of body a slide stretches, m
+    hinge: np.ndarray  # (nv,) 1 for a hinge, 0 for a slide
+    twists: np.ndarray  # (nv,) whether a hinge twists
     slender: np.ndarray  # (nv,) h^2 / EI of the disk interval, 1/N; 0 for twist
     partner: np.ndarray  # (nv,) the hinge about the same axis in the other set of the disk interval
     coupling: np.ndarray  # (nv,) N m/rad
+    bends: np.ndarray  # (n_set,) first of the three hinges of each set
+    slide: np.ndarray  # (n_set,) slide of each set, or empty
     hand: np.ndarray  # (n_set,) 1 where a set's hinges are right-handed, else -1
-    body: np.ndarray  # (nv,) the body each hinge moves
-    mass: np.ndarray  # (nv,) of everything distal of the hinge, kg
-    hole: np.ndarray  # (n_tendon, n_disk + 1) sites
+    body: np.ndarray  # (nv,) the body each joint moves
+    mass: np.ndarray  # (nv,) of everything distal of the joint, kg
+    hole: np.ndarray  # (n_tendon, n_hole) sites, base to where the tendons end
     disk: np.ndarray  # (n_disk,) sites
     marker: np.ndarray  # (n_marker,) sites
-    first: np.ndarray  # (n_disk + 1,) first hinge of each disk interval
+    first: np.ndarray  # (n_disk + 1,) first joint of each disk interval
 
 
 class Law(NamedTuple):
@@ -58,9 +64,20 @@ class Load(NamedTuple):
 
 
 @jit
-def lever(axis, point, anchor):
-    """Velocity of `point` for unit speed of a hinge at `anchor`."""
-    return cross(axis, (point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2]))
+def lever(chain, i, point):
+    """Velocity of `point`, distal of joint i, for unit speed of that joint."""
+    axis, anchor, h = chain.axis[i], chain.anchor[i], chain.hinge[i]
+    c = cross(axis, (point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2]))
+    s = 1.0 - h  # no branch: it would keep the loops over joints from being vectorised
+    return h * c[0] + s * axis[0], h * c[1] + s * axis[1], h * c[2] + s * axis[2]
+
+
+@jit
+def turned(chain, i, v):
+    """Velocity of a vector v that is fixed distal of joint i, for unit speed of that joint: a slide turns nothing."""
+    c = cross(chain.axis[i], v)
+    h = chain.hinge[i]
+    return h * c[0], h * c[1], h * c[2]
 
 
 @jit
@@ -77,13 +94,18 @@ def _add_weight(chain, load, r, J):
             m * (c[1] - p[1]) + load.payload * b[1],
             m * (c[2] - p[2]) + load.payload * b[2],
         )
-        put(n[i], cross(chain.axis[i], m_lever))
-        put(f[i], cross(chain.axis[i], b))
+        if chain.hinge[i] == 0.0:
+            a, m = chain.axis[i], m + load.payload
+            put(n[i], (m * a[0], m * a[1], m * a[2]))
+            put(f[i], a)
+        else:
+            put(n[i], cross(chain.axis[i], m_lever))
+            put(f[i], cross(chain.axis[i], b))
         r[i] -= dot(g, n[i]) + dot(load.force, f[i])
     if J.size:
         for j in range(nv):
-            b = cross(chain.axis[j], g)
-            c = cross(chain.axis[j], load.force)
+            b = turned(chain, j, g)
+            c = turned(chain, j, load.force)
             for i in range(j, nv):
                 h = b[0] * n[i, 0] + b[1] * n[i, 1] + b[2] * n[i, 2] + c[0] * f[i, 0] + c[1] * f[i, 1] + c[2] * f[i, 2]
                 J[i, j] += h
@@ -104,11 +126,11 @@ def wall_force(chain, wall, r, J):
         n = chain.first[k + 1]
         X = np.empty((n, 3))
         for i in range(n):
-            put(X[i], lever(chain.axis[i], x, chain.anchor[i]))
+            put(X[i], lever(chain, i, x))
             r[i] -= f * dot(normal, X[i])
         if J.size:
             for j in range(n):
-                b = cross(chain.axis[j], normal)  # normal . (a_j x X_i) = -(a_j x normal) . X_i
+                b = turned(chain, j, normal)  # normal . (a_j x X_i) = -(a_j x normal) . X_i
                 for i in range(j, n):
                     h = f * dot(b, X[i]) + stiffness * dot(normal, X[i]) * dot(normal, X[j])
                     J[i, j] += h
@@ -159,7 +181,7 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
     pressure = 0.0
     for t in range(nt):
         pressure += tension[t]
-    bowing = springs(q, rest, chain.stiffness, chain.slender, pressure, chain.partner, chain.coupling, chain.hand, r, J)
+    bowing = springs(q, rest, chain, pressure, r, J)
     _add_weight(chain, load, r, J)
     if law.wall[4] > 0.0:
         wall_force(chain, law.wall, r, J)
@@ -177,15 +199,15 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
         for d in range(nd):
             b = chain.site[chain.hole[t, d + 1]]
             for i in range(chain.first[d], chain.first[d + 1]):
-                put(X[i], lever(chain.axis[i], b, chain.anchor[i]))
+                put(X[i], lever(chain, i, b))
                 dl[i] = dot(u[d], X[i])
         for d in range(nd):
             for i in range(chain.first[d], chain.first[d + 1]):
                 r[i] += T[d] * dl[i]
                 if tangent:
-                    b = cross(u[d], chain.axis[i])
+                    b = turned(chain, i, u[d])
                     for k in range(i, chain.first[d + 1]):
-                        h = T[d] * (dot(b, X[k]) + (dot(X[i], X[k]) - dl[i] * dl[k]) / length[d])
+                        h = T[d] * ((dot(X[i], X[k]) - dl[i] * dl[k]) / length[d] - dot(b, X[k]))
                         J[k, i] += h
                         if k > i:
                             J[i, k] += h
@@ -203,7 +225,7 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
             y = (v[0] - co * p[0], v[1] - co * p[1], v[2] - co * p[2])
             m = cross(v, p)
             for i in range(chain.first[d - 1], chain.first[d]):
-                dlog[i] += f * (dot(y, X[i]) / length[d - 1] + dot(chain.axis[i], m))
+                dlog[i] += f * (dot(y, X[i]) / length[d - 1] + chain.hinge[i] * dot(chain.axis[i], m))
             for i in range(chain.first[d], chain.first[d + 1]):
                 dlog[i] += f * dot(w, X[i]) / length[d]
             if abs(z[t, d]) < 1.0:

@@ -11,7 +11,8 @@ under 4 N), so the energy is written in phi:
 The second term couples the two sets of a disk interval. Sets at 1/6 and 5/6 carry a curvature that changes linearly along the
 interval with a first moment of 1/9 instead of 1/12; stiffening the antisymmetric bending by 4/3 restores it. The tendons press the
 rod together with P; a bowed interval of length h keeps u cot u = 1 - u^2/3 - u^4/45 ... of its stiffness, u^2 = P h^2 / (4 EI)
-(beam-column theory). Two sets at 1/6 and 5/6 have the second term by their place; the third is the factor on K.
+(beam-column theory). Two sets at 1/6 and 5/6 have the second term by their place; the third is the factor on K. Where tendons run
+in channels of the body it cannot bow away from them: neither term applies, and sets may also stretch (hyperelastic.py).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.compiled import jit
+from twin.equilibrium.hyperelastic import soften_and_press
 
 COUPLING = 1.0 / 6.0
 BEAM_COLUMN = 720.0
@@ -69,38 +71,45 @@ def bending(q, i, hand, phi, D):
 
 
 @jit
-def bendings(q, hand, phi, D):
-    """phi (nv,) and dphi/dq D (n_set, 3, 3) of all sets."""
-    for j in range(hand.size):
-        bending(q, 3 * j, hand[j], phi[3 * j : 3 * j + 3], D[j])
+def bendings(q, chain, phi, D):
+    """phi (nv,) and dphi/dq D (n_set, 3, 3) of all sets; a slide is its own phi."""
+    for j in range(chain.hand.size):
+        o = chain.bends[j]
+        bending(q, o, chain.hand[j], phi[o : o + 3], D[j])
+    for i in chain.slide:
+        phi[i] = q[i]
 
 
 @jit
-def springs(q, rest, stiffness, slender, pressure, partner, coupling, hand, r, J):
+def springs(q, rest, chain, pressure, r, J):
     """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv); returns dE/dP (m), which bowing takes from all tendons'
-    lengths. `rest` is phi0 (nv,), `slender` (nv,) h^2 / EI (1/N; 0 for twist), `pressure` P the sum of the tendons' tensions (N).
+    lengths. `rest` is phi0 (nv,), `pressure` P the sum of the tendons' tensions (N).
     """
-    nv = q.size
+    nv, hand, partner, coupling, stiffness = q.size, chain.hand, chain.partner, chain.coupling, chain.stiffness
     phi, D, m = np.empty(nv), np.empty((hand.size, 3, 3)), np.empty(nv)
-    bendings(q, hand, phi, D)
+    bendings(q, chain, phi, D)
     K, bowing = np.empty(nv), 0.0
     for i in range(nv):
         p = partner[i]
-        softer = stiffness[i] * pressure * slender[i] ** 2 / BEAM_COLUMN
+        softer = stiffness[i] * pressure * chain.slender[i] ** 2 / BEAM_COLUMN
         K[i] = stiffness[i] - softer * pressure
         bowing -= softer * (phi[i] - rest[i]) ** 2
         m[i] = K[i] * (phi[i] - rest[i]) + coupling[i] * (phi[i] - rest[i] - phi[p] + rest[p])
+    if J.size:
+        for i in range(nv):
+            for k in range(nv):
+                J[i, k] = 0.0
     for j in range(hand.size):
+        if chain.slide.size:
+            soften_and_press(j, q, rest, chain, phi, D, K, m, r, J)
+        o = chain.bends[j]
         for b in range(3):
-            r[3 * j + b] = D[j, 0, b] * m[3 * j] + D[j, 1, b] * m[3 * j + 1] + D[j, 2, b] * m[3 * j + 2]
+            r[o + b] = D[j, 0, b] * m[o] + D[j, 1, b] * m[o + 1] + D[j, 2, b] * m[o + 2]
     if J.size == 0:
         return bowing
-    for i in range(nv):
-        for k in range(nv):
-            J[i, k] = 0.0
     phi1, D1, moved = np.empty(3), np.empty((3, 3)), np.empty(3)
     for j in range(hand.size):
-        o = 3 * j
+        o = chain.bends[j]
         for b in range(3):
             for k in range(3):
                 moved[k] = q[o + k]
@@ -114,8 +123,10 @@ def springs(q, rest, stiffness, slender, pressure, partner, coupling, hand, r, J
                 J[o + b, o + a] += 0.5 * h
         for c in range(3):
             p = partner[o + c]
-            other = p // 3
+            if p == o + c:  # a set without a partner
+                continue
+            other = j ^ 1
             for a in range(3):
                 for b in range(3):
-                    J[o + a, 3 * other + b] -= D[j, c, a] * coupling[o + c] * D[other, p - 3 * other, b]
+                    J[o + a, chain.bends[other] + b] -= D[j, c, a] * coupling[o + c] * D[other, p - chain.bends[other], b]
     return bowing

@@ -91,7 +91,7 @@ def pulls(chain, law, z, path_gradient, pull):
                 share = np.exp(-law.mu * wrapped)
             before = u
             for i in range(chain.first[d], chain.first[d + 1]):
-                path_gradient[t, i] = dot(u, lever(chain.axis[i], b, chain.anchor[i]))
+                path_gradient[t, i] = dot(u, lever(chain, i, b))
                 pull[t, i] = share * path_gradient[t, i]
 
 
@@ -231,7 +231,7 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, held):
         for t in range(nt):
             step += dT[t] * B[t, i]
         q[i] -= step
-        longest = max(longest, abs(step))
+        longest = max(longest, abs(step) / chain.unit[i])
     for t in range(nt):
         tension[t] = max(0.0, tension[t] + dT[t])
     return longest
@@ -252,7 +252,7 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, 
         balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
         size = 0.0
         for i in range(nv):
-            size = max(size, abs(r[i] / chain.stiffness[i]))
+            size = max(size, abs(r[i] / chain.stiffness[i]) / chain.unit[i])
         linearise(held, s1, tension)
         for t in range(nt):
             if held.which[t]:

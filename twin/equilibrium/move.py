@@ -61,7 +61,7 @@ def answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gra
             for a in range(3):
                 gradient[t, k, a] = 0.0
             for i in range(below[k]):
-                v = lever(chain.axis[i], x, chain.anchor[i])
+                v = lever(chain, i, x)
                 for a in range(3):
                     gradient[t, k, a] -= v[a] * B[t, i]
     return True

@@ -1,7 +1,8 @@
 """The static solve: chord Newton with the exact tangent, and a path to follow where Newton fails.
 
 A factorised tangent is kept from solve to solve and used as long as each step shrinks the residual fourfold (steps in between
-are improved by one-deep Anderson mixing); else a fresh tangent is factorised. Convergence is max |r_i / K_i| < tol (rad).
+are improved by one-deep Anderson mixing); else a fresh tangent is factorised. Convergence is max |r_i / K_i| < tol (rad; of a
+slide, shares of the length it stretches).
 
 Where Newton fails (a saddle, a fold, a jump), the overdamped motion K q' = -dE/dq is followed by implicit Euler with growing
 steps, the slip states of friction committed at each, until a stable equilibrium is reached.
@@ -55,7 +56,7 @@ def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flo
         size, lost = 0.0, False
         for i in range(nv):
             r[i] += flow * K[i] * (q[i] - anchor[i])
-            x = abs(r[i] / K[i])
+            x = abs(r[i] / K[i]) / chain.unit[i]
             size = max(size, x)
             lost = lost or not x < LOST  # also where x is no number, which isfinite may miss under fast-math
         if lost or (tangent and size > GROWTH * before):
@@ -99,7 +100,7 @@ def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flo
             dq[i] = f[i] - theta * (dq[i] + f[i] - f0[i])
             f0[i] = f[i]
             last[i] = q[i]
-            longest = max(longest, abs(dq[i]))
+            longest = max(longest, abs(dq[i]) / chain.unit[i])
         step = min(1.0, LONGEST_STEP / longest)
         mix = step == 1.0
         for i in range(nv):
@@ -143,11 +144,11 @@ def follow(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, tol
             continue
         moved = 0.0
         for i in range(q.size):
-            moved = max(moved, abs(q[i] - start[i]))
+            moved = max(moved, abs(q[i] - start[i]) / chain.unit[i])
         flow = 0.0 if moved * flow < 1e-4 else 0.5 * flow
         if k == 0 and moved < 1e-9:  # exactly on a saddle: leave it
             for i in range(q.size):
-                q[i] += 1e-3 * (1 + 7 * i % 5)
+                q[i] += 1e-3 * (1 + 7 * i % 5) * chain.unit[i]
     return False
 
 
@@ -190,7 +191,7 @@ def step_once(model, data, chain, rest, tension, law, load, z, s, q, LU):
     longest = 0.0
     for i in range(q.size):
         q[i] -= r[i]
-        longest = max(longest, abs(r[i]))
+        longest = max(longest, abs(r[i]) / chain.unit[i])
     place(model, data, chain, q)
     commit(chain, law, z, s, bowing)
     return 1 if longest < LONGEST_STEP else 0

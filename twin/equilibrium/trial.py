@@ -163,7 +163,7 @@ def run(
     assign(q2, q)
     for i in range(n):
         if amplitude.size and i > 0:
-            bendings(q1, chain.hand, instant, D)
+            bendings(q1, chain, instant, D)
             for k in range(nv):
                 instant[k] -= rest[k]
             creep(delayed, instant, amplitude, retardation, drive.time[i] - drive.time[i - 1])

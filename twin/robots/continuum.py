@@ -1,9 +1,8 @@
-"""A slender elastic backbone with rigid disks and tendons straight between the disks' holes, as a MuJoCo hinge chain.
+"""A slender elastic backbone pulled by tendons through holes, as a chain of MuJoCo joints.
 
-Each interval between two disks has two joint sets, at 1/6 and 5/6 of it, so that the mean height of the polyline over the
-chord equals the arc's (the tendon's moment arm is then right to second order). A set is three hinges with stiffness
+Each interval between two disks has two joint sets (backbone.py says where and how stiff). A set is three hinges with stiffness
 EI/h, EI/h, GJ/h, h half the interval; the order of the two bending hinges alternates from set to set, because three
-successive rotations in one fixed order bend unequally in 3D.
+successive rotations in one fixed order bend unequally in 3D. A body that stretches has a slide of stiffness EA/h beside them.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ import mujoco
 import numpy as np
 
 from twin.errors import DataError
-from twin.robots.body import Body, JointSet
+from twin.robots.backbone import BODIES, Backbone, Cast, Piece, Wire
+from twin.robots.body import Body, Frame, JointSet
 
-PLACES = (1.0 / 6.0, 5.0 / 6.0)  # of a disk interval
 ALUMINIUM = [0.72, 0.74, 0.78, 1.0]
 NITI = [0.35, 0.38, 0.44, 1.0]
 TIMESTEP = 1e-3  # s
@@ -27,65 +26,98 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
     """The robot of `structure` (counts) and `values` (SI, by parameter name) as an editable MuJoCo model.
 
     Base frame: origin on the backbone at the base hole plate, +z along the straight robot, angles from +x towards +y.
+    `structure`: disks, tendons; body ("wire" if not given, or "cast"); tendons_end, the disk they end at (the last); markers,
+    "disk" for a marker disk_K on every disk, or a list of disks that carry marker_1, marker_2, ... at offset_x|y|z from the centre.
     """
-    n_disk, n_tendon = int(structure["disks"]), int(structure["tendons"])  # type: ignore[call-overload]
-    _check(n_disk, n_tendon, values)
-    pitch = np.array([values[f"disks.pitch_{k}"] for k in range(1, n_disk + 1)])
-    disk_z = np.concatenate([[0.0], np.cumsum(pitch)])
+    n_disk, n_tendon, end, on_disk = _checked(structure, values)
+    disk_z = np.concatenate([[0.0], np.cumsum([values[f"disks.pitch_{k}"] for k in range(1, n_disk + 1)])])
     length = float(disk_z[-1])
-    place = [disk_z[k] + f * pitch[k] for k in range(n_disk) for f in PLACES]
+    backbone = BODIES[str(structure.get("body", "wire"))](values, disk_z)
     spec = _world()
-    holes = [(values["tendons.radius"], values[f"tendons.angle_{i}"]) for i in range(1, n_tendon + 1)]
-    tendons = [[f"tendon_{i}_hole_{k}" for k in range(n_disk + 1)] for i in range(1, n_tendon + 1)]
-    _drill(spec.worldbody, holes, 0, 0.0)
+    angles = [values[f"tendons.angle_{i}"] for i in range(1, n_tendon + 1)]
+    tendons = [[f"tendon_{i}_hole_{k}" for k in range(end + 1)] for i in range(1, n_tendon + 1)]
+    _drill(spec.worldbody, backbone.hole_radius(0.0), angles, 0, 0.0)
+    plate = 1.3 * (values["disks.radius"] if not backbone.in_channels else backbone.radius(0.0))
     spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[1.3 * values["disks.radius"], 1.5e-3, 0], pos=[0, 0, -1.5e-3],
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[plate, 1.5e-3, 0], pos=[0, 0, -1.5e-3],
         rgba=NITI, contype=0, conaffinity=0, mass=0,
     )  # fmt: skip
 
-    joints, parent, ends = [], spec.worldbody, [*place[1:], length]
-    for j, (z, end) in enumerate(zip(place, ends, strict=True)):
-        k = j // 2  # the interval, from disk k to disk k + 1
-        body = parent.add_body(name=f"link_{j + 1}", pos=[0, 0, z - (place[j - 1] if j else 0.0)])
-        joints.append(_joint_set(body, j, 0.5 * pitch[k], z / length, values))
-        carries_disk = k + 1 if j % 2 else None
-        _add_mass(body, z, end, disk_z, carries_disk, values, n_disk, first=j == 0)
-        if carries_disk is not None:
-            at = float(disk_z[carries_disk] - z)
-            _drill(body, holes, carries_disk, at)
-            body.add_site(name=f"disk_{carries_disk}_centre", pos=[0, 0, at], size=[5e-4, 0, 0])
-            offset = values[f"markers.axial_offset_{carries_disk}"]
-            body.add_site(name=f"disk_{carries_disk}", pos=[0, 0, at + offset], size=[1.2e-3, 0, 0], rgba=[0.9, 0.2, 0.2, 1])
-        parent = body
+    joints, parent, before = [], spec.worldbody, 0.0
+    for j, piece in enumerate(backbone.pieces()):
+        z = piece.place
+        body = parent.add_body(name=f"link_{j + 1}", pos=[0, 0, z - before])
+        joints.append(_joint_set(body, j, piece, length, backbone, values["damping.time"]))
+        disk = j // 2 + 1 if j % 2 else None
+        _add_mass(body, piece, float(disk_z[disk]) if disk else None, backbone, values, n_disk, first=j == 0)
+        if disk is not None:
+            at = float(disk_z[disk] - z)
+            if disk <= end:
+                _drill(body, backbone.hole_radius(float(disk_z[disk])), angles, disk, at)
+            body.add_site(name=f"disk_{disk}_centre", pos=[0, 0, at], size=[5e-4, 0, 0])
+            for name, offset in _glued(on_disk, disk, values):
+                body.add_site(name=name, pos=[*offset[:2], at + offset[2]], size=[1.2e-3, 0, 0], rgba=[0.9, 0.2, 0.2, 1])
+        parent, before = body, z
     for i, sites in enumerate(tendons, 1):
         _thread(spec, i, sites)
+    markers = (
+        [f"disk_{k}" for k in range(1, n_disk + 1)] if on_disk is None else [f"marker_{m}" for m in range(1, len(on_disk) + 1)]
+    )
+    tip = f"disk_{n_disk}" if on_disk is None else f"disk_{n_disk}_centre"
     return Body(
         spec=spec,
         joints=tuple(joints),
         tendons=tuple(tuple(s) for s in tendons),
-        markers={**{f"disk_{k}": f"disk_{k}" for k in range(1, n_disk + 1)}, "tip": f"disk_{n_disk}"},
+        markers={**{name: name for name in markers}, "tip": tip},
         disks=tuple(f"disk_{k}_centre" for k in range(1, n_disk + 1)),
         tip=f"disk_{n_disk}_centre",
         length=length,
+        bows=not backbone.in_channels,
+        frame=Frame.of(values),
     )
 
 
-LISTS = {"disks.pitch": "m", "markers.axial_offset": "m", "tendons.angle": "rad"}
-SCALARS = {
-    "backbone.radius": "m", "backbone.mass": "kg", "backbone.youngs_modulus": "Pa", "backbone.poisson_ratio": "1",
-    "backbone.radius_taper": "1", "disks.mass": "kg", "disks.radius": "m", "tendons.radius": "m", "damping.time": "s",
-}  # fmt: skip
-UNITS = LISTS | SCALARS  # of the parameters this family is built from
+LISTS = {"disks.pitch": "m", "tendons.angle": "rad"}
+OFFSETS = ("markers.offset_x", "markers.offset_y", "markers.offset_z")
+UNITS = {
+    **LISTS, "markers.axial_offset": "m", **dict.fromkeys(OFFSETS, "m"), **Cast.SCALARS, **Cast.STATIONS, **Wire.SCALARS,
+    **Frame.UNITS,
+}  # fmt: skip  # of the parameters this family is built from
 
 
-def _check(n_disk: int, n_tendon: int, values: Mapping[str, float]) -> None:
-    """Raises DataError for counts and parameters this family cannot be built from."""
+def _checked(structure: Mapping[str, object], values: Mapping[str, float]) -> tuple[int, int, int, list[int] | None]:
+    """Disks, tendons, where they end, disks that carry markers (None: all). Raises DataError for counts and parameters this family
+    cannot be built from."""
+    n_disk, n_tendon = int(structure["disks"]), int(structure["tendons"])  # type: ignore[call-overload]
     if n_disk < 1 or n_tendon < 1:
         raise DataError(f"disks = {n_disk}, tendons = {n_tendon}; at least one of each is needed")
-    length = dict.fromkeys(LISTS, n_disk) | {"tendons.angle": n_tendon}
-    needed = {*SCALARS, *(f"{name}_{k}" for name, n in length.items() for k in range(1, n + 1))}
+    end = structure.get("tendons_end", n_disk)
+    if not (isinstance(end, int) and 1 <= end <= n_disk):
+        raise DataError(f"structure: tendons_end is {end!r}; a disk from 1 to {n_disk} is needed")
+    kind = structure.get("body", "wire")
+    if kind not in BODIES:
+        raise DataError(f"structure: body is {kind!r}; allowed: {', '.join(BODIES)}")
+    body, markers = BODIES[str(kind)], structure.get("markers", "disk")
+    if markers == "disk":
+        on_disk, lists = None, {"markers.axial_offset": n_disk}
+    elif isinstance(markers, list) and all(isinstance(k, int) and 1 <= k <= n_disk for k in markers):
+        on_disk, lists = markers, dict.fromkeys(OFFSETS, len(markers))
+    else:
+        raise DataError(f'structure: markers is {markers!r}; "disk" or a list of disks from 1 to {n_disk} is needed')
+    stations = sum(name.startswith("backbone.station_") for name in values)
+    lists |= {"disks.pitch": n_disk, "tendons.angle": n_tendon, **dict.fromkeys(body.STATIONS, max(stations, 2))}
+    needed = {*body.SCALARS, *(f"{name}_{k}" for name, n in lists.items() for k in range(1, n + 1))}
     if missing := sorted(needed - set(values)):
         raise DataError(f"parameter {missing[0]!r} is missing; {n_disk} disks and {n_tendon} tendons need it")
+    return n_disk, n_tendon, end, on_disk
+
+
+def _glued(on_disk: list[int] | None, disk: int, values: Mapping[str, float]) -> list[tuple[str, list[float]]]:
+    """Names of the markers on a disk, and where they sit from its centre (m)."""
+    if on_disk is None:
+        return [(f"disk_{disk}", [0.0, 0.0, values[f"markers.axial_offset_{disk}"]])]
+    numbers = [m for m, k in enumerate(on_disk, 1) if k == disk]
+    return [(f"marker_{m}", [values[f"{name}_{m}"] for name in OFFSETS]) for m in numbers]
 
 
 def _world() -> mujoco.MjSpec:
@@ -98,33 +130,38 @@ def _world() -> mujoco.MjSpec:
     return spec
 
 
-def _joint_set(body: mujoco.MjsBody, j: int, h: float, arclength: float, values: Mapping[str, float]) -> JointSet:
-    radius = values["backbone.radius"] * (1.0 + values["backbone.radius_taper"] * (0.5 - arclength))
-    bending = values["backbone.youngs_modulus"] * math.pi * radius**4 / 4.0  # EI, N m^2
-    twisting = bending / (1.0 + values["backbone.poisson_ratio"])  # GJ, N m^2
-    names = {"x": f"bend_x_{j + 1}", "y": f"bend_y_{j + 1}", "z": f"twist_{j + 1}"}
-    axes = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
-    for axis in "xyz" if j % 2 == 0 else "yxz":
-        stiffness = (twisting if axis == "z" else bending) / h
-        joint = body.add_joint(name=names[axis], type=mujoco.mjtJoint.mjJNT_HINGE, axis=axes[axis])
-        joint.stiffness = [stiffness, 0, 0]
-        joint.damping = [values["damping.time"] * stiffness, 0, 0]
-    return JointSet(names["x"], names["y"], names["z"], arclength, h)
+def _joint_set(body: mujoco.MjsBody, j: int, piece: Piece, length: float, backbone: Backbone, damping_time: float) -> JointSet:
+    stiffness = backbone.stiffness(piece)
+    hinges = ("bend_x", "bend_y", "twist") if j % 2 == 0 else ("bend_y", "bend_x", "twist")
+    slide = ("slide",) if math.isfinite(stiffness.stretch) else ()
+    kinds = (*hinges, *slide) if j % 2 == 0 else (*slide, *hinges)  # slides in the link between: hinges stay at their holes
+    names = {kind: f"{kind}_{j + 1}" for kind in kinds}
+    axes = {"bend_x": [1, 0, 0], "bend_y": [0, 1, 0], "twist": [0, 0, 1], "slide": [0, 0, 1]}
+    each = {"bend_x": stiffness.bend, "bend_y": stiffness.bend, "twist": stiffness.twist, "slide": stiffness.stretch}
+    for kind, name in names.items():
+        shape = mujoco.mjtJoint.mjJNT_SLIDE if kind == "slide" else mujoco.mjtJoint.mjJNT_HINGE
+        joint = body.add_joint(name=name, type=shape, axis=axes[kind])
+        joint.stiffness = [each[kind], 0, 0]
+        joint.damping = [damping_time * each[kind], 0, 0]
+    return JointSet(
+        names["bend_x"], names["bend_y"], names["twist"], piece.place / length, piece.end - piece.start, names.get("slide")
+    )
 
 
 def _add_mass(
-    body: mujoco.MjsBody, z: float, end: float, disk_z: np.ndarray, disk: int | None, values: Mapping[str, float],
-    n_disk: int, *, first: bool,
+    body: mujoco.MjsBody, piece: Piece, disk_z: float | None, backbone: Backbone, values: Mapping[str, float], n_disk: int,
+    *, first: bool,
 ) -> None:  # fmt: skip
-    """The link's piece of wire and, where it carries one, its disk, as one inertia about their common centre."""
-    span = end - z
-    wire = values["backbone.mass"] * span / disk_z[-1]
-    parts = [(wire, 0.5 * span, wire * span**2 / 12.0, 0.5 * wire * values["backbone.radius"] ** 2)]  # m, z, Ixx, Izz
-    if disk is not None:
-        m, r = values["disks.mass"] / n_disk, values["disks.radius"]
-        parts.append((m, float(disk_z[disk]) - z, m * r**2 / 4.0, m * r**2 / 2.0))
+    """The link's piece of backbone and, where it carries one, its disk, as one inertia about their common centre."""
+    start, end = piece.tail - piece.place, piece.head - piece.place
+    span, middle = end - start, 0.5 * (start + end)
+    own, radius = backbone.mass(piece.tail, piece.head), backbone.radius(0.5 * (piece.tail + piece.head))
+    parts = [(own, middle, own * (span**2 / 12.0 + radius**2 / 4.0), 0.5 * own * radius**2)]  # m, z, Ixx, Izz
+    if disk_z is not None and not backbone.in_channels:
+        m, r, at = values["disks.mass"] / n_disk, values["disks.radius"], disk_z - piece.place
+        parts.append((m, at, m * r**2 / 4.0, m * r**2 / 2.0))
         body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[r, 7.5e-4, 0], pos=[0, 0, float(disk_z[disk]) - z],
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[r, 7.5e-4, 0], pos=[0, 0, at],
             rgba=ALUMINIUM, contype=0, conaffinity=0, mass=0,
         )  # fmt: skip
     mass = sum(p[0] for p in parts)
@@ -133,13 +170,13 @@ def _add_mass(
     body.mass, body.ipos, body.explicitinertial = mass, [0, 0, centre], True
     body.inertia = [across, across, sum(p[3] for p in parts)]
     body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[values["backbone.radius"], 0, 0], fromto=[0, 0, -z if first else 0, 0, 0, span],
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0], fromto=[0, 0, -piece.place if first else start, 0, 0, end],
         rgba=NITI, contype=0, conaffinity=0, mass=0,
     )  # fmt: skip
 
 
-def _drill(body: mujoco.MjsBody, holes: list[tuple[float, float]], disk: int, z: float) -> None:
-    for i, (radius, angle) in enumerate(holes, 1):
+def _drill(body: mujoco.MjsBody, radius: float, angles: list[float], disk: int, z: float) -> None:
+    for i, angle in enumerate(angles, 1):
         at = [radius * math.cos(angle), radius * math.sin(angle), z]
         body.add_site(name=f"tendon_{i}_hole_{disk}", pos=at, size=[5e-4, 0, 0])
 

@@ -1,0 +1,76 @@
+"""A soft body that stretches as it bends: an incompressible neo-Hookean rod, to second order in bending and twist.
+
+A fibre stretched by lambda holds W = E/6 (lambda^2 + 2/lambda - 3) per volume. Across a section that is stretched by lambda,
+shrinks sideways by lambda^(-1/2) and bends by kappa per unit of rest length, a fibre at x has lambda + kappa x lambda^(-1/2);
+integrated over the section, per unit of rest length,
+
+    w = EA/6 (lambda^2 + 2/lambda - 3) + EI/2 b(lambda) kappa^2 + GJ/2 t(lambda) tau^2,
+    b = (1 + 2/lambda^3) / (3 lambda),   t = 1/lambda.
+
+Pressed to 0.8 of its length silicone bends 2.0 times as hard as at rest; in the limit lambda -> 1 it is the linear rod with EA, EI
+and GJ. Source: neo-Hookean law with G = E/3 (Treloar 1943); b and t are its expansion for a slender rod, as in the papers on
+stretched and bent elastomer beams (e.g. Lestringant and Audoly 2020, J. Elasticity 140). The tendons' channels are kept at their
+rest distance from the axis: their spreading by lambda^(-1/2) is left out.
+"""
+
+from __future__ import annotations
+
+from twin.compiled import jit
+
+SHORTEST = 0.1  # of the rest length: beyond it nothing is believed, and the step that led there is refused
+REFUSED = 1e300
+
+
+@jit
+def axial(stretch):
+    """Axial force over EA, (lambda - lambda^-2) / 3, and its slope."""
+    inverse = 1.0 / stretch
+    return (stretch - inverse * inverse) / 3.0, (1.0 + 2.0 * inverse * inverse * inverse) / 3.0
+
+
+@jit
+def bend(stretch):
+    """b(lambda), its first and second derivative."""
+    a = 1.0 / stretch
+    a2 = a * a
+    return (a + 2.0 * a2 * a2) / 3.0, -(a2 + 8.0 * a2 * a2 * a) / 3.0, (2.0 * a2 * a + 40.0 * a2 * a2 * a2) / 3.0
+
+
+@jit
+def twist(stretch):
+    """t(lambda), its first and second derivative."""
+    a = 1.0 / stretch
+    return a, -a * a, 2.0 * a * a * a
+
+
+@jit
+def soften_and_press(j, q, rest, chain, phi, D, K, m, r, J):
+    """What stretch changes in set j: its slide's own force, and that of bending and twist felt along it.
+
+    On entry K (nv,) and m (nv,) are stiffness and moment of the linear rod; on return those at the set's stretch, with r and,
+    unless J is empty, J of the slide's rows and columns.
+    """
+    i, first = chain.slide[j], chain.bends[j]
+    h = chain.unit[i]
+    stretch = 1.0 + (q[i] - rest[i]) / h
+    if stretch < SHORTEST:
+        r[i] = REFUSED
+        return
+    force, slope = axial(stretch)
+    r[i], slope = chain.stiffness[i] * h * force, chain.stiffness[i] * slope
+    for c in range(3):
+        k = first + c
+        out = phi[k] - rest[k]
+        own = K[k]
+        f, f1, f2 = twist(stretch) if chain.twists[k] else bend(stretch)
+        K[k] = own * f
+        m[k] = own * f * out
+        r[i] += 0.5 * own * f1 * out * out / h
+        slope += 0.5 * own * f2 * out * out / (h * h)
+        if J.size:
+            for b in range(3):
+                cross = own * f1 * out * D[j, c, b] / h
+                J[i, first + b] += cross
+                J[first + b, i] += cross
+    if J.size:
+        J[i, i] += slope
