@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from tools.bench.bench import run
+from tools.bench.design import bench_day
 from tools.bench.rod import Rod, follow
+from tools.bench.sensors import Noise
 from tools.bench.springs import GF, Springs
+from tools.bench.write import write_set
 from twin.bench import prepare
 from twin.effects import Loads, Route, named
 from twin.equilibrium import Equilibrium, Heating
 from twin.errors import DataError
-from twin.measurements import Channel, Recording, Trial
+from twin.measurements import Channel, Recording, Trial, read
 from twin.robots import load
 from twin.springs import Spring, pull
 from twin.springs.heat import LEAST_LOSS, heated, loss
@@ -319,3 +327,25 @@ def test_a_draught_and_a_wider_loop_do_what_they_say() -> None:
     late = predicted(named("sma_hysteresis")(shift=5.0, width=0.0))
     np.testing.assert_allclose(late[:, T], plain[:, T], atol=3.0)  # K: it cools a little otherwise at another elongation
     assert late[:40, pulls].max() < plain[:40, pulls].max() - 0.1  # N: it needs more heat
+
+
+# ---- from the command line -----------------------------------------------------------------------------------------------
+
+
+def test_a_current_driven_set_is_simulated_from_the_command_line(tmp_path: Path) -> None:
+    """The bench's described robot, two trials: what the twin writes is what was logged, but for the instruments."""
+    rng = np.random.default_rng(3)
+    day = bench_day("by_current", rng)
+    day = replace(day, trials=tuple(t for t in day.trials if t.name in ("turns_1", "pair_2")))
+    noise = Noise()
+    write_set(tmp_path / "day", "two heatings", day, run(Rod(), [], day), noise, rng)
+    command = [sys.executable, "-m", "twin.cli", "simulate", "continuum", str(tmp_path / "day"), "--out", str(tmp_path / "again")]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    logged, again = read(tmp_path / "day"), read(tmp_path / "again")
+    for a, b in zip(logged.trials, again.trials, strict=True):
+        for channel in logged.outputs():
+            error = a.values[channel.name] - b.values[channel.name]
+            # A tenth more than the instrument's: the readings that drive the twin are noisy too. Tensions feel those most.
+            most = (2.0 if channel.kind == "tendon_tension" else 1.2) * (channel.noise or 0.0)
+            assert np.sqrt(np.nanmean(error**2)) < most, channel.name
