@@ -25,7 +25,8 @@ from tools.attribution_table import table
 from tools.bench.day import MISMATCH, make_set
 from tools.bench.effects import all_effects
 from tools.bench.rod import NoEquilibrium
-from twin.diagnose import Settings, diagnose
+from tools.compared import COMPARED, SAME, distance
+from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.effects import catalogue
 from twin.errors import TwinError
 from twin.measurements import read
@@ -105,8 +106,22 @@ def run(case: Case, folder: Path) -> dict[str, object]:
         "structure": [d.structure_before, d.structure_after, d.structure_unseen],
         "line": d.line[0], "seconds": seconds, "samples": d.bench.n_sample,
         "parameters": {c.effect: {n: [f.value, f.std] for n, f in c.parameters.items()} for c in d.claims},
-        "truth": truth["effects"], "scores": [[list(s), v] for s, v in d.scores[:5]], "description": d.description,
+        "truth": truth["effects"], "apart": _apart(truth["effects"], d), "scores": [[list(s), v] for s, v in d.scores[:5]],
+        "description": d.description,
     }  # fmt: skip
+
+
+def _apart(truth: list[dict], d: Diagnosis) -> dict[str, float]:
+    """Relative error of the parameters of every effect that is claimed, true, and of the same law in bench and twin."""
+    out = {}
+    for t in truth:
+        law = next((e for e in d.twin.effects if e.id == t["id"]), None)
+        if law is not None and t["id"] in {c.effect for c in d.claims}:
+            given = {k: tuple(v) if isinstance(v, list) else v for k, v in t["parameters"].items()}
+            true, found, tolerance = COMPARED[t["id"]](all_effects()[t["id"]](**given), law.values)
+            if tolerance == SAME:
+                out[t["id"]] = distance(true, found)
+    return out
 
 
 def main() -> None:

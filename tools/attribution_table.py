@@ -6,6 +6,7 @@ import numpy as np
 
 CLASSES = ({"base_tilt", "camera_misalignment"}, {"time_delay", "actuator_lag"})  # effects such data hardly tell apart
 SURE = 0.9  # a claim at this probability or more must be right nine times of ten
+CLOSE = 0.15  # relative error of an effect's parameters
 FLAGS = ("unexplained", "partly_explained")
 
 
@@ -66,6 +67,8 @@ def table(every: list[dict]) -> str:
         f"claims at probability >= {SURE}, right         {share(sure)}",
         f"worse than calibrated on held-out trials    {share([r['after'] > 1.001 * r['calibrated'] for r in rows])}",
     ]
+    apart = [x <= CLOSE for r in rows for x in r.get("apart", {}).values()]
+    lines.append(f"parameters within {100 * CLOSE:.0f} %, same law            {share(apart)}")
     if ratio:
         lines.append(
             f"held-out after / floor                      median {np.median(ratio):.3f}, 90 % {np.quantile(ratio, 0.9):.3f}"

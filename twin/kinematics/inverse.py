@@ -121,12 +121,11 @@ def _sought(robot: LoadedRobot, tip: np.ndarray, used: np.ndarray, guess: np.nda
 
 def _peek(robot: LoadedRobot, tension: np.ndarray) -> Shape:
     """The shape `tension` (softened, true) would give; the robot stays."""
-    T, q, z, s = robot.state()
-    LU, fresh = robot.LU.copy(), robot.fresh.copy()
+    now = robot.state()
     try:
         return robot.pull(robot.reported(tension / robot.softness))
     finally:
-        robot.tension, robot.q, robot.slip, robot.distal, robot.LU, robot.fresh = T, q, z, s, LU, fresh
+        robot.restore(now)
 
 
 def _reason(robot: LoadedRobot, tip: np.ndarray, tension: np.ndarray, distance: float, limit: float) -> str:

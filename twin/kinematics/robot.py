@@ -99,6 +99,11 @@ class LoadedRobot:
         """Copies of (T, q, z, s): what `twin.equilibrium.move` advances."""
         return self.tension.copy(), self.q.copy(), self.slip.copy(), self.distal.copy()
 
+    def restore(self, state: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> None:
+        """Back to an earlier `state`: a pull that was only tried."""
+        self.tension, self.q, self.slip, self.distal = (x.copy() for x in state)
+        self.fresh[0] = False
+
     def shape(self) -> Shape:
         """As it stands after the last `pull` or `rest`."""
         chain = self.solver.chain

@@ -1,0 +1,86 @@
+"""What was true and what was found of each effect, as numbers that can be compared: the bench's parameters are not the twin's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+HOUR = 3600.0
+SAME, OTHER = 0.15, 0.35  # relative error allowed for the same law and for another (diagnosis.md, section 8)
+
+
+def _each(values: dict[str, float], name: str) -> list[float]:
+    return [values[f"{name}_{i}"] for i in (1, 2, 3)]
+
+
+def _across(gravity: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """What a rotation vector does to gravity: the only part of a tilt that shows."""
+    return Rotation.from_rotvec(rotation).as_matrix() @ gravity - gravity
+
+
+def _routed(i: int, angle: float, radius: float) -> np.ndarray:
+    out = np.zeros((3, 2))
+    out[i] = angle, radius / 8e-3
+    return out
+
+
+DOWN = np.array([0.0, 0.0, 9.81])
+# an effect of the bench with fields of its own, the twin's parameters of it
+Compare = Callable[[Any, dict[str, float]], tuple[object, object, float]]
+# effect -> (what was true, what was found, tolerance), as arrays to be compared by their distance
+COMPARED: dict[str, Compare] = {
+    "tendon_friction": lambda t, v: (0.1 * t.strength, v["mu"], SAME),
+    "backbone_creep": lambda t, v: (0.08 * t.strength, v["amplitude"] + v["amplitude_2"], OTHER),
+    "backbone_precurvature": lambda t, v: (  # varies along the body there
+        0.5 * t.strength * np.array([-np.sin(t.angle), np.cos(t.angle)]), [v["about_x"], v["about_y"]], OTHER,
+    ),
+    "stiffness_asymmetry": lambda t, v: (np.tanh(0.05 * t.strength), np.hypot(v["along"], v["across"]), SAME),
+    "stiffness_gradient": lambda t, v: (0.2 * t.strength * t.sign, v["gradient"], SAME),
+    "base_tilt": lambda t, v: (
+        _across(DOWN, np.radians(t.strength) * np.array(t.axis)),
+        _across(DOWN, np.array([v["about_x"], v["about_y"], v["about_z"]])), SAME,
+    ),
+    "camera_misalignment": lambda t, v: (
+        np.radians(0.7 * t.strength) * np.array(t.axis), [v["turn_x"], v["turn_y"], v["turn_z"]], SAME,
+    ),
+    "tip_payload": lambda t, v: (1e-3 * t.strength, v["mass"], SAME),
+    # A common factor of all cells is the hole radius's, a nuisance: what differs between them is compared.
+    "load_cell_gain": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "gain"))), SAME),
+    "load_cell_bias": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "bias"))), SAME),
+    "load_cell_drift": lambda t, v: (  # the bend takes part of it
+        _differ(0.05 * t.strength * np.array(t.share) / HOUR), _differ(np.array(_each(v, "rate"))), OTHER,
+    ),
+    "tendon_routing": lambda t, v: (
+        np.radians(3.0) * t.strength * t.around, v.get(f"angle_{t.tendon + 1}", 0.0), SAME,
+    ),
+    "time_delay": lambda t, v: (0.1 * t.strength, v["delay"], SAME),
+    # Another law there: of second order, whose steady lag behind a ramp is 2 zeta tau.
+    "actuator_lag": lambda t, v: (2 * t.zeta * 0.1 * t.strength, v["time"] + v["time_2"], OTHER),
+    "actuator_saturation": lambda t, v: (5.0 - 0.6 * t.strength, v["limit"], SAME),  # a softer corner there
+    "load_cell_crosstalk": lambda t, v: (
+        0.03 * t.strength * np.array(t.share), [v[f"share_{i}_{j}"] for i in (1, 2, 3) for j in (1, 2, 3) if i != j], OTHER,
+    ),
+    "temperature_softening": lambda t, v: (0.005 * t.strength, v["rate"], SAME),
+    "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
+    "tendon_backlash": lambda t, v: (1e-4 * t.strength, v["gap"], OTHER),  # swaps sides by another law there
+    "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
+    "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),
+    # Starts and finishes of the phases move by different amounts there: their means are what this law knows.
+    "sma_hysteresis": lambda t, v: (
+        2.1 * t.strength * np.array([1.0, -t.below]), [v["shift"] + 0.5 * v["width"], v["shift"] - 0.5 * v["width"]], SAME,
+    ),
+    "contact": lambda t, v: (1.0, 1.0 if v["stiffness"] > 0 else 0.0, SAME),  # another obstacle there: that it is found counts
+}  # fmt: skip
+
+
+def _differ(x: np.ndarray) -> np.ndarray:
+    return x - x.mean()
+
+
+def distance(true: object, found: object) -> float:
+    """|found - true| / |true|, of numbers or arrays."""
+    return float(np.linalg.norm(np.subtract(found, true)) / np.linalg.norm(true))  # type: ignore[arg-type]
