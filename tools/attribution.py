@@ -18,6 +18,7 @@ import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -117,7 +118,7 @@ def _apart(truth: list[dict], d: Diagnosis) -> dict[str, float]:
     for t in truth:
         law = next((e for e in d.twin.effects if e.id == t["id"]), None)
         if law is not None and t["id"] in {c.effect for c in d.claims}:
-            given = {k: tuple(v) if isinstance(v, list) else v for k, v in t["parameters"].items()}
+            given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in t["parameters"].items()}
             true, found, tolerance = COMPARED[t["id"]](all_effects()[t["id"]](**given), law.values)
             if tolerance == SAME:
                 out[t["id"]] = distance(true, found)
@@ -125,7 +126,7 @@ def _apart(truth: list[dict], d: Diagnosis) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--sets", type=int, default=300)
     parser.add_argument("--seed", type=int, default=5000)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-
 HOUR = 3600.0
 SAME, OTHER = 0.15, 0.35  # relative error allowed for the same law and for another (diagnosis.md, section 8)
 
