@@ -45,7 +45,10 @@ def loss(*effects: Effect) -> float:
 def on(law: type[Effect]) -> Effect:
     """The law at a moderate strength, the same for all: its fits' own start, or a fifth of the way to its bounds."""
     predicted = [t.true for t in simulate(Twin(load("continuum")), prepare(recording(two_cycles()), load("continuum")))]
-    return law(next(iter(law.starts(predicted, 3))).values, 3)
+    start = next(iter(law.starts(predicted, 3)), None)
+    if start is None:
+        pytest.skip("it acts on springs, which do not drive here")
+    return law(start.values, 3)
 
 
 def test_the_plain_robot_gives_back_what_it_takes() -> None:

@@ -2,6 +2,8 @@
 
 spring.py   the numbers of the springs       force.py   elongation, temperature and history -> tension
 heat.py     current -> temperature           alone.py   many springs along given elongations, without a robot
+
+superelastic.py   a spring of another kind, that no current drives: elongation -> tension, with coils that narrow
 """
 
 from __future__ import annotations
