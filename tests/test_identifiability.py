@@ -112,7 +112,8 @@ def usual() -> dict[str, Visibility]:
 
 
 def test_every_effect_has_a_row_and_only_what_is_not_logged_is_never_seen(usual: dict[str, Visibility]) -> None:
-    assert set(usual) == set(catalogue())
+    of_springs = {name for name, law in catalogue().items() if law(n_tendon=3).acts_in("spring")}  # none pull here
+    assert set(usual) == set(catalogue()) - of_springs
     for effect, v in usual.items():
         assert 0.0 <= v.share <= 1.0
         assert v.seen <= v.apart
