@@ -12,34 +12,45 @@ from twin.compiled import assign, jit
 from twin.equilibrium.chain import lever
 from twin.equilibrium.lengths import pulls
 from twin.equilibrium.linear import substitute
-from twin.equilibrium.newton import is_minimum, place, solve
+from twin.equilibrium.newton import is_minimum, newton, place, solve
 
+SHORTEST = 1.0 / 16.0  # of a part: below it the robot is let go where it wants
 TRIALS = 25  # Gauss-Newton steps of `seek`
-CORRECTIONS = 6  # of its answer, the way there considered
+CORRECTIONS = 12  # of its answer, the way there considered
 DAMPING = 1e-3  # m/N: of a step, against directions in which all tendons pull against each other and the tip hardly moves
 STALLED = 0.9  # of the error: a step that leaves more has found the nearest point, if the one before did too
 
 
 @jit
 def move(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh):
-    """Advance the state (T, q, z, s) to tensions `goal` (n_tendon,) N in equal parts of at most `stride` N; 0 where lost."""
+    """Advance the state (T, q, z, s) to tensions `goal` (n_tendon,) N in parts of at most `stride` N; 0 where lost."""
     nt, longest = T.size, 0.0
-    start = T.copy()
+    start, before, last = T.copy(), q.copy(), q.copy()
     for t in range(nt):
         longest = max(longest, abs(goal[t] - T[t]))
-    parts = max(1, int(np.ceil(longest / stride)))
-    before, last = q.copy(), q.copy()
-    for k in range(1, parts + 1):
+    whole = min(1.0, stride / longest) if longest > 0.0 else 1.0
+    done, part, parted = 0.0, whole, 0.0
+    while True:
         for t in range(nt):
-            T[t] = start[t] + (goal[t] - start[t]) * (k / parts)
-        assign(last, q)
-        if k > 1:
-            for i in range(q.size):
-                q[i] = 2.0 * q[i] - before[i]
+            T[t] = start[t] + (goal[t] - start[t]) * (done + part)
+        for i in range(q.size):
+            last[i] = q[i]
+            q[i] += parted * (q[i] - before[i])  # `parted`: this part over the one before
+        if newton(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, 0.0, last, tol) <= 0:
+            # Short pre-sliding makes friction kinked, and Newton lose its way: a shorter part passes fewer kinks.
+            assign(q, last)
+            fresh[0] = False
+            if part > SHORTEST * whole:
+                part, parted = 0.5 * part, 0.5 * parted
+                continue
+            if solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol) == 0:
+                return 0
         assign(before, last)
-        if solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol) == 0:
-            return 0
-    return 1
+        done += part
+        if done > 1.0 - 1e-12:
+            return 1
+        longer = min(whole, 2.0 * part, 1.0 - done)
+        part, parted = longer, longer / part
 
 
 @jit
@@ -160,7 +171,7 @@ def refine(model, data, chain, rest, law, load, target, used, limit, tol, near, 
     nt = T.size
     gradient, error, fresh = np.empty((nt, 1, 3)), np.empty(3), np.zeros(1, np.bool_)
     site, below = chain.disk[-1:], np.full(1, q.size)
-    goal, dT, best_T, best = T.copy(), np.zeros(nt), T.copy(), 1e300
+    goal, dT, best_T, best, share = T.copy(), np.zeros(nt), T.copy(), 1e300, 1.0
     free = np.empty(nt, np.bool_)
     for _ in range(CORRECTIONS):
         assign(T, T0)
@@ -179,8 +190,11 @@ def refine(model, data, chain, rest, law, load, target, used, limit, tol, near, 
             size += error[a] * error[a]
         size = np.sqrt(size)
         if size >= best:
-            break
-        best = size
+            share *= 0.5
+            for t in range(nt):
+                goal[t] = min(limit, max(0.0, best_T[t] + share * dT[t]))
+            continue
+        best, share = size, 1.0
         assign(best_T, T)
         if size < near or not answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gradient):
             break

@@ -23,6 +23,7 @@ GROWTH = 3.0  # a Newton step that lets the residual grow more than this is halv
 LOST = 1e9  # rad: a residual beyond it is a diverged step
 LONGEST_STEP = 0.5  # rad, of any hinge
 NEWTON_STEPS = 30
+CYCLES = 3  # full steps with a fresh tangent that do not halve the residual: it goes round a kink of friction or a wall
 FLOW_STEPS = 200
 FLOW_TOLERANCE = 1e-6  # rad, of the steps on the way
 
@@ -45,7 +46,7 @@ def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flo
     K = chain.stiffness
     r, J, none = np.empty(nv), np.empty((nv, nv)), np.empty((0, 0))
     z1, s1 = np.zeros(z.shape), np.zeros(s.shape)
-    before, step = 1e300, 1.0
+    before, step, slow = 1e300, 1.0, 0
     last, dq, f, f0 = np.empty(nv), np.zeros(nv), np.empty(nv), np.zeros(nv)
     mix = False
     have = fresh[0]
@@ -79,6 +80,10 @@ def newton(model, data, chain, rest, tension, law, load, z, s, q, LU, fresh, flo
                 r[i] += flow * K[i] * (q[i] - anchor[i])
             tangent = True
         if tangent:
+            if step == 1.0 and size > 0.5 * before:
+                slow += 1
+                if slow > CYCLES:
+                    return -it
             for i in range(nv):
                 assign(LU[i], J[i])
                 LU[i, i] += flow * K[i]
