@@ -12,8 +12,8 @@ from twin.springs import Spring
 
 
 class SmaCooling(Effect):
-    """Heat loss of spring i: h_i = factor s_i (h + forced) (1 + rate (T_a - 23 degC)), h the described one (W/K), s_i = share_i
-    over the shares' geometric mean.
+    """Heat loss of spring i: h_i = factor share_i (h + forced) (1 + rate (T_a - 23 degC)), h the described one (W/K); the last
+    spring's share is what makes their product one.
 
     `factor` is what still or moving air does to all springs, `share` a draught on one side, `forced` a loss that depends on neither
     elongation nor heat, `rate` surroundings that carry off more when warm.
@@ -24,7 +24,7 @@ class SmaCooling(Effect):
     >>> from twin.robots import load
     >>> plain = load("continuum").springs(3)
     >>> (SmaCooling(factor=1.5, share_2=2.0).spring(plain).loss / plain.loss).round(3).tolist()
-    [1.191, 2.381, 1.191]
+    [1.5, 3.0, 0.75]
     """
 
     id = "sma_cooling"
@@ -33,24 +33,29 @@ class SmaCooling(Effect):
         Parameter("forced", 0.0, "W/K", -1e-3, 1e-2, "a draught's; described: 2-5 mW/K", scale=2e-4, std=1e-3),
         Parameter("rate", 0.0, "1/K", -0.1, 0.1, "air's properties: 0.002; a ventilated room: ours", scale=0.01, std=0.03),
     )
-    per_tendon = (Parameter("share", 1.0, "1", 0.2, 5.0, "springs beside each other: tens of per cent", scale=0.05, std=0.3),)
-    richer = ("forced", "rate", "share_1", "share_2", "share_3")
+    richer = ("forced", "rate")
     moves_with = "the heat of the springs, so the time held"
 
     @classmethod
+    def declared(cls, n_tendon: int) -> tuple[Parameter, ...]:
+        words = "springs beside each other: tens of per cent"
+        shares = (Parameter(f"share_{i}", 1.0, "1", 0.2, 5.0, words, scale=0.05, std=0.3) for i in range(1, n_tendon))
+        return (*cls.parameters, *shares)
+
+    @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Of all springs, then of each alone; nowhere without springs."""
-        driven = _heated(predicted, n_tendon)
-        if not driven.any():
+        """More and less of all springs, then of each its own; nowhere without springs."""
+        if not any(s.by_current.any() for s in predicted):
             return
         for factor in (1.3, 0.75):
             yield Start({"factor": factor}, ("factor",))
-        for i in np.flatnonzero(driven) + 1:
-            yield Start({"factor": 1.3 ** (1.0 / n_tendon), f"share_{i}": 1.3}, ("factor", f"share_{i}"))
+        shares = {p.name: 1.1 for p in cls.declared(n_tendon) if p not in cls.parameters}
+        if shares:
+            yield Start({"factor": 1.1, **shares}, ("factor", *shares))
 
     def spring(self, spring: Spring) -> Spring:
-        shares = self.each("share")
-        more = self["factor"] * shares / np.exp(np.mean(np.log(shares)))
+        shares = [self[p.name] for p in self.declared(len(spring.loss)) if p not in self.parameters]
+        more = self["factor"] * np.array([*shares, 1.0 / np.prod(shares)])
         return spring._replace(
             loss=more * (spring.loss + self["forced"]),
             loss_warm=more * spring.loss_warm,
@@ -60,8 +65,3 @@ class SmaCooling(Effect):
             loss_warm_open=more * spring.loss_warm_open,
             loss_surroundings=spring.loss_surroundings + self["rate"],
         )
-
-
-def _heated(predicted: list[Signals], n_tendon: int) -> np.ndarray:
-    """(n_tendon,) whether a current drives the tendon in some trial."""
-    return np.any([np.broadcast_to(s.by_current, n_tendon) for s in predicted], axis=0)
