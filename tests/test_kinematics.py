@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from twin.effects import Loads, named
 from twin.equilibrium import Equilibrium
 from twin.errors import TwinError
-from twin.kinematics import LoadedRobot, inverse
+from twin.kinematics import HeatedRobot, LoadedRobot, inverse
 from twin.kinematics.tip_wrench import tip_wrench
 from twin.robots import load
-from twin.twin import Twin
+from twin.twin import Twin, heating_of
 
 HANGING = Loads(np.array([0.0, 0.0, 9.81]))
 SIDEWAYS = Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
@@ -162,3 +162,22 @@ def test_the_tip_wrench_rod_is_near_the_twin_where_both_hold() -> None:
         rod = tip_wrench(load("continuum"), np.array(tension), HANGING)[-1]
         twin = LoadedRobot(PLAIN, HANGING).pull(np.array(tension)).tip
         assert np.linalg.norm(rod - twin) < 5e-4  # m: 0.4 % of the length
+
+
+def test_springs_step_by_step_are_a_trial_of_currents() -> None:
+    """The same currents as a log, through the trial's own solve: heat, tensions and shape."""
+    rng = np.random.default_rng(2)
+    when = np.arange(0.0, 40.0, 0.5)
+    current = np.repeat(rng.uniform(0.0, 1.4, (8, 3)), 10, axis=0)
+    robot = HeatedRobot(RUBBING, SIDEWAYS)
+    assert robot.shape().markers.shape == (9, 3)
+    solved = Equilibrium(load("continuum").build()).solve(
+        when, current, SIDEWAYS, named("tendon_friction")({"mu": 0.15}, 3).route(),
+        heating=heating_of(RUBBING, np.full(len(when), 296.15), np.ones(3, bool)),
+    )  # fmt: skip
+    for i in range(1, len(when)):
+        tension = robot.step(current[i - 1], when[i] - when[i - 1])
+        np.testing.assert_allclose(robot.warm, solved.temperature[i], atol=1e-6)  # K
+        np.testing.assert_allclose(tension, solved.tension[i], atol=1e-5)  # N: two solves within 1e-7 rad
+        np.testing.assert_allclose(robot.shape().markers, solved.markers[i], atol=5e-7)
+    assert np.ptp(solved.tension) > 1.0

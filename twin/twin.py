@@ -140,7 +140,7 @@ def _trial(
     for effect in twin.effects:
         stiffness = stiffness * effect.soften(inputs.temperature, inputs.clock)
     if isinstance(solver, Equilibrium):
-        heating = _heating(twin, inputs.temperature, by_current) if by_current.any() else None
+        heating = heating_of(twin, inputs.temperature, by_current) if by_current.any() else None
         path = solver.solve(
             inputs.time, command, loads, route, creep, delayed, near, keep, tolerance, by_length, stiffness, once, heating
         )  # fmt: skip
@@ -166,7 +166,7 @@ def _trial(
     return Trace(true, path)
 
 
-def _heating(twin: Twin, ambient: np.ndarray, by_current: np.ndarray) -> Heating:
+def heating_of(twin: Twin, ambient: np.ndarray, by_current: np.ndarray) -> Heating:
     spring = twin.robot.springs(len(by_current), twin.values)
     for effect in twin.effects:
         spring = effect.spring(spring)

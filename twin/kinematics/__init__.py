@@ -1,11 +1,13 @@
 """Tensions to shape and back, with the friction a robot's tendons have met so far.
 
 robot.py       a twin under its loads: forward kinematics, step by step
+heated.py      the same pulled by SMA springs, stepped in time
 inverse.py     the tensions for a wanted tip, by sectors or in general
 tip_wrench.py  the reference of Peng et al.: a rod under a tip wrench
 """
 
+from twin.kinematics.heated import HeatedRobot
 from twin.kinematics.inverse import Reach, inverse
 from twin.kinematics.robot import LoadedRobot, Shape
 
-__all__ = ["LoadedRobot", "Reach", "Shape", "inverse"]
+__all__ = ["HeatedRobot", "LoadedRobot", "Reach", "Shape", "inverse"]
