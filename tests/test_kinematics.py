@@ -168,7 +168,7 @@ def test_springs_step_by_step_are_a_trial_of_currents() -> None:
     """The same currents as a log, through the trial's own solve: heat, tensions and shape."""
     rng = np.random.default_rng(2)
     when = np.arange(0.0, 40.0, 0.5)
-    current = np.repeat(rng.uniform(0.0, 1.4, (8, 3)), 10, axis=0)
+    current = np.repeat(rng.uniform(0.0, 2.0, (8, 3)), 10, axis=0)
     robot = HeatedRobot(RUBBING, SIDEWAYS)
     assert robot.shape().markers.shape == (9, 3)
     solved = Equilibrium(load("continuum").build()).solve(
