@@ -35,10 +35,11 @@ from twin.robots import load
 from twin.twin import Twin
 
 AMPLITUDES = (1.0, 3.0, 8.0)
-DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length")
+DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length", "by_current")
 BLOCK = ("none", "one", "one", "one", "pair", "unknown", "one", "none", "one", "one", "one", "one", "pair", "unknown",
          "one", "one", "one", "pair", "unknown", "none")  # fmt: skip
 BY_TENSION = {"actuator_saturation"}  # where lengths are commanded the bench has no such law
+NO_SPRINGS = {"actuator_saturation", "actuator_lag", "tendon_backlash", "backbone_creep"}  # not on the bench where springs pull
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,12 @@ def plan(sets: int, seed: int) -> list[Case]:
         elif kind == "unknown":
             effects = (next_of("unknown", others),)
         amplitude, design = float(rng.choice(AMPLITUDES)), str(rng.choice(DESIGNS))
-        if BY_TENSION & set(effects) and design == "by_length":
+        if (BY_TENSION & set(effects) and design == "by_length") or (NO_SPRINGS & set(effects) and design == "by_current"):
             design = "default"
+        if any(all_effects()[e].by_current for e in effects):
+            design = "by_current"
+            effects = tuple(e for e in effects if e not in NO_SPRINGS)
+            kind = "one" if kind == "pair" and len(effects) == 1 else kind
         mismatch, coloured = str(rng.choice(list(MISMATCH))), bool(rng.uniform() < 0.3)
         out.append(Case(seed + k, kind, effects, amplitude, design, mismatch, coloured))
     return out
