@@ -83,7 +83,8 @@ def test_a_cast_body_has_the_mass_of_its_cones(name: str) -> None:
     """Cones from station to station, integrated in fine slices; the first quarter of the first interval is part of the base."""
     file = written(name)["parameters"]
     station, radius = (1e-3 * np.array(file[f"backbone.{k}"]["value"]) for k in ("station", "radius"))
-    s = np.linspace(0.25e-3 * file["disks.pitch"]["value"][0], station[-1], 200_001)
+    pitch = 1e-3 * np.broadcast_to(file["disks.pitch"]["value"], written(name)["structure"]["disks"])
+    s = np.linspace(0.25 * pitch[0], pitch.sum(), 200_001)
     slices = file["backbone.density"]["value"] * np.pi * np.interp(s, station, radius) ** 2
     mass, centre = mass_and_centre(name)
     np.testing.assert_allclose(mass, np.trapezoid(slices, s), rtol=1e-5)  # pitches are written with five digits

@@ -103,6 +103,7 @@ class Equilibrium:
             coupling=coupling,
             bends=np.array([min(dof[at.bend_x], dof[at.bend_y]) for at in body.joints], np.int64),
             slide=np.array([dof[at.slide] for at in body.joints if at.slide is not None], np.int64),
+            stiffening=float(body.stiffening),
             hand=np.linalg.det(model.jnt_axis[hinge > 0.0].reshape(-1, 3, 3)),
             body=moved_by,
             mass=model.body_subtreemass[moved_by].copy(),

@@ -10,7 +10,8 @@ integrated over the section, per unit of rest length,
 Pressed to 0.8 of its length silicone bends 2.0 times as hard as at rest; in the limit lambda -> 1 it is the linear rod with EA, EI
 and GJ. Source: neo-Hookean law with G = E/3 (Treloar 1943); b and t are its expansion for a slender rod, as in the papers on
 stretched and bent elastomer beams (e.g. Lestringant and Audoly 2020, J. Elasticity 140). The tendons' channels are kept at their
-rest distance from the axis: their spreading by lambda^(-1/2) is left out.
+rest distance from the axis: their spreading by lambda^(-1/2) is left out. A body may be neo-Hookean in part: `stiffening` 0 is the
+rod that stretches and bends by Hooke's law, 1 the one above.
 """
 
 from __future__ import annotations
@@ -22,25 +23,27 @@ REFUSED = 1e300
 
 
 @jit
-def axial(stretch):
-    """Axial force over EA, (lambda - lambda^-2) / 3, and its slope."""
+def axial(stretch, share):
+    """Axial force over EA and its slope: (lambda - lambda^-2) / 3 of the neo-Hookean `share`, lambda - 1 of the Hookean rest."""
     inverse = 1.0 / stretch
-    return (stretch - inverse * inverse) / 3.0, (1.0 + 2.0 * inverse * inverse * inverse) / 3.0
+    force, slope = (stretch - inverse * inverse) / 3.0, (1.0 + 2.0 * inverse * inverse * inverse) / 3.0
+    return share * force + (1.0 - share) * (stretch - 1.0), share * slope + 1.0 - share
 
 
 @jit
-def bend(stretch):
-    """b(lambda), its first and second derivative."""
+def bend(stretch, share):
+    """1 + share (b - 1), its first and second derivative."""
     a = 1.0 / stretch
     a2 = a * a
-    return (a + 2.0 * a2 * a2) / 3.0, -(a2 + 8.0 * a2 * a2 * a) / 3.0, (2.0 * a2 * a + 40.0 * a2 * a2 * a2) / 3.0
+    b = (a + 2.0 * a2 * a2) / 3.0
+    return 1.0 + share * (b - 1.0), -share * (a2 + 8.0 * a2 * a2 * a) / 3.0, share * (2.0 * a2 * a + 40.0 * a2 * a2 * a2) / 3.0
 
 
 @jit
-def twist(stretch):
-    """t(lambda), its first and second derivative."""
+def twist(stretch, share):
+    """1 + share (t - 1), its first and second derivative."""
     a = 1.0 / stretch
-    return a, -a * a, 2.0 * a * a * a
+    return 1.0 + share * (a - 1.0), -share * a * a, 2.0 * share * a * a * a
 
 
 @jit
@@ -56,13 +59,13 @@ def soften_and_press(j, q, rest, chain, phi, D, K, m, r, J):
     if stretch < SHORTEST:
         r[i] = REFUSED
         return
-    force, slope = axial(stretch)
+    force, slope = axial(stretch, chain.stiffening)
     r[i], slope = chain.stiffness[i] * h * force, chain.stiffness[i] * slope
     for c in range(3):
         k = first + c
         out = phi[k] - rest[k]
         own = K[k]
-        f, f1, f2 = twist(stretch) if chain.twists[k] else bend(stretch)
+        f, f1, f2 = twist(stretch, chain.stiffening) if chain.twists[k] else bend(stretch, chain.stiffening)
         K[k] = own * f
         m[k] = own * f * out
         r[i] += 0.5 * own * f1 * out * out / h

@@ -98,8 +98,8 @@ class Cast:
     at radius + slope s from the axis."""
 
     SCALARS: ClassVar[Mapping[str, str]] = {
-        "backbone.density": "kg/m^3", "backbone.youngs_modulus": "Pa", "tendons.radius": "m", "tendons.slope": "1",
-        "damping.time": "s",
+        "backbone.density": "kg/m^3", "backbone.youngs_modulus": "Pa", "backbone.stiffening": "1", "tendons.radius": "m",
+        "tendons.slope": "1", "damping.time": "s",
     }  # fmt: skip
     STATIONS: ClassVar[Mapping[str, str]] = {"backbone.station": "m", "backbone.radius": "m"}
     in_channels: ClassVar[bool] = True

@@ -60,6 +60,7 @@ class Body:
     `tendons[i]` lists the sites tendon i + 1 passes, base to tip; `markers` maps a channel prefix ("disk_3") to its site;
     `disks` lists the sites of the disk centres, base to tip; `tip` is where payload and tip force act. `bows`: tendons are straight
     between disks and the backbone bows away from them; else they run in channels of the body. `frame` is that of the markers.
+    `stiffening`: of a body that stretches, from 0 (Hooke) to 1 (neo-Hookean).
     """
 
     spec: mujoco.MjSpec
@@ -71,6 +72,7 @@ class Body:
     length: float
     bows: bool = True
     frame: Frame = field(default_factory=Frame)
+    stiffening: float = 0.0
 
 
 def hinge_pairs(body: Body) -> Iterator[tuple[str, str]]:

@@ -30,7 +30,8 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
     "disk" for a marker disk_K on every disk, or a list of disks that carry marker_1, marker_2, ... at offset_x|y|z from the centre.
     """
     n_disk, n_tendon, end, on_disk = _checked(structure, values)
-    disk_z = np.concatenate([[0.0], np.cumsum([values[f"disks.pitch_{k}"] for k in range(1, n_disk + 1)])])
+    pitch = [values.get(f"disks.pitch_{k}", values.get("disks.pitch", 0.0)) for k in range(1, n_disk + 1)]
+    disk_z = np.concatenate([[0.0], np.cumsum(pitch)])
     length = float(disk_z[-1])
     backbone = BODIES[str(structure.get("body", "wire"))](values, disk_z)
     spec = _world()
@@ -74,6 +75,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
         length=length,
         bows=not backbone.in_channels,
         frame=Frame.of(values),
+        stiffening=values.get("backbone.stiffening", 0.0),
     )
 
 
@@ -105,7 +107,8 @@ def _checked(structure: Mapping[str, object], values: Mapping[str, float]) -> tu
     else:
         raise DataError(f'structure: markers is {markers!r}; "disk" or a list of disks from 1 to {n_disk} is needed')
     stations = sum(name.startswith("backbone.station_") for name in values)
-    lists |= {"disks.pitch": n_disk, "tendons.angle": n_tendon, **dict.fromkeys(body.STATIONS, max(stations, 2))}
+    lists |= {} if "disks.pitch" in values else {"disks.pitch": n_disk}
+    lists |= {"tendons.angle": n_tendon, **dict.fromkeys(body.STATIONS, max(stations, 2))}
     needed = {*body.SCALARS, *(f"{name}_{k}" for name, n in lists.items() for k in range(1, n + 1))}
     if missing := sorted(needed - set(values)):
         raise DataError(f"parameter {missing[0]!r} is missing; {n_disk} disks and {n_tendon} tendons need it")

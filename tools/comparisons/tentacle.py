@@ -1,0 +1,78 @@
+"""The soft tentacle: leave one hold out, single tendons against both, and the learned remainder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from tools.comparisons.row import Row
+from tools.importers import tentacle
+from twin.bench import Bench, prepare
+from twin.calibrate import fit
+from twin.diagnose import Diagnosis, Settings, diagnose
+from twin.diagnose.objective import objective_of
+from twin.learn import Remainder
+from twin.measurements import Recording
+from twin.robots import load
+from twin.twin import Twin, readings, report, simulate
+
+HOOKE = {"backbone.stiffening": 0.0}
+SETTINGS = Settings(jobs=1)
+
+
+def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
+    recording, dropped = tentacle.read(folder)
+    print(f"tentacle: {len(recording.trials)} holds\n{dropped}\n  {recording.notices[0]}")
+    bench = prepare(recording, load("tentacle"))
+    began = perf_counter()
+    diagnosis = diagnose(recording, Twin(bench.robot), SETTINGS)
+    spent = perf_counter() - began
+    pulls = np.stack([i.command[0] for i in bench.inputs])
+    n, both = len(pulls), np.flatnonzero((pulls > 0).all(axis=1))
+    alone = np.setdiff1d(np.arange(n), both)
+    left, learned = np.empty((n, 12)), np.empty((n, 12))
+    for k in range(n):
+        others = np.delete(np.arange(n), k)
+        twin = calibrated(bench, others, diagnosis.twin.effects)
+        left[k] = residual(bench, twin, [k])[0]
+        learned[k] = left[k] - Remainder.fit(pulls[others], residual(bench, twin, others)).predict(pulls[[k]])[0]
+    hooke, soft = (residual(bench, calibrated(bench, alone, (), values), both) for values in (HOOKE, {}))
+    whole, with_remainder = mean_error(left), mean_error(learned)
+    gain = 1.0 - mean_error(soft) / mean_error(hooke)
+    return [
+        Row("tentacle, leave one of 22 holds out, mean marker error", "<= 10 mm", "<= 6 mm", f"{whole:.2f} mm", whole <= 10, whole
+        <= 6), Row("  by marker, base to tip", "", "", ", ".join(f"{e:.1f}" for e in by_marker(left)) + " mm", None),
+        Row("  with the learned remainder", "<= 7 mm", "<= 4.5 mm", f"{with_remainder:.2f} mm", with_remainder <= 7, with_remainder
+        <= 4.5), Row(
+            "tentacle, single-tendon holds -> two-tendon holds", "15 % below", "40 % below",
+            f"{mean_error(soft):.2f} mm, {100 * gain:.0f} % below Hooke's {mean_error(hooke):.2f} mm", gain >= 0.15, gain >= 0.4,
+        ),
+        Row("tentacle, diagnosis", "<= 5 min", "<= 1 min", f"{spent:.0f} s, {diagnosis.verdict}", spent <= 300, spent <= 60),
+    ], recording, diagnosis  # fmt: skip
+
+
+def calibrated(bench: Bench, rows: Sequence[int] | np.ndarray, effects=(), values=None) -> Twin:
+    """The robot's own parameters (and those of the effects named) fitted to these holds."""
+    start = Twin(bench.robot, values or {}, tuple(effects))
+    model, objective, _ = objective_of(bench, start, [int(k) for k in rows], SETTINGS)
+    return fit(objective, model).model.twin
+
+
+def residual(bench: Bench, twin: Twin, rows: Sequence[int] | np.ndarray) -> np.ndarray:
+    """Measured less predicted (n_hold, 12) m, means over each hold."""
+    rows = [int(k) for k in rows]
+    traces = simulate(twin, bench, trials=rows)
+    off = [bench.measured[k] - readings(bench, report(twin.effects, t.true)) for k, t in zip(rows, traces, strict=True)]
+    return np.stack([r.mean(axis=0) for r in off])
+
+
+def by_marker(off: np.ndarray) -> np.ndarray:
+    """Mean distance (4,) mm over the holds."""
+    return 1e3 * np.linalg.norm(off.reshape(-1, 4, 3), axis=2).mean(axis=0)
+
+
+def mean_error(off: np.ndarray) -> float:
+    return float(by_marker(off).mean())

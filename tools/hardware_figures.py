@@ -1,0 +1,77 @@
+"""Pictures of the hardware rigs for models/<robot>/README.md: measured against predicted. Needs matplotlib.
+
+python -m tools.hardware_figures FOLDER    FOLDER as for tools.hardware
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from tools.comparisons.tentacle import HOOKE, calibrated
+from tools.comparisons.three_cable import with_dead_band
+from tools.importers import tentacle, three_cable
+from twin.bench import Bench, prepare
+from twin.robots import load
+from twin.robots.robot import models_folder
+from twin.twin import Twin, readings, report, simulate
+
+BEFORE, AFTER = "#b0413e", "#1f6f8b"
+
+
+def main(folder: Path) -> None:
+    plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"})
+    draw_tentacle(folder / "tentacle")
+    draw_three_cable(folder / "three-cable")
+
+
+def predicted(bench: Bench, twin: Twin, rows: list[int]) -> list[np.ndarray]:
+    return [readings(bench, report(twin.effects, t.true)) for t in simulate(twin, bench, trials=rows)]
+
+
+def draw_tentacle(folder: Path) -> None:
+    """Two-tendon holds seen from the side, by twins fitted to single-tendon holds."""
+    recording, _ = tentacle.read(folder)
+    bench = prepare(recording, load("tentacle"))
+    pulls = np.stack([i.command[0] for i in bench.inputs])
+    both = [int(k) for k in np.flatnonzero((pulls > 0).all(axis=1))]
+    alone = np.setdiff1d(np.arange(len(pulls)), both)
+    twins = {"Hooke's law": (calibrated(bench, alone, (), HOOKE), BEFORE), "neo-Hookean": (calibrated(bench, alone), AFTER)}
+    figure, axes = plt.subplots(1, 4, figsize=(9.0, 3.0), sharey=True, layout="constrained")
+    for axis, k in zip(axes, sorted(both, key=lambda k: pulls[k].sum())[1::2], strict=True):
+        seen = 1e3 * bench.measured[k].mean(axis=0).reshape(4, 3)
+        axis.plot(seen[:, 0], -seen[:, 2], "ko", ms=4, label="measured")
+        for name, (twin, colour) in twins.items():
+            x = 1e3 * predicted(bench, twin, [k])[0].mean(axis=0).reshape(4, 3)
+            axis.plot(x[:, 0], -x[:, 2], "x", color=colour, ms=6, label=name)
+        axis.set(xlabel="x, mm", aspect="equal", xlim=(-40, 200))
+        axis.set_title(f"{pulls[k, 0]:.1f} and {pulls[k, 1]:.1f} N", fontsize=9, loc="left")
+    axes[0].set_ylabel("height, mm")
+    axes[0].legend(frameon=False, fontsize=7, loc="lower right")
+    figure.savefig(models_folder() / "tentacle/two_tendons.svg", metadata={"Date": None})
+
+
+def draw_three_cable(folder: Path) -> None:
+    """The tip's error along a sweep, for the calibrated robot and with a dead band."""
+    recording, _ = three_cable.read(folder)
+    bench = prepare(recording, load("three_cable"))
+    block = [k for k, i in enumerate(bench.inputs) if i.name.startswith("block1")]
+    base, slack, _ = with_dead_band(bench, block[::2])
+    figure, axis = plt.subplots(figsize=(5.0, 2.8), layout="constrained")
+    for twin, colour, name in ((base, BEFORE, "calibrated"), (slack, AFTER, "with a dead band")):
+        off = np.stack([bench.measured[k] - y for k, y in zip(block[1::2], predicted(bench, twin, block[1::2]), strict=True)])
+        pull = 1e3 * bench.inputs[block[1]].command[:, 2]
+        axis.plot(pull, 1e3 * np.sqrt((off**2).sum(axis=2).mean(axis=0)), ".-", color=colour, label=name)
+    axis.set(xlabel="shortening of cable 3, mm", ylabel="tip error, mm", ylim=(0, None))
+    axis.legend(frameon=False)
+    figure.savefig(models_folder() / "three_cable/sweep.svg", metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,54 @@
+"""The three-cable robot of ARM-Lab: rows a1, a2, a3 (0..100: 0..10 mm of cable), x, y, z (mm, camera frame), in order of the
+experiment.
+
+A sweep, one cable drawn in step by step with the others held, becomes a trial; the fast cable's jump back to 0 separates them.
+There are no time stamps: a row counts as a second. The first rows of a sweep are all kept, for the dead band is there, then one in
+`THIN`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tools.importers.importer import Dropped
+from twin.measurements import Channel, Recording, Trial
+
+PER_STEP = 1e-4  # m of cable per unit of action
+NOISE = 5e-5  # m: second differences of neighbouring rows (README: 0.04-0.06 mm)
+FIRST, THIN = 8, 6  # rows kept at a sweep's start; of the rest one in so many
+EVERY = 7  # one sweep in so many is taken
+BLOCK = 10200  # rows of the first block
+SHORTEST = 20  # rows of a sweep worth a trial: the last one of the file is cut off
+
+
+def read(folder: Path) -> tuple[Recording, Dropped]:
+    """Every `EVERY`th sweep as a trial, named block_a1_a2_a3 by the held cables, and what was left out."""
+    rows = np.loadtxt(folder / "Dataset.txt.gz", delimiter=",")
+    starts = np.flatnonzero(np.any(np.diff(rows[:, :3], axis=0) < 0, axis=1)) + 1
+    sweeps = np.split(np.arange(len(rows)), starts)
+    dropped, trials, thinned = Dropped(), [], 0
+    whole = [s for s in sweeps if len(s) >= SHORTEST]
+    dropped.count(
+        "Dataset.txt", f"sweeps shorter than {SHORTEST} rows", sum(len(s) for s in sweeps if len(s) < SHORTEST), len(rows)
+    )
+    taken = whole[::EVERY]
+    dropped.count("Dataset.txt", f"all but one sweep in {EVERY}", sum(map(len, whole)) - sum(map(len, taken)), 0)
+    for sweep in taken:
+        kept = np.r_[sweep[:FIRST], sweep[FIRST::THIN]]
+        thinned += len(sweep) - len(kept)
+        action, tip = rows[kept, :3], 1e-3 * rows[kept, 3:]
+        fast = int(np.argmax(np.ptp(action, axis=0)))
+        held = "_".join("x" if i == fast else f"{int(a)}" for i, a in enumerate(action[0]))
+        values = {f"tendon_{i + 1}_displacement": PER_STEP * action[:, i] for i in range(3)}
+        values |= {f"marker_1_{axis}": tip[:, j] for j, axis in enumerate("xyz")}
+        block = 1 if sweep[0] < BLOCK else 2
+        trials.append(Trial(f"block{block}_{held}.csv", (kept - kept[0]).astype(float), values, start=float(sweep[0])))
+    dropped.count("Dataset.txt", f"beyond row {FIRST} of a sweep all but one in {THIN}", thinned, 0)
+    channels = [Channel(f"tendon_{i}_displacement", "input", "mm", 5e-6) for i in (1, 2, 3)]
+    channels += [Channel(f"marker_1_{axis}", "output", "mm", NOISE) for axis in "xyz"]
+    return Recording(
+        "three_cable", "ARM-Lab three-cable robot", "hardware: ARM-Lab, Learning-Based-Position-Control, MIT licence", None,
+        tuple(channels), tuple(trials),
+    ), dropped  # fmt: skip
