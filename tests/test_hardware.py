@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.importers import tentacle, three_cable
+from tools.comparisons import cable_tool as transmission
+from tools.importers import cable_tool, tentacle, three_cable
 from twin.bench import prepare
 from twin.learn import Remainder
-from twin.measurements import read, write
+from twin.measurements import Trial, read, write
 from twin.robots import load
 
 RAW = Path(__file__).resolve().parents[2] / "shared/measured"
@@ -57,6 +58,33 @@ def test_sweeps_of_the_three_cable_robot_rise_with_one_cable_and_stay_in_their_b
         assert 0.0 <= pulls.min() <= pulls.max() <= 0.0101  # m: 10 mm of cable
         assert (pulls[0] == 0).all() == trial.name.startswith("block1")
     prepare(recording, load("three_cable"))
+
+
+def test_runs_of_the_cable_tool_have_the_measured_loads_and_loops(raw: Path) -> None:
+    """Loads and loop widths are those that the data's README gives, found there by another program."""
+    recording, dropped = cable_tool.read(raw / "cable-tool")
+    assert len(recording.trials) == 20
+    load = {10: 0.010, 20: 0.022, 30: 0.034, 40: 0.046}  # N m
+    loop = {10: (5.9, 6.2), 20: (3.9, 4.2), 30: (3.0, 3.3), 40: (3.1, 3.4)}  # deg, over all rates
+    for trial in recording.trials:
+        percent = int(trial.name[4:6])
+        assert trial.values["joint_2_torque"].mean() == pytest.approx(load[percent], abs=1.5e-3)  # given to a thousandth
+        width = transmission.width(trial, trial.values["joint_2_angle"])
+        low, high = loop[percent]
+        assert low - 0.8 < width < high + 0.8  # deg: its middle is ours, a fifth of the stroke; theirs is not said
+    assert all(n > 0 for _, reason, n, _ in dropped.rows if reason == "start-up transient")
+
+
+def test_the_transmission_without_friction_has_no_loop() -> None:
+    t = np.linspace(0, 20, 501)
+    values = {"joint_1_angle": np.sin(t), "joint_2_torque": np.full(501, 0.02)}
+    run = Trial("made", t, values)
+    law = {name: prior[0] for name, prior in transmission.PRIOR.items()}
+    # deg: what the sampling of the two ways leaves
+    assert transmission.width(run, transmission.predict(law | {"f0": 0.0, "mu": 0.0}, run)) < 1e-6
+    # under a torque far above the seat both ways lie on the elastic line, 2 f / k apart
+    stiff = law | {"seat": 0.003, "mu": 0.0, "f0": 0.01, "delta": 0.005}
+    np.testing.assert_allclose(transmission.width(run, transmission.predict(stiff, run)), np.rad2deg(0.02), rtol=0.02)
 
 
 def test_the_remainder_learns_what_is_smooth_and_leaves_noise_alone() -> None:

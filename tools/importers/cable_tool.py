@@ -1,0 +1,52 @@
+"""The cable-driven da Vinci tool of MRDLab: angle and torque at both ends of a long cable pair, 1 kHz, 20 s a run.
+
+A run is a trial: means over `MEAN` rows (25 Hz: the motion is at 0.5 Hz at most), without the start-up transient. Angles and
+torques keep the sign of their own sensor.
+"""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+
+from tools.importers.importer import Dropped
+from twin.measurements import Channel, Recording, Trial
+
+TOOL = "Tool_4_Maryland_R_5"
+RATES = (0.1, 0.2, 0.3, 0.4, 0.5)  # Hz, first digit of a file's name
+LOADS = (10, 20, 30, 40)  # per cent, second digit
+START_UP = 1.0  # s
+MEAN = 40  # rows
+IN_TURN, OUT_TURN = 8192.0, 4000.0  # counts a turn, encoders at input and output
+TORQUE = 3.9811e-5  # N m a count, both cells
+
+
+def read(folder: Path) -> tuple[Recording, Dropped]:
+    """The twenty runs of one tool at five rates and four loads, named by both, and what was left out."""
+    dropped, trials = Dropped(), []
+    for i, rate in enumerate(RATES):
+        for j, load in enumerate(LOADS):
+            name = f"{TOOL}/{i}{j}.TXT.gz"
+            with gzip.open(folder / name, "rt", encoding="latin-1") as file:
+                rows = np.loadtxt(file, delimiter=",", comments="%")
+            kept = rows[rows[:, 0] > START_UP]
+            dropped.count(name, "start-up transient", len(rows) - len(kept), len(rows))
+            whole = len(kept) // MEAN * MEAN
+            dropped.count(name, f"left over from means of {MEAN}", len(kept) - whole, 0)
+            mean = kept[:whole].reshape(-1, MEAN, rows.shape[1]).mean(axis=1)
+            values = {
+                "joint_1_angle": 2 * np.pi / IN_TURN * mean[:, 1],
+                "joint_1_torque": TORQUE * mean[:, 2],
+                "joint_2_angle": 2 * np.pi / OUT_TURN * mean[:, 4],
+                "joint_2_torque": TORQUE * mean[:, 5],
+            }
+            label = f"load{load}_{rate:.1f}Hz.csv"
+            trials.append(Trial(label, mean[:, 0], values, other={"load": f"{load} %", "rate": f"{rate} Hz"}))
+    channels = (
+        Channel("joint_1_angle", "input", "deg"), Channel("joint_2_torque", "input", "N*m"),
+        Channel("joint_2_angle", "output", "deg", float(np.deg2rad(360 / OUT_TURN))), Channel("joint_1_torque", "output", "N*m"),
+    )  # fmt: skip
+    source = "hardware: MRDLab/mis-tool-characterization, Tool 4, ODbL (O'Neill, Stephens, Kowalewski, RA-L 2018)"
+    return Recording("cable_tool", "MRDLab cable tool", source, None, channels, tuple(trials)), dropped
