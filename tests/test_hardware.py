@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import warnings
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from twin.learn import Remainder
 from twin.measurements import Trial, read, write
 from twin.robots import load
 
-RAW = Path(__file__).resolve().parents[2] / "shared/measured"
+RAW = Path(os.environ.get("TWIN_MEASURED", Path(__file__).resolve().parents[2] / "shared/measured"))
 
 
 @pytest.fixture

@@ -79,7 +79,7 @@ def _starts(robot: LoadedRobot, tip: np.ndarray, limit: float, by_sector: bool) 
     nt = robot.n_tendon
     chain = robot.solver.chain
     lever = float(np.linalg.norm(chain.site[chain.hole[0, 0], :2]))
-    bends = chain.stiffness[chain.slender > 0.0]  # two hinges a joint set, K = EI / h
+    bends = chain.stiffness[(chain.hinge > 0.0) & ~chain.twists]  # two hinges a joint set, K = EI / h
     theta = 2.0 * math.atan2(math.hypot(tip[0], tip[1]), tip[2])
     want = theta / float((1.0 / bends[::2]).sum()) / lever  # EI theta / length: the sets are springs in a row
     towards = math.atan2(tip[1], tip[0])
