@@ -8,6 +8,7 @@ evidence.py    named effects against "some smooth error"
 identifiability.py  what these data cannot tell
 screen.py      which effects are worth a refit
 search.py      beam search over sets of effects
+rigs.py        whether the trials come from one robot
 describe.py    what is left, in words
 held_out.py    the error on unseen trials
 verdict.py     gates, the verdict, and its numbers

@@ -13,12 +13,14 @@ import numpy as np
 from twin.bench import Bench
 from twin.diagnose.evidence import COMPONENTS, IN_WORDS, Discrepancy
 from twin.diagnose.null import Thresholds
+from twin.diagnose.rigs import Rigs
 
 ALIKE = 1.5  # ratio of the largest marker error to the smallest that counts as none
 ALONE = 3.0  # ratio of the largest marker error to the next: that marker alone is off (errors that grow along the body: some 8/7)
 TWICE = 2.0  # the square of both jumps at the ends of an interval over that of any other: the bending is wrong there
 SHUFFLES = 999  # orders of the trials of which none may show so clear a step: one chance in a thousand
 STEP = 0.2  # of the trials' scatter a step in time may leave; of a steady drift the best step leaves a quarter
+SHOWN = 6  # trials named one by one
 NEAR = 0.1  # of the held-out error a known effect must take off to be worth a hint
 
 
@@ -71,6 +73,17 @@ def since(bench: Bench, trials: Sequence[int], z: np.ndarray) -> str:
     minutes = f"{(last.clock[-1] - start) / 60:.0f} to {(first.clock[0] - start) / 60:.0f} min into the session"
     between = f"between {label[last.name]} and {label[first.name]}, {minutes}"
     return f" The calibrated robot's error changed at once {between}: what moved then?"
+
+
+def mixed(bench: Bench, rigs: Rigs) -> str:
+    """Two rigs' data in one set, in words."""
+    label = {t.name: t.label for t in bench.recording.trials}
+    few = ", ".join(label[bench.inputs[k].name] for k in rigs.other[:SHOWN])
+    more = f" and {len(rigs.other) - SHOWN} more" if len(rigs.other) > SHOWN else ""
+    return (
+        f" The trials want two different robots, {len(rigs.one)} the one, {len(rigs.other)} the other ({few}{more}), more than "
+        "any known effect: are two rigs in this set, or was it rebuilt? Diagnose the two groups apart."
+    )
 
 
 def unlike(unseen: float, seen: float) -> str:

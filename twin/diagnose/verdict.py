@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Objective, fit
-from twin.diagnose.describe import change, components, describe, misbent, nearest, since, unlike, where, worst_channel
+from twin.diagnose.describe import change, components, describe, misbent, mixed, nearest, since, unlike, where, worst_channel
 from twin.diagnose.diagnosis import Claim, Diagnosis, Settings
 from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import next_experiment
@@ -16,6 +16,7 @@ from twin.diagnose.held_out import HeldOut
 from twin.diagnose.identifiability import identifiability
 from twin.diagnose.null import ACCEPT, Thresholds, thresholds
 from twin.diagnose.objective import objective_of
+from twin.diagnose.rigs import rigs
 from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
@@ -71,8 +72,11 @@ def diagnose(
     off, z = base.discrepancy.mean * objective.whitener.noise.sigma, base.fit.z.reshape(base.discrepancy.mean.shape)
     calibrated = [predictions["calibrated"][k] for k in fitted]
     strange = before > bars.left and (bool(misbent(bench, fitted, off, calibrated)) or change(bench, fitted, z) is not None)
+    apart = rigs(bench, fitted, base.fit)
+    if apart is not None and apart.fall < base.fit.cost - best.fit.cost:  # what the effects explain needs no second robot
+        apart = None
     unseen, floor = held_out.structure(best.fit.model.twin)
-    verdict = _verdict(added, before, after, unseen, line[0], bars, strange)
+    verdict = "unexplained" if apart else _verdict(added, before, after, unseen, line[0], bars, strange)
     if added and held_out.error(best.fit.model.twin) > held_out.error(base.fit.model.twin):  # it makes unseen trials worse
         verdict = _verdict((), before, before, held_out.structure(base.fit.model.twin)[0], line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
@@ -107,6 +111,7 @@ def diagnose(
         description = describe(bench, fitted, left, final.discrepancy, strongest[0][0], line, bars)
         description += where(bench, fitted, off, calibrated) if before > bars.left else ""
         description += since(bench, fitted, z)
+        description += mixed(bench, apart) if apart else ""
         description += unlike(unseen, final.discrepancy.size) if unseen > max(MUCH, bars.left) else ""
         if runners:
             share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)
@@ -138,7 +143,7 @@ def diagnose(
         fitted_trials=tuple(fitted),
         held_trials=tuple(held),
         predictions=predictions,
-        notices=(*notices, *_unlikely(final.fit)),
+        notices=(*notices, *_unlikely(final.fit), *([mixed(bench, apart).strip()] if apart else [])),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.all),
     )
