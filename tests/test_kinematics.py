@@ -111,6 +111,23 @@ def test_a_limit_is_kept_and_named() -> None:
     assert "tendon 2 would need more than the 2 N allowed" in answer.reason
 
 
+@both
+def test_tendons_that_need_not_pull_keep_what_they_rest_at(twin: Twin) -> None:
+    """Springs are never slack: what three resting tendons and two that pull more reach is found again, none below its rest."""
+    rng = np.random.default_rng(6)
+    robot, other = LoadedRobot(twin, SIDEWAYS), LoadedRobot(twin, SIDEWAYS)
+    for _ in range(10):
+        resting = rng.uniform(0.5, 1.5, 3)
+        tension = resting + rng.uniform(0.0, 2.0, 3) * rng.permutation([1.0, 1.0, 0.0])
+        there = other.pull(tension).tip
+        answer = inverse(robot, there, resting=resting)
+        assert answer.reason is None
+        assert answer.tension.min() >= resting.min() - 1e-9
+        assert (answer.tension - resting > 1e-9).sum() <= 2
+        assert answer.tension == pytest.approx(tension, abs=0.02)  # one answer, as without resting tensions
+        robot.pull(tension)
+
+
 def test_no_point_is_refused() -> None:
     with pytest.raises(TwinError, match="three finite numbers"):
         inverse(LoadedRobot(PLAIN), np.array([0.0, np.nan, 0.1]))

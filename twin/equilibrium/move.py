@@ -79,8 +79,8 @@ def answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gra
 
 
 @jit
-def seek(model, data, chain, rest, law, load, target, used, limit, tol, near, T0, q0, z0, s0, T, q, z, s, LU):
-    """Tensions T of the tendons in `used` (n_tendon,), between 0 and `limit` N, whose tip comes nearest to `target` (3,) m when
+def seek(model, data, chain, rest, law, load, target, used, least, limit, tol, near, T0, q0, z0, s0, T, q, z, s, LU):
+    """Tensions T of the tendons in `used` (n_tendon,), between `least` (n_tendon,) and `limit` N, whose tip comes nearest to `target` (3,) m when
     pulled at once from the state (T0, q0, z0, s0); T and q hold a first guess. Returns the distance (m), negative where lost.
 
     Bounded, damped Gauss-Newton, its steps halved while they lead away.
@@ -108,7 +108,7 @@ def seek(model, data, chain, rest, law, load, target, used, limit, tol, near, T0
             if share < 1e-3:
                 break
             for t in range(nt):
-                T[t] = min(limit, max(0.0, best_T[t] + share * dT[t]))
+                T[t] = min(limit, max(least[t], best_T[t] + share * dT[t]))
             assign(q, best_q)
             fresh[0] = False
             continue
@@ -121,10 +121,10 @@ def seek(model, data, chain, rest, law, load, target, used, limit, tol, near, T0
         fresh[0] = True
         for t in range(nt):
             free[t] = used[t]
-        step(gradient[:, 0], error, T, limit, free, dT)
+        step(gradient[:, 0], error, T, least, limit, free, dT)
         moved = 0.0
         for t in range(nt):
-            new = min(limit, max(0.0, T[t] + dT[t]))
+            new = min(limit, max(least[t], T[t] + dT[t]))
             moved = max(moved, abs(new - T[t]))
             T[t] = new
         if moved < 1e-7:
@@ -135,8 +135,8 @@ def seek(model, data, chain, rest, law, load, target, used, limit, tol, near, T0
 
 
 @jit
-def step(gradient, error, T, limit, free, dT):
-    """The Gauss-Newton step dT of the free tendons; one that would leave [0, limit] from its end of it is held there."""
+def step(gradient, error, T, least, limit, free, dT):
+    """The Gauss-Newton step dT of the free tendons; one that would leave [least, limit] from its end of it is held there."""
     nt = T.size
     for _ in range(nt + 1):
         A = np.zeros((nt, nt))
@@ -155,7 +155,7 @@ def step(gradient, error, T, limit, free, dT):
         dT[:] = np.linalg.solve(A, dT)
         held = False
         for i in range(nt):
-            if free[i] and ((T[i] <= 0.0 and dT[i] < 0.0) or (T[i] >= limit and dT[i] > 0.0)):
+            if free[i] and ((T[i] <= least[i] and dT[i] < 0.0) or (T[i] >= limit and dT[i] > 0.0)):
                 free[i] = False
                 held = True
         if not held:
@@ -163,7 +163,7 @@ def step(gradient, error, T, limit, free, dT):
 
 
 @jit
-def refine(model, data, chain, rest, law, load, target, used, limit, tol, near, stride, T0, q0, z0, s0, T, q, z, s, LU):
+def refine(model, data, chain, rest, law, load, target, used, least, limit, tol, near, stride, T0, q0, z0, s0, T, q, z, s, LU):
     """As `seek`, from its answer T, but moving as `move` does, in parts of `stride` N, whose friction is the one that counts.
 
     Returns the distance (m), negative where lost.
@@ -192,7 +192,7 @@ def refine(model, data, chain, rest, law, load, target, used, limit, tol, near, 
         if size >= best:
             share *= 0.5
             for t in range(nt):
-                goal[t] = min(limit, max(0.0, best_T[t] + share * dT[t]))
+                goal[t] = min(limit, max(least[t], best_T[t] + share * dT[t]))
             continue
         best, share = size, 1.0
         assign(best_T, T)
@@ -200,8 +200,8 @@ def refine(model, data, chain, rest, law, load, target, used, limit, tol, near, 
             break
         for t in range(nt):
             free[t] = used[t]
-        step(gradient[:, 0], error, T, limit, free, dT)
+        step(gradient[:, 0], error, T, least, limit, free, dT)
         for t in range(nt):
-            goal[t] = min(limit, max(0.0, T[t] + dT[t]))
+            goal[t] = min(limit, max(least[t], T[t] + dT[t]))
     assign(T, best_T)
     return best if best < 1e299 else -1.0

@@ -31,18 +31,23 @@ class Reach:
     reason: str | None
 
 
-def inverse(robot: LoadedRobot, tip: np.ndarray, *, limit: float = 4.0, within: float = 1e-4, by_sector: bool = True) -> Reach:
+def inverse(
+    robot: LoadedRobot, tip: np.ndarray, *, limit: float = 4.0, within: float = 1e-4, by_sector: bool = True,
+    resting: np.ndarray | None = None,
+) -> Reach:  # fmt: skip
     """The tensions, each from 0 to `limit` N, that move the robot's tip from where it stands to `tip` (3,) m in the base frame.
 
-    The robot does not move: `pull` it to the answer. A tip that is not found `within` (m) comes back with the nearest there is
+    `resting` (n_tendon,) N are load-cell readings below which no tendon can go, as a cold SMA spring's: those that need not pull
+    keep them, and at most two pull more. Nothing by default: slack. The robot does not move: `pull` it to the answer. A tip that is not found `within` (m) comes back with the nearest there is
     and the reason. Raises TwinError for a point that is none.
     """
     tip = np.asarray(tip, float)
     if tip.shape != (3,) or not np.isfinite(tip).all():
         raise TwinError(f"a tip position is {tip.tolist()}; three finite numbers in metres are needed")
+    least = np.zeros(robot.n_tendon) if resting is None else robot.true(np.asarray(resting, float)) * robot.softness
     nearest: tuple[float, np.ndarray] | None = None
-    for used, guess in _starts(robot, tip, limit, by_sector):
-        distance, tension = _sought(robot, tip, used, guess, limit)
+    for used, guess in _starts(robot, tip, least, limit, by_sector):
+        distance, tension = _sought(robot, tip, used, guess, least, limit)
         if nearest is None or distance < nearest[0]:
             nearest = distance, tension
         if distance < within:
@@ -70,11 +75,13 @@ def _directions(robot: LoadedRobot) -> np.ndarray:
     return np.mod(np.arctan2(holes[:, 1], holes[:, 0]) + 1e-9, 2 * np.pi)
 
 
-def _starts(robot: LoadedRobot, tip: np.ndarray, limit: float, by_sector: bool) -> list[tuple[np.ndarray, np.ndarray]]:
+def _starts(
+    robot: LoadedRobot, tip: np.ndarray, least: np.ndarray, limit: float, by_sector: bool
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Which tendons may pull, and a first guess of their tensions, the likeliest first.
 
     A bend of constant curvature k = theta / length with its tip at (rho, z) has theta = 2 atan2(rho, z); its moment is EI k, of
-    which each tendon gives tension times lever arm towards its side.
+    which each tendon gives tension times lever arm towards its side. What resting tendons give is there already.
     """
     nt = robot.n_tendon
     chain = robot.solver.chain
@@ -84,16 +91,17 @@ def _starts(robot: LoadedRobot, tip: np.ndarray, limit: float, by_sector: bool) 
     want = theta / float((1.0 / bends[::2]).sum()) / lever  # EI theta / length: the sets are springs in a row
     towards = math.atan2(tip[1], tip[0])
     angle = _directions(robot)
+    side = np.stack([np.cos(angle), np.sin(angle)])
+    lacking = want * np.array([math.cos(towards), math.sin(towards)]) - side @ least / robot.softness
+    towards = math.atan2(lacking[1], lacking[0])
     out = []
     ranked = sorted(sectors(robot), key=lambda s: -_enclosed(angle[s[1]], angle[s[2]], towards))
     for _, i, j in ranked:
         used = np.zeros(nt, bool)
         used[[i, j]] = True
-        M = np.array([[math.cos(angle[i]), math.cos(angle[j])], [math.sin(angle[i]), math.sin(angle[j])]])
-        pair = np.linalg.lstsq(M, want * np.array([math.cos(towards), math.sin(towards)]), rcond=None)[0]
-        guess = np.zeros(nt)
-        guess[[i, j]] = np.clip(pair, 0.0, 0.9 * limit)
-        out.append((used if by_sector else np.ones(nt, bool), guess * robot.softness))
+        guess = least / robot.softness
+        guess[[i, j]] += np.clip(np.linalg.lstsq(side[:, [i, j]], lacking, rcond=None)[0], 0.0, 0.9 * limit)
+        out.append((used if by_sector else np.ones(nt, bool), np.minimum(guess, limit) * robot.softness))
     return out
 
 
@@ -104,16 +112,18 @@ def _enclosed(a: float, b: float, direction: float) -> float:
     return min(inside, span - inside) if inside <= span else -min(inside - span, 2 * math.pi - inside)
 
 
-def _sought(robot: LoadedRobot, tip: np.ndarray, used: np.ndarray, guess: np.ndarray, limit: float) -> tuple[float, np.ndarray]:
+def _sought(
+    robot: LoadedRobot, tip: np.ndarray, used: np.ndarray, guess: np.ndarray, least: np.ndarray, limit: float
+) -> tuple[float, np.ndarray]:
     T0, q0, z0, s0 = robot.state()
     T, q, z, s = guess.copy(), q0.copy(), z0.copy(), s0.copy()
     distance = seek(
-        *robot.statics, tip, used, limit * robot.softness, TOLERANCE, NEAR,
+        *robot.statics, tip, used, least, limit * robot.softness, TOLERANCE, NEAR,
         T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU),
     )  # fmt: skip
     if distance >= 0.0 and robot.law.mu > 0.0:
         distance = refine(
-            *robot.statics, tip, used, limit * robot.softness, TOLERANCE,
+            *robot.statics, tip, used, least, limit * robot.softness, TOLERANCE,
             NEAR, STRIDE, T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU),
         )  # fmt: skip
     return (float(distance) if distance >= 0.0 else math.inf), T
