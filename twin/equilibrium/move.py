@@ -14,6 +14,7 @@ from twin.equilibrium.lengths import pulls
 from twin.equilibrium.linear import substitute
 from twin.equilibrium.newton import is_minimum, newton, place, solve
 
+STRIDE = 0.5  # N: the largest part; 0.5 against 0.02 moves the tip by less than 0.1 mm (tests/test_kinematics.py)
 SHORTEST = 1.0 / 16.0  # of a part: below it the robot is let go where it wants
 TRIALS = 25  # Gauss-Newton steps of `seek`
 CORRECTIONS = 12  # of its answer, the way there considered
@@ -22,7 +23,7 @@ STALLED = 0.9  # of the error: a step that leaves more has found the nearest poi
 
 
 @jit
-def move(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh):
+def pull(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh):
     """Advance the state (T, q, z, s) to tensions `goal` (n_tendon,) N in parts of at most `stride` N; 0 where lost."""
     nt, longest = T.size, 0.0
     start, before, last = T.copy(), q.copy(), q.copy()
@@ -51,6 +52,30 @@ def move(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU,
             return 1
         longer = min(whole, 2.0 * part, 1.0 - done)
         part, parted = longer, longer / part
+
+
+@jit
+def onward(model, data, chain, rest, law, load, T0, q0, tol, T, q, z, s, LU, fresh):
+    """Equilibrium at tensions T from the guess q; where Newton does not lead there, from the state (T0, q0) before by `pull`.
+
+    Short pre-sliding and large steps from sample to sample leave Newton no way, and what a robot let go of does on its own is not
+    what a pulled one does. Returns 1, 2 where it was pulled, 0 where lost.
+    """
+    if newton(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, 0.0, q0, tol) > 0:
+        return 1
+    goal, z0, s0 = T.copy(), z.copy(), s.copy()
+    assign(T, T0)
+    assign(q, q0)
+    fresh[0] = False
+    if pull(model, data, chain, rest, law, load, goal, STRIDE, tol, T, q, z, s, LU, fresh) == 1:
+        return 2
+    for t in range(T.size):  # it snaps over on the way
+        assign(z[t], z0[t])
+        assign(s[t], s0[t])
+    assign(T, goal)
+    assign(q, q0)
+    fresh[0] = False
+    return solve(model, data, chain, rest, T, law, load, z, s, q, LU, fresh, tol)
 
 
 @jit
@@ -164,7 +189,7 @@ def step(gradient, error, T, least, limit, free, dT):
 
 @jit
 def refine(model, data, chain, rest, law, load, target, used, least, limit, tol, near, stride, T0, q0, z0, s0, T, q, z, s, LU):
-    """As `seek`, from its answer T, but moving as `move` does, in parts of `stride` N, whose friction is the one that counts.
+    """As `seek`, from its answer T, but moving as `pull` does, in parts of `stride` N, whose friction is the one that counts.
 
     Returns the distance (m), negative where lost.
     """
@@ -180,7 +205,7 @@ def refine(model, data, chain, rest, law, load, target, used, least, limit, tol,
             assign(z[t], z0[t])
             assign(s[t], s0[t])
         fresh[0] = False
-        if move(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh) == 0:
+        if pull(model, data, chain, rest, law, load, goal, stride, tol, T, q, z, s, LU, fresh) == 0:
             break
         place(model, data, chain, q)
         tip = chain.site[chain.disk[-1]]

@@ -23,7 +23,7 @@ GROWTH = 3.0  # a Newton step that lets the residual grow more than this is halv
 LOST = 1e9  # rad: a residual beyond it is a diverged step
 LONGEST_STEP = 0.5  # rad, of any hinge
 NEWTON_STEPS = 30
-CYCLES = 3  # full steps with a fresh tangent that do not halve the residual: it goes round a kink of friction or a wall
+CYCLES = 7  # full steps with a fresh tangent that do not halve the residual: it goes round a kink of friction or a wall
 FLOW_STEPS = 200
 FLOW_TOLERANCE = 1e-6  # rad, of the steps on the way
 

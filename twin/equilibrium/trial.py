@@ -17,6 +17,7 @@ from twin.effects.backbone_creep import retard
 from twin.equilibrium.chain import Law, Load, balance
 from twin.equilibrium.elastic import bendings
 from twin.equilibrium.lengths import Held, hold_once, move, reach, remember, tangent
+from twin.equilibrium.move import onward
 from twin.equilibrium.newton import follow, is_minimum, place, solve, step_once
 from twin.springs.heat import heated
 from twin.springs.spring import Spring
@@ -90,7 +91,7 @@ def run(
     """
     n, nv, nt = drive.time.size, spring.size, drive.command.shape[1]
     q, q1, q2, rest, instant = np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv), np.empty(nv)
-    LU, fresh, T, free = np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt), drive.straight.copy()
+    LU, fresh, T, T1, free = np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt), np.zeros(nt), drive.straight.copy()
     which, held_by, warm = np.zeros(nt, np.bool_), np.zeros(nt, np.bool_), np.full(nt, drive.ambient[0])
     by_spring = False
     for t in range(nt):
@@ -156,7 +157,10 @@ def run(
                 )  # fmt: skip
                 remember(held, s, T)
             else:
-                found = solve(model, data, chain, rest, T, now_law, now_load, z, s, q, LU, fresh, RAMP_TOLERANCE)
+                for t in range(nt):
+                    T1[t] = factor * drive.command[0, t] * ((k - 1) / steps)
+                assign(q1, q)
+                found = onward(model, data, chain, rest, now_law, now_load, T1, q1, RAMP_TOLERANCE, T, q, z, s, LU, fresh)
             if found == 0:
                 started = 0
     assign(q1, q)
@@ -200,7 +204,9 @@ def run(
         elif once and guess.size:
             status[i] = step_once(model, data, chain, rest, T, now_law, now_load, z, s, q, LU)
         else:
-            status[i] = solve(model, data, chain, rest, T, now_law, now_load, z, s, q, LU, fresh, tol)
+            for t in range(nt):
+                T1[t] = factor * drive.command[max(0, i - 1), t]
+            status[i] = onward(model, data, chain, rest, now_law, now_load, T1, q1, tol, T, q, z, s, LU, fresh)
         if status[i] == 0:
             assign(q, q1)
         if keep:

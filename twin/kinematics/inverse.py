@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.equilibrium import TOLERANCE
-from twin.equilibrium.move import refine, seek
+from twin.equilibrium.move import STRIDE, refine, seek
 from twin.errors import SolveError, TwinError
-from twin.kinematics.robot import STRIDE, LoadedRobot, Shape
+from twin.kinematics.robot import LoadedRobot, Shape
 
 NEAR = 1e-6  # m: where the search stops
 

@@ -13,12 +13,11 @@ import numpy as np
 from twin.effects import Loads, Signals
 from twin.equilibrium import TOLERANCE, Equilibrium
 from twin.equilibrium.chain import Law, Load
-from twin.equilibrium.move import answer, move
+from twin.equilibrium.move import STRIDE, answer, pull
 from twin.equilibrium.newton import place
 from twin.errors import SolveError
 from twin.twin import Twin, merged_route
 
-STRIDE = 0.5  # N: the largest step of a tension on the way; 0.5 against 0.02 moves the tip as tests/test_kinematics.py says
 ROOM = 296.15  # K
 
 
@@ -86,7 +85,7 @@ class LoadedRobot:
         """
         goal = np.maximum(self.true(np.asarray(tension, float)), 0.0) * self.softness
         T, q, z, s = self.state()
-        ok = move(
+        ok = pull(
             *self.statics, goal, STRIDE, TOLERANCE, T, q, z, s, self.LU,
             self.fresh,
         )  # fmt: skip
@@ -96,7 +95,7 @@ class LoadedRobot:
         return self.shape()
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Copies of (T, q, z, s): what `twin.equilibrium.move` advances."""
+        """Copies of (T, q, z, s): what `twin.equilibrium.move.pull` advances."""
         return self.tension.copy(), self.q.copy(), self.slip.copy(), self.distal.copy()
 
     def restore(self, state: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> None:
@@ -135,7 +134,7 @@ class LoadedRobot:
         self.load = self.load._replace(payload=float(payload))
         self.fresh[0] = False
         T, q, z, s = self.state()
-        if not move(
+        if not pull(
             *self.statics, T.copy(), STRIDE, TOLERANCE, T, q, z, s, self.LU,
             self.fresh,
         ):  # fmt: skip
