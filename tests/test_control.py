@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tools.examples import circle, heat
 from tools.tracking import KNOWN, LENGTH, RADIUS, Bench, Run, attempt, controller, track, unknown
 from twin.control import PI, RBF, Guard, PlainLoop, TensionLoop
 from twin.control.guard import loop_temperatures
@@ -200,3 +202,10 @@ def test_it_knows_of_the_robot_what_its_sensors_say() -> None:
         np.testing.assert_array_equal(again.step(wanted, tension, displacement, 0.05), voltage)
     assert len(seen) > 100
     assert unknown() != KNOWN
+
+
+def test_the_examples_write_their_pages(tmp_path: Path) -> None:
+    heat.main(tmp_path / "heat.html", seconds=60.0)
+    circle.main(tmp_path / "circle.html", until=2.0)
+    for name, title in (("heat", "Tension against temperature (simulation"), ("circle", "mm RMS")):
+        assert title in (tmp_path / f"{name}.html").read_text(encoding="utf-8")

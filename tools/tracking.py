@@ -69,8 +69,7 @@ class Bench:
 
 
 def controller(kind: str, payload: float = 0.0) -> TipController:
-    """`full`, `PI only` (nothing else but inverse kinematics), `no friction` (`full` told mu = 0) or `no tip feedback`, told `payload`
-    (kg)."""
+    """`full`, `PI only` (with inverse kinematics), `no friction` (`full` told mu = 0), `no tip feedback`; told `payload` (kg)."""
     loads, guard = Loads(GRAVITY, payload=payload), Guard(springs(KNOWN), ROOM)
     if kind == "PI only":
         return TipController(KNOWN, loads, PlainLoop(guard), reset=None)

@@ -1,0 +1,1 @@
+"""Short scripts, one a capability; each writes a page to look at."""
