@@ -15,6 +15,8 @@ from twin.evaluate import rms, squares
 from twin.residual import Noise, Whitener
 from twin.twin import Twin, readings, report, simulate
 
+ODD = 1.0  # sigma
+
 
 class HeldOut:
     """The held-out trials, and what twins predict of them."""
@@ -41,12 +43,23 @@ class HeldOut:
 
     def structure(self, twin: Twin) -> tuple[float, dict[str, float]]:
         """The smooth error (sigma) the twin makes here, and the RMS by group of outputs that a perfect one would still make."""
-        predicted = self.predict(twin)
+        white, G = self._white(twin, self.predict(twin))
+        return self.evidence.discrepancy(np.concatenate(white)).size, self.noise.floor(self.bench, G)
+
+    def _white(self, twin: Twin, predicted: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """White residuals (n_k, n_output) and sensitivities to the driving readings, one array a trial."""
         G = sensitivity(self.bench, self.trials, twin, predicted)
         measured = [self.bench.measured[k] for k in self.trials]
         white = Whitener(self.noise, measured, G, [self.bench.inputs[k].command for k in self.trials])
-        z = np.concatenate([white.trial(k, r) for k, r in enumerate(self.residual(predicted))])
-        return self.evidence.discrepancy(z).size, self.noise.floor(self.bench, G)
+        return [white.trial(k, r) for k, r in enumerate(self.residual(predicted))], G
+
+    def odd(self, twin: Twin) -> list[int]:
+        """Trials that err by more than `ODD` sigma beyond the noise (RMS)."""
+        try:
+            white = self._white(twin, self.predict(twin))[0]
+        except SolveError:
+            return []
+        return [k for k, z in zip(self.trials, white, strict=True) if float((z[z != 0] ** 2).mean()) > 1.0 + ODD**2]
 
     def errors(self, predictions: dict[str, list[np.ndarray]], floor: dict[str, float], seed: int) -> Errors:
         """Of the predictions (all trials) called nominal, calibrated and after."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import next_experiment
 from twin.diagnose.held_out import HeldOut
 from twin.diagnose.identifiability import identifiability
-from twin.diagnose.null import ACCEPT, Thresholds, thresholds
+from twin.diagnose.null import ACCEPT, LEFT, Thresholds, thresholds
 from twin.diagnose.objective import objective_of
 from twin.diagnose.rigs import rigs
 from twin.diagnose.screen import dictionary
@@ -41,19 +42,20 @@ def diagnose(
     bench = prepare(recording, twin.robot)
     if len(bench.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one held out")
-    fitted, held = split(bench, settings.seed)
     progress("nominal prediction")
     nominal_traces = simulate(twin, bench)
     notices = [
         *bench.notices,
         *(f"{n}: unstable start, its shape is one of several" for n in unstable_starts(bench, nominal_traces)),
     ]
-    progress("noise")
-    start, objective, notes = objective_of(bench, twin, fitted, settings)
+    objective, evidence, base, held_out, notes = _calibrated(bench, twin, settings, (), progress)
+    odd = held_out.odd(base.fit.model.twin) if base.discrepancy.size < LEFT else []
+    if odd and len(odd) < len(bench.inputs) - 1:  # what these trials show would otherwise be seen by no fit
+        shown = ", ".join(bench.inputs[k].name for k in odd)
+        notices.append(f"{shown}: first held out, but unlike all others; fitted, and others held out in turn")
+        objective, evidence, base, held_out, notes = _calibrated(bench, twin, settings, odd, progress)
     notices += notes
-    evidence = Evidence(bench, fitted)
-    progress("calibration")
-    base = weigh(objective, evidence, fit(objective, start, refresh=True))
+    fitted, held = objective.trials, held_out.trials
     patterns = dictionary(objective, base.fit)
     progress("no-effect sets of this design")
     bars = thresholds(objective, evidence, base.fit, patterns, settings.seed)
@@ -61,7 +63,6 @@ def diagnose(
     table = identifiability(objective, base.fit, patterns, bars.material)
     found = search(objective, evidence, base, patterns, bars, progress)
     progress("verdict")
-    held_out = HeldOut(bench, held, objective.whitener.noise)
     found = replace(found, best=_predicting(found, held_out, bars.accept))
     best, dropped, small = _gate(objective, evidence, found, bars.material, progress)
     before, after = base.discrepancy.size, best.discrepancy.size
@@ -147,6 +148,19 @@ def diagnose(
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.all),
     )
+
+
+def _calibrated(
+    bench: Bench, twin: Twin, settings: Settings, shown: Collection[int], progress: Progress
+) -> tuple[Objective, Evidence, Weighed, HeldOut, list[str]]:
+    """The split with the trials `shown` on the fitted side, the noise there, and the robot's own parameters fitted."""
+    fitted, held = split(bench, settings.seed, shown)
+    progress("noise")
+    start, objective, notes = objective_of(bench, twin, fitted, settings)
+    evidence = Evidence(bench, fitted)
+    progress("calibration")
+    base = weigh(objective, evidence, fit(objective, start, refresh=True))
+    return objective, evidence, base, HeldOut(bench, held, objective.whitener.noise), notes
 
 
 def calibration(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str]:
