@@ -38,8 +38,8 @@ def inverse(
     """The tensions, each from 0 to `limit` N, that move the robot's tip from where it stands to `tip` (3,) m in the base frame.
 
     `resting` (n_tendon,) N are load-cell readings below which no tendon can go, as a cold SMA spring's: those that need not pull
-    keep them, and at most two pull more. Nothing by default: slack. The robot does not move: `pull` it to the answer. A tip that is not found `within` (m) comes back with the nearest there is
-    and the reason. Raises TwinError for a point that is none.
+    keep them, and at most two pull more. Nothing by default: slack. The robot does not move: `pull` it to the answer. A tip that is
+    not found `within` (m) comes back with the nearest there is and the reason. Raises TwinError for a point that is none.
     """
     tip = np.asarray(tip, float)
     if tip.shape != (3,) or not np.isfinite(tip).all():
