@@ -106,7 +106,8 @@ def answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gra
 @jit
 def seek(model, data, chain, rest, law, load, target, used, least, limit, tol, near, T0, q0, z0, s0, T, q, z, s, LU):
     """Tensions T of the tendons in `used` (n_tendon,), between `least` (n_tendon,) and `limit` N, whose tip comes nearest to
-    `target` (3,) m when pulled at once from the state (T0, q0, z0, s0); T and q hold a first guess. Returns the distance (m), negative where lost.
+    `target` (3,) m when pulled at once from the state (T0, q0, z0, s0); T and q hold a first guess. Returns the distance (m),
+    negative where lost.
 
     Bounded, damped Gauss-Newton, its steps halved while they lead away.
     """
