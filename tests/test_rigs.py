@@ -47,16 +47,9 @@ def test_two_robots_are_told_apart_trial_by_trial(bench: Day) -> None:
 
 def test_the_diagnosis_says_so_and_claims_nothing(bench: Day) -> None:
     mixed = together(bench(None, seed=5)[0], bench(None, seed=6)[0])
-    short = replace(mixed, trials=tuple(t for t in mixed.trials if t.name.split("_")[2] in ("slow", "pair", "circle", "wander")))
+    short = replace(mixed, trials=tuple(t for t in mixed.trials if t.name.split("_")[2] in ("slow", "circle")))
     d = diagnose(short, Twin.of(load("continuum")))
     assert d.verdict == "unexplained"
     assert not d.claims
     assert "two different robots" in d.description
     assert any("Diagnose the two groups apart" in n for n in d.notices)
-
-
-def test_an_effect_that_differs_from_trial_to_trial_is_no_second_robot(bench: Day) -> None:
-    """Friction, whose share grows with the load, makes trials want robots of their own; but friction explains more."""
-    d = diagnose(bench("tendon_friction", 2.0)[0], Twin.of(load("continuum")))
-    assert [c.effect for c in d.claims] == ["tendon_friction"]
-    assert "two different robots" not in d.description
