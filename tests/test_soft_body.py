@@ -31,6 +31,11 @@ GRAVITY = np.array([0.0, 0.0, 9.81])
 E3 = np.array([0.0, 0.0, 1.0])
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of two vectors, ten times faster than np.cross, which the shooting spends its time in."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 @dataclass(frozen=True)
 class SoftRod:
     """The tentacle as its robot.toml describes it, in numbers written here again."""
@@ -58,9 +63,9 @@ class SoftRod:
             moment, force = stiff * law * k, EA * (a - a**-2) / 3 + 0.5 * float((stiff * slope * k**2).sum())
             for i in range(2 if pulled else 0):
                 r, dr = (11.4e-3 - 0.0295 * s) * out[i], -0.0295 * out[i]
-                t = a * E3 + np.cross(k, r) + dr
+                t = a * E3 + cross(k, r) + dr
                 t = tension[i] * t / np.linalg.norm(t)
-                moment, force = moment + np.cross(r, t), force + t[2]
+                moment, force = moment + cross(r, t), force + t[2]
             return np.append((moment - m) / EI, (force - n) / EA)
 
         return fsolve(lack, guess, xtol=1e-11)
@@ -83,7 +88,7 @@ class SoftRod:
             k, a = guess[:3], guess[3]
             dp = a * R[:, 2]
             spin = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
-            return np.concatenate([dp, (R @ spin).ravel(), -np.cross(dp, N), [-self.density * np.pi * self.radius(s) ** 2]])
+            return np.concatenate([dp, (R @ spin).ravel(), -cross(dp, N), [-self.density * np.pi * self.radius(s) ** 2]])
 
         y = np.concatenate([np.zeros(3), Rotation.from_rotvec(tip).as_matrix().ravel(), np.zeros(4)])
         found = {}
