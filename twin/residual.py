@@ -56,6 +56,7 @@ class Whitener:
         self.noise = noise
         self.present = [np.isfinite(y) for y in measured]
         self._mix = [self._across(p, g, u) for p, g, u in zip(self.present, sensitivity, command, strict=True)]
+        self._memory = [self._along(p) for p in self.present]
 
     def _across(self, present: np.ndarray, G: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         change = np.abs(np.diff(command, axis=0, prepend=command[:1], append=command[-1:]))  # (n + 1, t)
@@ -72,20 +73,15 @@ class Whitener:
         x = np.where(present, r, 0.0) / self.noise.sigma
         A, core = self._mix[k]
         x = x + np.einsum("nmt,nt->nm", A, np.einsum("nts,ns->nt", core, np.einsum("nmt,nm->nt", A, x)))
-        return self._along(x, present)
+        before, decay, scale = self._memory[k]
+        return (x - decay * np.take_along_axis(x, before, axis=0)) * scale
 
-    def _along(self, x: np.ndarray, present: np.ndarray) -> np.ndarray:
-        if not self.noise.rho.any():
-            return np.where(present, x, 0.0)
-        z = np.zeros_like(x)
-        for j, rho in enumerate(self.noise.rho):
-            at = np.flatnonzero(present[:, j])
-            if at.size == 0:
-                continue
-            decay = rho ** np.diff(at)
-            z[at[0], j] = x[at[0], j]
-            z[at[1:], j] = (x[at[1:], j] - decay * x[at[:-1], j]) / np.sqrt(1.0 - decay**2)
-        return z
+    def _along(self, present: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For each sample (n, m): the row of the one measured before it, its correlation with that one, and 1 / the spread left."""
+        rows = np.arange(len(present))[:, None]
+        before = np.vstack([np.full((1, present.shape[1]), -1), np.maximum.accumulate(np.where(present, rows, -1), axis=0)[:-1]])
+        decay = np.where(before < 0, 0.0, self.noise.rho ** (rows - before))
+        return np.maximum(before, 0), decay, present / np.sqrt(1.0 - decay**2)
 
 
 def repeats(bench: Bench) -> list[tuple[int, int]]:
