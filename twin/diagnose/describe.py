@@ -139,13 +139,13 @@ def where(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Seque
     if at is None:
         return ""
     if at == 0:
-        return " The calibrated robot is off from its base on, as a whole: look at the clamp and the camera."
+        return " The fitted robot is off from its base on, as a whole: look at the clamp and the camera."
     names = [name for name, c in _markers(bench).items() if len(c) == 3]
-    return f" The calibrated robot bends wrongly at one place, between {names[at - 1]} and {names[at]}."
+    return f" The fitted robot bends wrongly at one place, between {names[at - 1]} and {names[at]}."
 
 
 def misbent(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Sequence[np.ndarray]) -> int | None:
-    """The chord, from 0 at the base, in which alone the calibrated robot bends wrongly; None if there is no such place.
+    """The chord, from 0 at the base, in which alone the fitted robot bends wrongly; None if there is no such place.
 
     `off` (n, m) is the smooth part of its error, `predicted` (n_k, m) where it should be, both SI. A chord t from marker to marker,
     the base the first, turns by w = t x (change of `off` along it) / |t|^2. Bending that is wrong between two markers makes w jump

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,11 @@ class Dictionary:
 
     patterns: tuple[Pattern, ...]
     columns: np.ndarray
+
+    def beside(self, effects: Collection[str]) -> Dictionary:
+        """Without the patterns of these effects and of those akin to them."""
+        left = [p for p in self.patterns if p.effect not in effects and not set(catalogue()[p.effect].akin) & set(effects)]
+        return Dictionary(tuple(left), self.columns)
 
 
 def dictionary(objective: Objective, fit: Fit) -> Dictionary:

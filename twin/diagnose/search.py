@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.calibrate import Fit, Objective, fit
+from twin.calibrate import Fit, Model, Objective, fit
 from twin.diagnose.evidence import Discrepancy, Evidence
 from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Dictionary, dictionary, screen
@@ -17,7 +17,7 @@ from twin.errors import SolveError
 WIDTH = 3  # models carried from level to level
 BEHIND = 400.0  # a model this far behind the best is not extended
 DEEPEST = 3  # effects at once
-FORM = 0.08  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
+FORM = 0.15  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
 PROMISE = 0.25  # of a material gain: what a first-order pattern must promise to be worth a refit
 ROUGHLY = 2e-4  # of the cost: the last step's fall at which a refit is weighed; what is left is second order in it
 
@@ -64,7 +64,9 @@ def search(
         for member in beam:
             if member.score < best_before - BEHIND:
                 continue
-            lacks = patterns if member is base else dictionary(objective, member.fit)
+            # Patterns depend little on what is already fitted: the leading set's are taken anew, the others' are the base's.
+            anew = member is beam[0] and member is not base
+            lacks = dictionary(objective, member.fit) if anew else patterns.beside(member.effects)
             for candidate in screen(objective, evidence, member.fit, member.discrepancy, lacks):
                 if candidate.gain < max(bars.accept, PROMISE * _material(objective, base, member, bars.material)):
                     continue
@@ -82,7 +84,7 @@ def search(
         if not beam or beam[0].score < best_before + bars.accept:
             break
     best = max(known.values(), key=lambda w: w.score - bars.accept * len(w.effects))
-    best = _leaner(objective, evidence, best, known, bars.accept, progress)
+    best = _leaner(objective, evidence, base, best, known, bars.accept, progress)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
@@ -138,6 +140,7 @@ def _own(fitted: Fit) -> np.ndarray:
 def _leaner(
     objective: Objective,
     evidence: Evidence,
+    base: Weighed,
     best: Weighed,
     known: dict[tuple[str, ...], Weighed],
     accept: float,
@@ -150,7 +153,7 @@ def _leaner(
             rest = tuple(e for e in best.effects if e != effect)
             if rest not in known:
                 progress(f"without {effect}")
-                known[rest] = refit_without(objective, evidence, best, effect)
+                known[rest] = refit_without(objective, evidence, base, best, effect)
             reduced.append(known[rest])
         lean = max(reduced, key=lambda w: w.score)
         if lean.score < best.score - accept:
@@ -159,8 +162,18 @@ def _leaner(
     return best
 
 
-def refit_without(objective: Objective, evidence: Evidence, best: Weighed, effect: str) -> Weighed:
-    """The best set less one effect, everything else fitted again."""
+def refit_without(objective: Objective, evidence: Evidence, base: Weighed, best: Weighed, effect: str) -> Weighed:
+    """The best set less one effect, everything else fitted again.
+
+    A robot fitted with the effect may have no equilibrium without it, where lengths are held: then from the base's robot, and where
+    that has none under the other effects, the base itself.
+    """
     keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
     model = best.fit.model.without_effect(effect)
-    return weigh(objective, evidence, fit(objective, model, J=best.fit.J[:, keep]))
+    as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
+    for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
+        try:
+            return weigh(objective, evidence, fit(objective, start, J=J))
+        except SolveError:
+            continue
+    return base

@@ -70,9 +70,11 @@ def diagnose(
     own = tuple(e.id for e in twin.effects)
     added = tuple(e for e in best.effects if e not in own)
     predictions = {name: _predict_all(t, bench) for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin))}
-    off, z = base.discrepancy.mean * objective.whitener.noise.sigma, base.fit.z.reshape(base.discrepancy.mean.shape)
-    calibrated = [predictions["calibrated"][k] for k in fitted]
-    strange = before > bars.left and (bool(misbent(bench, fitted, off, calibrated)) or change(bench, fitted, z) is not None)
+    off, rest = (w.discrepancy.mean * objective.whitener.noise.sigma for w in (base, best))  # SI
+    z = base.fit.z.reshape(off.shape)
+    calibrated, improved = ([t[k] for k in fitted] for t in (predictions["calibrated"], _predict_all(best.fit.model.twin, bench)))
+    bent = after > bars.left and bool(misbent(bench, fitted, rest, improved))
+    strange = bent or (before > bars.left and change(bench, fitted, z) is not None)
     apart = rigs(bench, fitted, base.fit)
     if apart is not None and apart.fall < base.fit.cost - best.fit.cost:  # what the effects explain needs no second robot
         apart = None
@@ -84,12 +86,14 @@ def diagnose(
     if final is base and best is not base:
         unseen, floor = held_out.structure(base.fit.model.twin)
     too_small = {c.effect for c in small}
+    # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
+    sure = 1.0 - after / before if verdict == "partly_explained" else 1.0
     claims = tuple(
         Claim(
             e,
             final.fit.fitted(e),
             held_out.error(dropped[e].fit.model.twin),
-            _probability(found, e, too_small),
+            sure * _probability(found, e, too_small),
             _contribution(final, dropped[e], objective),
         )
         for e in added
@@ -110,7 +114,8 @@ def diagnose(
         description = f"What is left looks like noise (smooth part {final.discrepancy.size:.2f} sigma)."
     else:
         description = describe(bench, fitted, left, final.discrepancy, strongest[0][0], line, bars)
-        description += where(bench, fitted, off, calibrated) if before > bars.left else ""
+        if final.discrepancy.size > bars.left:
+            description += where(bench, fitted, *((rest, improved) if final is best else (off, calibrated)))
         description += since(bench, fitted, z)
         description += mixed(bench, apart) if apart else ""
         description += unlike(unseen, final.discrepancy.size) if unseen > max(MUCH, bars.left) else ""
@@ -188,7 +193,7 @@ def _gate(
             if e in own:
                 continue
             progress(f"without {e}")
-            dropped[e] = refit_without(objective, evidence, best, e)
+            dropped[e] = refit_without(objective, evidence, found.base, best, e)
         if not dropped:
             return best, {}, tuple(small)
         least = min(dropped, key=lambda e: _contribution(best, dropped[e], objective))
@@ -216,7 +221,7 @@ def _verdict(
 ) -> str:
     """From the smooth errors (sigma) before and after on the fitted trials, and after on the unseen ones.
 
-    `strange`: the calibrated error sits at one place of the body, or began at once, as that of no known effect does.
+    `strange`: what is left sits at one place of the body, or the calibrated error began at once, as that of no known effect does.
     """
     much = max(after, unseen) > max(MUCH, bars.left) or line > bars.line
     if not added:
