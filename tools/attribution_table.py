@@ -48,13 +48,15 @@ def table(every: list[dict]) -> str:
     of = {k: [r for r in rows if r["kind"] == k] for k in ("none", "one", "pair", "unknown")}
     known = [r for r in rows if r["kind"] in ("one", "pair")]
     sure = [right(r, c) for r in rows for c, p in zip(r["claims"], r["probability"], strict=True) if p >= SURE]
-    ratio = [r["after"] / r["floor"] for r in known]
-    seconds = [r["seconds"] for r in rows]
+    answered = [r for r in rows if "after" in r]
+    ratio = [r["after"] / r["floor"] for r in answered if r["kind"] in ("one", "pair")]
+    seconds = [r["seconds"] for r in answered]
     wrong_names = [bool(r["claims"]) and r["verdict"] == "explained" and not all(right(r, c) for c in r["claims"]) for r in rows]
     lines = [
         f"sets                                        {len(rows)}: "
         + ", ".join(f"{len(v)} {k}" for k, v in of.items())
         + (f" ({len(every) - len(rows)} not scored: an effect that does not show on its design)" if len(every) > len(rows) else ""),
+        f"no answer                                   {share(['after' not in r for r in rows])}",
         f"false positives, no effect                  {share([false_positive(r) for r in of['none']])}",
         f"right effect first, one effect              {share([first(r) for r in of['one']])}",
         f"exact set, one effect                       {share([exact(r) for r in of['one']])}",

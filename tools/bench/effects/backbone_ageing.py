@@ -13,6 +13,7 @@ from tools.bench.effects.effect import Effect
 @dataclass(frozen=True)
 class BackboneAgeing(Effect):
     id: ClassVar[str] = "backbone_ageing"
+    most: ClassVar[float] = 10.0  # half as compliant again in an hour; more is no ageing
 
     def soften(self, clock: np.ndarray, ambient: np.ndarray) -> np.ndarray:
         return 1 + 0.05 * self.strength * clock / 3600.0
