@@ -18,6 +18,7 @@ from twin.robots.robot import models_folder
 from twin.twin import Twin
 
 robots = pytest.mark.parametrize("name", available())
+backbones = pytest.mark.parametrize("name", [n for n in available() if load(n).build().joints])
 TOML = (models_folder() / "continuum/robot.toml").read_text("utf-8")
 
 
@@ -34,14 +35,15 @@ def test_it_compiles_and_all_its_names_exist(name: str) -> None:
     assert all(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site) >= 0 for site in sites)
     hinges = [hinge for at in body.joints for hinge in (at.bend_x, at.bend_y, at.twist)]
     slides = [at.slide for at in body.joints if at.slide is not None]
-    assert sorted(model.joint(joint).id for joint in hinges + slides) == list(range(model.njnt))  # each once, and none besides
+    joints = [*hinges, *slides, *body.pivots]
+    assert sorted(model.joint(joint).id for joint in joints) == list(range(model.njnt))  # each once, and none besides
     assert len(slides) in (0, len(body.joints))
     assert len(body.tendons) == load(name).structure["tendons"]
     assert model.nu == sum(len(tendon) - 1 for tendon in body.tendons)
     assert {hinge for pair in hinge_pairs(body) for hinge in pair} == set(hinges)
 
 
-@robots
+@backbones
 def test_its_backbone_is_divided_among_the_joints_without_rest(name: str) -> None:
     body = load(name).build()
     # m: sums of a dozen lengths of 0.1 m; rounding is 1e-17 each
@@ -110,7 +112,7 @@ def test_its_masses_are_those_of_its_file(name: str) -> None:
     np.testing.assert_allclose(found, [0, 0, centre], rtol=0, atol=1e-14)
 
 
-@robots
+@backbones
 def test_turned_tensions_turn_the_shape(name: str) -> None:
     """A robot with equally spaced tendons that hangs along its axis looks the same from every tendon."""
     body = load(name).build()
@@ -131,7 +133,7 @@ def test_turned_tensions_turn_the_shape(name: str) -> None:
         np.testing.assert_allclose(other, one @ R.T, rtol=0, atol=1e-9)
 
 
-@robots
+@backbones
 def test_mirrored_tensions_mirror_the_shape(name: str) -> None:
     """The plane of tendon 1 is a plane of symmetry: swapping the tendons left and right of it mirrors the robot."""
     body = load(name).build()

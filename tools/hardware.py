@@ -1,7 +1,7 @@
 """Real rigs, before and after: python -m tools.hardware FOLDER [--out DIR] [rig ...]
 
 FOLDER holds the raw public data, one folder a rig (tentacle, cable-tool, three-cable); each is imported,
-compared and held against its bars. Reports go to DIR/<rig>; the cable tool, which the twin has no family for, has none.
+compared and held against its bars. Reports go to DIR/<rig>.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main() -> None:
         rows, recording, diagnosis = importlib.import_module(f"tools.comparisons.{rig}").compare(raw)
         for row in rows:
             table.add_row(*row.cells())
-        if asked.out and diagnosis is not None:
+        if asked.out:
             report.write(diagnosis, asked.out / rig, report.provenance(recording, diagnosis.settings, " ".join(sys.argv)))
     Console(width=200).print(table)
 

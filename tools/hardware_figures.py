@@ -14,10 +14,12 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from tools.comparisons.cable_tool import split as runs
 from tools.comparisons.tentacle import HOOKE, calibrated
 from tools.comparisons.three_cable import with_dead_band
-from tools.importers import tentacle, three_cable
+from tools.importers import cable_tool, tentacle, three_cable
 from twin.bench import Bench, prepare
+from twin.diagnose import Settings, diagnose
 from twin.robots import load
 from twin.robots.robot import models_folder
 from twin.twin import Twin, readings, report, simulate
@@ -29,6 +31,7 @@ def main(folder: Path) -> None:
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"})
     draw_tentacle(folder / "tentacle")
     draw_three_cable(folder / "three-cable")
+    draw_cable_tool(folder / "cable-tool")
 
 
 def predicted(bench: Bench, twin: Twin, rows: list[int]) -> list[np.ndarray]:
@@ -71,6 +74,28 @@ def draw_three_cable(folder: Path) -> None:
     axis.set(xlabel="shortening of cable 3, mm", ylabel="tip error, mm", ylim=(0, None))
     axis.legend(frameon=False)
     figure.savefig(models_folder() / "three_cable/sweep.svg", metadata={"Date": None})
+
+
+def draw_cable_tool(folder: Path) -> None:
+    """How far the jaw is from where the drum alone would have it: measured, and by the twin that was diagnosed at two loads."""
+    recording, _ = cable_tool.read(folder)
+    found = diagnose(runs(recording)[0], Twin.of(load("cable_tool")), Settings(jobs=1))
+    predicted = found.twin.predict(recording)
+    ratio = np.polyfit(*(np.concatenate([t.values[f"joint_{j}_angle"] for t in recording.trials]) for j in (1, 2)), 1)
+    figure, axes = plt.subplots(1, 4, figsize=(9.0, 2.8), sharey=True, layout="constrained")
+    for axis, percent in zip(axes, cable_tool.LOADS, strict=True):
+        name = f"load{percent}_0.5Hz.csv"
+        k = next(k for k, t in enumerate(recording.trials) if t.name == name)
+        q, half = recording.trials[k].values["joint_1_angle"], slice(len(recording.trials[k].time) // 2, None)
+        for of, style, words in ((recording, "k-", "measured"), (predicted, "-", "twin")):
+            off = np.rad2deg(of.trials[k].values["joint_2_angle"] - np.polyval(ratio, q))
+            colour = {} if of is recording else {"color": AFTER}
+            axis.plot(np.rad2deg(q[half]), off[half], style, lw=0.8, label=words, **colour)
+        axis.set(xlabel="drum, deg")
+        axis.set_title(f"load {percent} %", fontsize=9, loc="left")
+    axes[0].set_ylabel("jaw less ratio x drum, deg")
+    axes[-1].legend(frameon=False, fontsize=7, loc="lower right")
+    figure.savefig(models_folder() / "cable_tool/loops.svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":

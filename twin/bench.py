@@ -9,7 +9,7 @@ import numpy as np
 from twin.effects import Loads
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
-from twin.robots import Robot
+from twin.robots import Body, Jaw, Robot
 
 ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
 # What a reading that drives a tendon is typically good for: N, m, A, V
@@ -17,8 +17,9 @@ READING = {"tendon_tension": 0.01, "tendon_displacement": 2e-5, "sma_current": 3
 HEATING = ("sma_current", "sma_voltage")  # what drives a tendon through an SMA spring
 SCALARS = {  # kind of an output channel -> group
     "tendon_tension": "tension", "tendon_displacement": "displacement", "sma_temperature": "temperature",
-    "sma_resistance": "resistance",
+    "sma_resistance": "resistance", "joint_angle": "angle", "joint_torque": "torque",
 }  # fmt: skip
+DRUM, LOAD = "joint_1_angle", "joint_2_torque"  # what drives a transmission, and what may load it
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Output:
 
     channel: Channel
     group: str  # "marker" or a value of SCALARS
-    index: int  # marker or tendon, from 0
+    index: int  # marker, tendon or joint, from 0
     axis: int  # 0, 1, 2 for x, y, z; 0 for a scalar
 
 
@@ -86,16 +87,16 @@ class Bench:
 def prepare(recording: Recording, robot: Robot) -> Bench:
     """The bench of a recording. Raises DataError where the inputs do not determine the robot, or no output is predictable."""
     notices = list(recording.notices)
-    n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
+    n_tendon, body = int(robot.structure["tendons"]), robot.build()  # type: ignore[call-overload]
     driven = _drives(recording, robot, n_tendon)
-    driving = {c.name for c in driven}
+    driving = {c.name for c in driven} | ({LOAD} if isinstance(body, Jaw) else set())
     notices += [
         f"input {c.name} does not drive robot {robot.name!r} and is not used" for c in recording.inputs() if c.name not in driving
     ]
-    by_length = np.array([c.kind == "tendon_displacement" for c in driven])
+    by_length = np.array([c.kind in ("tendon_displacement", "joint_angle") for c in driven])
     by_current = np.array([c.kind in HEATING for c in driven])
-    amperes = _amperes(robot, driven)
-    outputs, unknown = _outputs(recording, robot, by_current)
+    effect = _amperes(robot, driven) * lead(body, n_tendon)
+    outputs, unknown = _outputs(recording, body, by_current)
     if not outputs:
         raise DataError(f"{_where(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
     notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
@@ -113,15 +114,20 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
                 trial.name,
                 trial.time,
                 clocks[k],
-                command * amperes,
+                command * effect,
                 by_length,
                 _temperature(recording, trial),
-                _loads(recording, trial, robot),
+                _loads(recording, trial, robot, body),
                 by_current,
             )
         )
         measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
     return Bench(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices))
+
+
+def lead(body: Body, n_tendon: int) -> np.ndarray:
+    """(n_tendon,) what one unit of the driving channel is to each tendon: of a drum's angle, m/rad."""
+    return np.array([body.drum, -body.drum]) if isinstance(body, Jaw) else np.ones(n_tendon)
 
 
 def drives(bench: Bench) -> list[Channel]:
@@ -135,7 +141,12 @@ def _where(recording: Recording) -> str:
 
 def _drives(recording: Recording, robot: Robot, n_tendon: int) -> list[Channel]:
     """The channel that drives each tendon: its tension, its displacement, or current or voltage of its SMA spring. Raises DataError
-    where one is missing or doubled."""
+    where one is missing or doubled. A drum drives both tendons of a transmission."""
+    if isinstance(robot.build(), Jaw):
+        found = [c for c in recording.inputs() if c.name == DRUM]
+        if not found:
+            raise DataError(f"{_where(recording)}: the inputs do not determine robot {robot.name!r}: give {DRUM} the role 'input'")
+        return found * n_tendon
     drives = []
     for i in range(1, n_tendon + 1):
         found = [c for c in recording.inputs() if c.kind in READING and c.index == i]
@@ -163,8 +174,9 @@ def _amperes(robot: Robot, driven: list[Channel]) -> np.ndarray:
     return np.array([1.0 / R if c.kind == "sma_voltage" else 1.0 for c, R in zip(driven, resistance, strict=True)])
 
 
-def _outputs(recording: Recording, robot: Robot, by_current: np.ndarray) -> tuple[tuple[Output, ...], list[str]]:
-    markers = list(robot.build().markers)
+def _outputs(recording: Recording, body: Body, by_current: np.ndarray) -> tuple[tuple[Output, ...], list[str]]:
+    markers = list(body.markers)
+    of_joints = {"joint_1_torque", "joint_2_angle"} if isinstance(body, Jaw) else set()
     found, unknown = [], []
     for channel in recording.outputs():
         name = channel.name.rpartition("_")[0]
@@ -172,7 +184,8 @@ def _outputs(recording: Recording, robot: Robot, by_current: np.ndarray) -> tupl
             found.append(Output(channel, "marker", markers.index(name), "xyz".index(channel.axis)))
         elif channel.kind in SCALARS and channel.index is not None and channel.index <= len(by_current):
             group = SCALARS[channel.kind]
-            known = group in ("tension", "displacement") or by_current[channel.index - 1]
+            on_spring = group in ("temperature", "resistance") and by_current[channel.index - 1]
+            known = group in ("tension", "displacement") or on_spring or channel.name in of_joints
             found += [Output(channel, group, channel.index - 1, 0)] if known else []
             unknown += [] if known else [channel.name]
         else:
@@ -219,10 +232,12 @@ def _temperature(recording: Recording, trial: Trial) -> np.ndarray:
     return np.full(len(trial.time), float(trial.conditions.get("ambient_temperature", ROOM)))
 
 
-def _loads(recording: Recording, trial: Trial, robot: Robot) -> Loads:
+def _loads(recording: Recording, trial: Trial, robot: Robot, body: Body) -> Loads:
+    loaded = isinstance(body, Jaw) and any(c.name == LOAD for c in recording.inputs())
     gravity = trial.conditions.get("gravity", recording.gravity if recording.gravity is not None else robot.gravity)
     return Loads(
         gravity=np.asarray(gravity, float),
         payload=float(trial.conditions.get("tip_payload", 0.0)),
         force=np.asarray(trial.conditions.get("tip_force", np.zeros(3)), float),
+        torque=_commands(trial, [LOAD])[0][:, 0] if loaded else np.zeros(1),
     )

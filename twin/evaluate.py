@@ -13,11 +13,11 @@ from twin.twin import Twin, is_dynamic, readings, report, simulate
 
 UNIT = {
     "marker": ("mm", 1e3), "displacement": ("mm", 1e3), "tension": ("N", 1.0), "temperature": ("K", 1.0),
-    "resistance": ("ohm", 1.0),
+    "resistance": ("ohm", 1.0), "angle": ("deg", 180.0 / np.pi), "torque": ("N*m", 1.0),
 }  # fmt: skip
 KIND = {
     "marker": "position", "displacement": "tendon_displacement", "tension": "tendon_tension", "temperature": "sma_temperature",
-    "resistance": "sma_resistance",
+    "resistance": "sma_resistance", "angle": "joint_angle", "torque": "joint_torque",
 }  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from twin.bench import Bench, Inputs, drives
+from twin.bench import Bench, Inputs, drives, lead
 
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
 SAME = (
@@ -97,6 +97,9 @@ def repeats(bench: Bench) -> list[tuple[int, int]]:
             )
             if not same_loads or len(A.time) != len(B.time):
                 continue
+            torque = np.broadcast_arrays(A.loads.torque, B.loads.torque)
+            if np.sqrt(np.mean((torque[0] - torque[1]) ** 2)) > SAME * np.abs(torque).max():
+                continue
             a_u, b_u = A.command / bench.reading, B.command / bench.reading
             if np.sqrt(np.mean((a_u - b_u) ** 2)) < max(SAME * np.ptp(a_u), 2.0):
                 pairs.append((a, b))
@@ -115,7 +118,7 @@ def estimate_noise(
     place = {k: i for i, k in enumerate(trials)}
     pairs = [(place[a], place[b]) for a, b in repeats(bench) if a in place and b in place]
     declared = np.array([o.channel.noise or np.nan for o in bench.outputs])
-    cells = np.array([c.noise or np.nan for c in drives(bench)])
+    cells = np.array([c.noise or np.nan for c in drives(bench)]) * np.abs(lead(bench.robot.build(), bench.n_tendon))
     drive = cells if np.isfinite(cells).all() else None
     notes = []
     if pairs:

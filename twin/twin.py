@@ -11,11 +11,11 @@ import numpy as np
 from twin.bench import Bench, Inputs, prepare
 from twin.dynamics import Dynamics
 from twin.effects import Creep, Effect, Loads, Route, Signals, named
-from twin.equilibrium import TOLERANCE, Equilibrium, Heating, Path
-from twin.errors import SolveError
+from twin.equilibrium import TOLERANCE, Antagonists, Equilibrium, Heating, Path
+from twin.errors import DataError, SolveError
 from twin.measurements import Recording
 from twin.quantities import Values
-from twin.robots import Frame, Robot, load
+from twin.robots import Body, Frame, Jaw, Robot, load
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ def is_dynamic(bench: Bench) -> bool:
     It is where its samples resolve the motion and some tension crosses its range (10 to 90 %, noise smoothed away) within one
     period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static motion.
     """
-    period = 1.0 / first_mode(bench.robot)
     if _is_held(bench):
         return False
+    period = 1.0 / first_mode(bench.robot)
     for trial in bench.inputs:
         dt = np.diff(trial.time)
         width = int(np.ceil(0.3 * period / np.median(dt)))
@@ -98,12 +98,15 @@ def simulate(
 
     With creep every trial before is simulated too, since the body remembers. `near` (traces with kept tangents of a
     neighbouring twin, same trials) speeds the solves up, with `once` to first order in the difference; `keep` keeps tangents for
-    that. Raises SolveError where a static equilibrium was not found.
+    that. Raises SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
     """
     body = twin.robot.build(twin.values)
     for effect in twin.effects:
+        if lacking := effect.needs - body.parts:
+            what = " and ".join(sorted(lacking))
+            raise DataError(f"effect {effect.id} acts on {what}, which robot {twin.robot.name!r} has not: remove the effect")
         effect.edit(body)
-    solver = Dynamics(body) if dynamic and not _is_held(bench) else Equilibrium(body)
+    solver = _solver(body, dynamic and not _is_held(bench))
     creep, route = _merged_creep(twin.effects), merged_route(twin.effects)
     wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
@@ -119,15 +122,23 @@ def simulate(
     return [traces[k] for k in (run if keep else wanted)]
 
 
+def _solver(body: Body, dynamic: bool) -> Equilibrium | Dynamics | Antagonists:
+    if isinstance(body, Jaw):
+        return Antagonists(body)
+    return Dynamics(body) if dynamic else Equilibrium(body)
+
+
 def _trial(
-    twin: Twin, solver: Equilibrium | Dynamics, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray, near: Path | None,
-    keep: bool, tolerance: float, once: bool, frame: Frame,
+    twin: Twin, solver: Equilibrium | Dynamics | Antagonists, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray,
+    near: Path | None, keep: bool, tolerance: float, once: bool, frame: Frame,
 ) -> Trace:  # fmt: skip
     n, by_length, by_current = len(inputs.time), inputs.by_length, np.broadcast_to(inputs.by_current, inputs.by_length.shape)
     driving = Signals(
         inputs.time, inputs.clock, np.where(by_length | by_current, 0.0, inputs.command), np.where(by_length, inputs.command, 0.0),
         np.zeros((n, 0, 3)), inputs.temperature, by_length, by_current, np.where(by_current, inputs.command, 0.0),
     )  # fmt: skip
+    if isinstance(solver, Antagonists):
+        driving = driving.with_(angle=solver.drum(inputs.command))
     for effect in reversed(twin.effects):
         driving = effect.command(driving)
     for effect in twin.effects:
@@ -157,12 +168,15 @@ def _trial(
             f"{inputs.name}: no static equilibrium at sample {bad + 1} (t = {inputs.time[bad]:.3g} s, tendons {pull}, payload "
             f"{loads.payload * 1e3:.3g} g); check the loads' units and directions{hint}"
         )
-    shortening = solver.straight_path - path.path + route.stretch * path.tension
+    shortening = solver.straight_path - path.path + route.elongation(path.tension)
     travel = np.where(by_length, driving.displacement, shortening)
     true = Signals(
         inputs.time, inputs.clock, path.tension, travel, frame.reported(path.markers), inputs.temperature,
         by_length, by_current, driving.current, path.temperature,
     )  # fmt: skip
+    if isinstance(solver, Antagonists):
+        angle, torque = solver.joints(driving.displacement, path, loads)
+        true = true.with_(angle=angle, torque=torque)
     return Trace(true, path)
 
 
@@ -181,7 +195,7 @@ def _merged_creep(effects: tuple[Effect, ...]) -> Creep:
 def merged_route(effects: tuple[Effect, ...]) -> Route:
     routes = [e.route() for e in effects]
     rubbing = next((r for r in routes if r.mu > 0.0), Route())
-    return replace(rubbing, stretch=sum(r.stretch for r in routes))
+    return replace(rubbing, stretch=sum(r.stretch for r in routes), stiffening=sum(r.stiffening for r in routes))
 
 
 def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
@@ -193,7 +207,10 @@ def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
 
 def readings(bench: Bench, seen: Signals) -> np.ndarray:
     """The bench's output channels of one trial's signals, (n, n_output)."""
-    of = {"marker": seen.markers, "displacement": seen.displacement[..., None], "tension": seen.tension[..., None]}
+    of = {
+        "marker": seen.markers, "displacement": seen.displacement[..., None], "tension": seen.tension[..., None],
+        "angle": seen.angle[..., None], "torque": seen.torque[..., None],
+    }  # fmt: skip
     if bench.by_current.any():
         resistance = np.broadcast_to(bench.robot.springs(bench.n_tendon).resistance, seen.warmth.shape)
         of |= {"temperature": seen.warmth[..., None], "resistance": resistance[..., None]}

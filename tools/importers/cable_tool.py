@@ -1,7 +1,8 @@
 """The cable-driven da Vinci tool of MRDLab: angle and torque at both ends of a long cable pair, 1 kHz, 20 s a run.
 
 A run is a trial: means over `MEAN` rows (25 Hz: the motion is at 0.5 Hz at most), without the start-up transient. Angles and
-torques keep the sign of their own sensor.
+the load's torque keep the sign of their own sensor; the input's cell reads the reaction: its sign is turned, so that torque times
+speed is the power that goes in. It is context: most of it is friction before the tendons, in the bearings of motor and drum.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ START_UP = 1.0  # s
 MEAN = 40  # rows
 IN_TURN, OUT_TURN = 8192.0, 4000.0  # counts a turn, encoders at input and output
 TORQUE = 3.9811e-5  # N m a count, both cells
+REPEATS = np.deg2rad(0.5)  # rad: how the output's loop repeats from rate to rate, 0.44-0.51 deg at the four loads; a count is 0.09
 
 
 def read(folder: Path) -> tuple[Recording, Dropped]:
@@ -38,15 +40,15 @@ def read(folder: Path) -> tuple[Recording, Dropped]:
             mean = kept[:whole].reshape(-1, MEAN, rows.shape[1]).mean(axis=1)
             values = {
                 "joint_1_angle": 2 * np.pi / IN_TURN * mean[:, 1],
-                "joint_1_torque": TORQUE * mean[:, 2],
+                "joint_1_torque": -TORQUE * mean[:, 2],
                 "joint_2_angle": 2 * np.pi / OUT_TURN * mean[:, 4],
                 "joint_2_torque": TORQUE * mean[:, 5],
             }
             label = f"load{load}_{rate:.1f}Hz.csv"
             trials.append(Trial(label, mean[:, 0], values, other={"load": f"{load} %", "rate": f"{rate} Hz"}))
     channels = (
-        Channel("joint_1_angle", "input", "deg"), Channel("joint_2_torque", "input", "N*m"),
-        Channel("joint_2_angle", "output", "deg", float(np.deg2rad(360 / OUT_TURN))), Channel("joint_1_torque", "output", "N*m"),
+        Channel("joint_1_angle", "input", "deg", float(np.deg2rad(360 / IN_TURN))), Channel("joint_2_torque", "input", "N*m"),
+        Channel("joint_2_angle", "output", "deg", float(REPEATS)), Channel("joint_1_torque", "context", "N*m"),
     )  # fmt: skip
     source = "hardware: MRDLab/mis-tool-characterization, Tool 4, ODbL (O'Neill, Stephens, Kowalewski, RA-L 2018)"
     return Recording("cable_tool", "MRDLab cable tool", source, None, channels, tuple(trials)), dropped

@@ -47,7 +47,10 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     slopes = [_slope(i, w) for i, w in zip(inputs, u, strict=True)]
     typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
     U, dU = np.concatenate(u), np.concatenate(slopes)
-    payload = np.concatenate([np.full(len(i.time), i.loads.payload) for i in inputs])
+    loads = {
+        "payload": np.concatenate([np.full(len(i.time), i.loads.payload) for i in inputs]),
+        "torque": np.concatenate([np.broadcast_to(i.loads.torque, len(i.time)) for i in inputs]),
+    }
     clock = np.concatenate([i.clock for i in inputs])
     t = (clock - clock.mean()) / max(np.ptp(clock), 1e-9) * 2.0
     warm = np.concatenate([i.temperature for i in inputs])
@@ -62,9 +65,10 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
         for b in range(a, n_tendon):
             static.append((f"{T[a]} {T[b]}", U[:, a] * U[:, b]))
             static += [(f"{T[a]} {T[b]} {T[c]}", U[:, a] * U[:, b] * U[:, c]) for c in range(b, n_tendon)]
-    if np.ptp(payload) > 0:
-        m = payload / payload.max()
-        static += [("payload", m), *((f"payload {T[a]}", m * U[:, a]) for a in range(n_tendon))]
+    for name, load in loads.items():
+        if np.ptp(load) > 0:
+            m = load / np.abs(load).max()
+            static += [(name, m), *((f"{name} {T[a]}", m * U[:, a]) for a in range(n_tendon))]
     for a in range(n_tendon):
         sign = np.tanh(dU[:, a] / typical)
         blocks["direction"] += [(f"direction of {T[a]}", sign), (f"direction of {T[a]} x {T[a]}", sign * U[:, a])]

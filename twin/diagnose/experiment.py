@@ -14,6 +14,7 @@ from twin.bench import Bench, Inputs
 from twin.calibrate import Evaluation, Fit, Objective
 from twin.errors import SolveError
 from twin.residual import Noise, Whitener
+from twin.robots import Jaw
 
 ENOUGH = 25.0
 RATE = 2.0  # samples a second
@@ -32,7 +33,8 @@ class Experiment:
 
 
 def menu(bench: Bench) -> list[tuple[str, Inputs]]:
-    """Trials this robot could run, within the commands already used; payload up to three times as much, at most 30 g.
+    """Trials this robot could run, within the commands already used; payload up to three times as much, at most 30 g; of a jaw
+    load torques from none to the largest.
 
     Where displacements are commanded, the tendons that do not pull are paid out, so that they are slack. Springs that currents heat
     cool within a minute: what is fast to a motor they would not feel.
@@ -44,8 +46,16 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
         f"{1e3 * x:.1f} mm" if length else f"{x:.1f} {'A' if current else 'N'}"
         for x, length, current in zip(top, bench.by_length, bench.by_current, strict=True)
     ]
-    heaviest = max(i.loads.payload for i in bench.inputs)
-    payloads = sorted({0.0, min(0.03, max(0.01, 3.0 * heaviest))})
+    like = bench.inputs[0]
+    bare = replace(like.loads, force=np.zeros(3))
+    if isinstance(bench.robot.build(), Jaw):
+        torques = [float(np.mean(i.loads.torque)) for i in bench.inputs]
+        least, most = min(torques), max(torques)
+        loaded = [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]
+    else:
+        heaviest = max(i.loads.payload for i in bench.inputs)
+        payloads = sorted({0.0, min(0.03, max(0.01, 3.0 * heaviest))})
+        loaded = [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
     def add(label: str, duration: float, *shares: np.ndarray) -> None:
@@ -68,12 +78,10 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
         add(f"two circles with all tendons up to 0.6 of {words[0]} (160 s)", 160.0, *circle)
     add("rest unloaded for 60 s", 60.0, *np.zeros((n, 30)))
     last = max(float(i.clock[-1]) for i in bench.inputs)
-    like = bench.inputs[0]
     out = []
-    for payload in payloads:
+    for load, loads in loaded:
         for motion, time, command in shapes:
-            loads = replace(like.loads, payload=payload, force=np.zeros(3))
-            label = f"{motion}, tip payload {1e3 * payload:.0f} g"
+            label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
             out.append((label, Inputs(label, time, last + 60.0 + time, command, bench.by_length, warm, loads, bench.by_current)))
     return out

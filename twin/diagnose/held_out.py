@@ -25,6 +25,12 @@ class HeldOut:
         self.bench, self.trials, self.noise = bench, list(trials), noise
         self.evidence = Evidence(bench, trials)
 
+    @property
+    def headline(self) -> str:
+        """The group of outputs whose error stands for the twin: markers where there are any, else the first."""
+        groups = [o.group for o in self.bench.outputs]
+        return "marker" if "marker" in groups else groups[0]
+
     def predict(self, twin: Twin) -> list[np.ndarray]:
         """(n_k, n_output) SI a trial. Raises SolveError where one has no equilibrium."""
         return [readings(self.bench, report(twin.effects, t.true)) for t in simulate(twin, self.bench, trials=self.trials)]
@@ -38,8 +44,7 @@ class HeldOut:
             raw = self.residual(self.predict(twin))
         except SolveError:
             return float("nan")
-        groups = list(dict.fromkeys(o.group for o in self.bench.outputs))
-        return rms(self.bench, raw, "marker" if "marker" in groups else groups[0])
+        return rms(self.bench, raw, self.headline)
 
     def structure(self, twin: Twin) -> tuple[float, dict[str, float]]:
         """The smooth error (sigma) the twin makes here, and the RMS by group of outputs that a perfect one would still make."""

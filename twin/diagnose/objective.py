@@ -14,7 +14,9 @@ from twin.residual import Noise, Whitener, estimate_noise
 from twin.springs.heat import memory
 from twin.twin import Trace, Twin, readings, report, simulate
 
-ROUGHLY = {"marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3}  # noise, SI, by group
+ROUGHLY = {  # noise, SI, by group
+    "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "angle": 2e-3, "torque": 1e-3,
+}  # fmt: skip
 
 
 def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:

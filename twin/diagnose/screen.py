@@ -53,15 +53,16 @@ class Dictionary:
 
 
 def dictionary(objective: Objective, fit: Fit) -> Dictionary:
-    """Patterns of every effect of the catalogue that the model lacks and that is not akin to one it has."""
+    """Patterns of every effect of the catalogue that the model lacks, that finds what it needs and is not akin to one it has."""
     bench = objective.bench
     present = {e.id for e in fit.model.twin.effects}
     predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces]
     patterns: list[Pattern] = []
     neighbours: dict[Twin, tuple[Model, float]] = {}
     index: dict[Twin, int] = {}  # several starts may share a pattern
+    parts = bench.robot.build().parts
     for identifier, law in catalogue().items():
-        if identifier in present or present & set(law.akin):
+        if identifier in present or present & set(law.akin) or not law.needs <= parts:
             continue
         for start in law.starts(predicted, bench.n_tendon):
             try:

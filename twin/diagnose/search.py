@@ -112,11 +112,11 @@ def _fuller(
 
     Before other effects are added: what the plain law leaves would be taken for them.
     """
-    n_tendon = objective.bench.n_tendon
+    n_tendon, parts = objective.bench.n_tendon, objective.bench.robot.build().parts
     for effect in effects:
         richer = catalogue()[effect].richer
         free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
-        if not richer or set(richer) <= set(free):
+        if not richer or set(richer) <= set(free) or not catalogue()[effect].richer_needs <= parts:
             continue
         progress(f"fuller law of {effect}")
         table = {p.name: p for p in catalogue()[effect].declared(n_tendon)}

@@ -22,6 +22,7 @@ from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
 from twin.errors import DataError
+from twin.evaluate import UNIT
 from twin.measurements import Recording
 from twin.residual import Noise
 from twin.twin import Twin, readings, report, simulate, unstable_starts
@@ -175,7 +176,9 @@ def calibration(recording: Recording, twin: Twin, settings: Settings | None = No
     fitted, held = split(bench, settings.seed)
     start, objective, _ = objective_of(bench, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
-    return found, f"{1e3 * HeldOut(bench, held, objective.whitener.noise).error(found.model.twin):.3f} mm"
+    held_out = HeldOut(bench, held, objective.whitener.noise)
+    unit, factor = UNIT[held_out.headline]
+    return found, f"{factor * held_out.error(found.model.twin):.3f} {unit}"
 
 
 def _gate(
@@ -205,8 +208,8 @@ def _gate(
 
 
 def _accuracy(bench: Bench, noise: Noise, accuracy: float) -> float:
-    """The twin's own accuracy (m) in sigmas of the markers: no less can be claimed."""
-    sigma = np.array([s for s, o in zip(noise.sigma, bench.outputs, strict=True) if o.group == "marker"])
+    """The twin's own accuracy (m; rad) in sigmas of the markers, or of the jaw's angle: no less can be claimed."""
+    sigma = np.array([s for s, o in zip(noise.sigma, bench.outputs, strict=True) if o.group in ("marker", "angle")])
     return accuracy / float(np.mean(sigma)) if sigma.size else 0.0
 
 

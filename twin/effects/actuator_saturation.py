@@ -33,6 +33,7 @@ class ActuatorSaturation(Effect):
         Parameter("corner", 0.1, "N", 1e-4, 2.0, "softness of the corner; ours", scale=0.1),
     )
     shape = ("limit", "corner")
+    needs = frozenset({"load cells"})
     moves_with = "the pull near its upper end"
 
     @classmethod

@@ -23,6 +23,7 @@ class BackboneAgeing(Effect):
     id = "backbone_ageing"
     parameters = (Parameter("rate", 0.0, "1/s", -1e-4, 1e-4, "functional fatigue, Mullins effect: up to 10 % an hour", scale=3e-6),)
     guesses = ({"rate": 1e-5},)
+    needs = frozenset({"backbone"})
     moves_with = "the time of day"
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ class BackbonePrecurvature(Effect):
         Parameter("about_y", 0.0, "1/m", -8.0, 8.0, "rest curvature about y", scale=0.1),
     )
     guesses = ({"about_x": 0.1, "about_y": 0.1},)
+    needs = frozenset({"backbone"})
     moves_with = "nothing: it is there at zero tension, and fades as load grows"
 
     def edit(self, body) -> None:

@@ -28,6 +28,7 @@ class CameraMisalignment(Effect):
         *(Parameter(a, 0.0, "m", -0.03, 0.03, "registration by hand", std=5e-3, scale=1e-3) for a in SHIFT),
     )
     guesses = ({**dict.fromkeys(TURN, 0.01), **dict.fromkeys(SHIFT, 1e-3)},)
+    needs = frozenset({"markers"})
     moves_with = "the marker's position itself"
 
     def sense(self, true: Signals) -> Signals:

@@ -32,21 +32,29 @@ from twin.springs import Spring
 @dataclass(frozen=True)
 class Loads:
     """Surroundings of one trial: gravity (3,) m/s^2; payload (kg) and force (3,) N at the tip; a wall (5,): normal, offset (m),
-    stiffness (N/m)."""
+    stiffness (N/m); torque (n,) or (1,) N m on a jaw's hinge, along its positive angle."""
 
     gravity: np.ndarray
     payload: float = 0.0
     force: np.ndarray = field(default_factory=lambda: np.zeros(3))
     wall: np.ndarray = field(default_factory=lambda: np.zeros(5))
+    torque: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
 
 @dataclass(frozen=True)
 class Route:
-    """A tendon: friction coefficient and pre-sliding travel (m), stretch (m/N)."""
+    """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N) at rest, and its `stiffening` with tension (1/N)."""
 
     mu: float = 0.0
     presliding: float = 4e-4
     stretch: float = 0.0
+    stiffening: float = 0.0
+
+    def elongation(self, tension: np.ndarray) -> np.ndarray:
+        """What a tendon that is slack at rest is longer by under `tension` (N), m: stretch (1 - exp(-k T)) / k, k = stiffening."""
+        if self.stiffening == 0.0:
+            return self.stretch * tension
+        return self.stretch / self.stiffening * -np.expm1(-self.stiffening * tension)
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,8 @@ class Signals:
     time (n,) s in the trial; clock (n,) s since the first trial; tension (n, n_tendon) N at the base; displacement (n, n_tendon) m
     at the motor; markers (n, n_marker, 3) m; temperature (n,) K of the room; by_length (n_tendon,): driven by displacement, else by
     tension or, where by_current (n_tendon,), through an SMA spring by its current (n, n_tendon) A; warmth (n, n_tendon) K, theirs.
-    On the way in (`command`, `drive`) what does not drive a tendon is zero.
+    On the way in (`command`, `drive`) what does not drive a tendon is zero. Of rigid joints, the driving drum the first: angle
+    (n, n_joint) rad, torque (n, n_joint) N m that acts on each from outside.
     """
 
     time: np.ndarray
@@ -77,6 +86,8 @@ class Signals:
     by_current: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
     current: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
     warmth: np.ndarray = field(default_factory=lambda: np.full((1, 1), np.nan))
+    angle: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
+    torque: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
 
     def with_(self, **changes: np.ndarray) -> Signals:
         return replace(self, **changes)
@@ -96,7 +107,8 @@ class Effect(ABC):
     `per_tendon` parameters exist once per tendon, as name_1, name_2, ... `shape` names parameters that mean nothing while
     the effect is OFF (a time constant of no creep). `richer` names parameters of a second, fuller law that stay OFF
     until the plain one has been accepted. `akin` names effects whose signature is so like this one's that both are never
-    claimed together. `moves_with` says in words what gives the effect away in a plot.
+    claimed together. `needs` names the parts a body must have for the law to act (`twin.robots.Body.parts`), `richer_needs` those
+    for its fuller law. `moves_with` says in words what gives the effect away in a plot.
     """
 
     id: ClassVar[str]
@@ -105,6 +117,8 @@ class Effect(ABC):
     shape: ClassVar[tuple[str, ...]] = ()
     richer: ClassVar[tuple[str, ...]] = ()
     akin: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[frozenset[str]] = frozenset()
+    richer_needs: ClassVar[frozenset[str]] = frozenset()
     guesses: ClassVar[tuple[Values, ...]] = ()
     moves_with: ClassVar[str]
 

@@ -22,6 +22,7 @@ class LoadCellBias(Effect):
 
     id = "load_cell_bias"
     per_tendon = (Parameter("bias", 0.0, "N", -1.0, 1.0, "zero of the cell", std=0.2, scale=0.03),)
+    needs = frozenset({"load cells"})
     moves_with = "the pull of one tendon, mostly where the others are slack"
 
     def sense(self, true: Signals) -> Signals:

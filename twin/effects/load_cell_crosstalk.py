@@ -24,6 +24,7 @@ class LoadCellCrosstalk(Effect):
     """
 
     id = "load_cell_crosstalk"
+    needs = frozenset({"load cells"})
     moves_with = "the tension of the other tendons"
 
     @classmethod

@@ -28,6 +28,7 @@ class LoadCellDrift(Effect):
         Parameter("rate", 0.0, "N/s", -2e-3, 2e-3, "warm-up of the amplifier; 0.1 N/h to 1 N/h", std=1e-4, scale=2e-5),
         Parameter("bend", 0.0, "N/s", -2e-3, 2e-3, "curvature of the drift over an hour", std=1e-4, scale=2e-5),
     )
+    needs = frozenset({"load cells"})
     moves_with = "the time of day"
 
     def sense(self, true: Signals) -> Signals:

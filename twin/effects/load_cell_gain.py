@@ -22,6 +22,7 @@ class LoadCellGain(Effect):
 
     id = "load_cell_gain"
     per_tendon = (Parameter("gain", 1.0, "1", 0.3, 3.0, "calibration of the cell", std=0.3, scale=0.03),)
+    needs = frozenset({"load cells"})
     moves_with = "the tension itself"
 
     def sense(self, true: Signals) -> Signals:

@@ -26,6 +26,7 @@ class StiffnessAsymmetry(Effect):
         Parameter("across", 0.0, "1", -0.6, 0.6, "e sin(2 alpha)", scale=0.03),
     )
     guesses = ({"along": 0.03, "across": 0.03},)
+    needs = frozenset({"backbone"})
     moves_with = "the direction of bending"
 
     def edit(self, body) -> None:

@@ -18,6 +18,7 @@ class StiffnessGradient(Effect):
     id = "stiffness_gradient"
     parameters = (Parameter("gradient", 0.0, "1", -1.6, 1.6, "relative change of EI from base to tip", scale=0.05),)
     guesses = ({"gradient": 0.1},)
+    needs = frozenset({"backbone"})
     moves_with = "the place along the body"
 
     def edit(self, body) -> None:

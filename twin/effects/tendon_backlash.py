@@ -26,6 +26,9 @@ class TendonBacklash(Effect):
     The side z changes over the travel `swap`; with swap = gap/2 the tendon stands still while the motor crosses the gap (the play
     operator), with less it is a spring-loaded one. `slack` is what must be taken up before the tendon pulls.
 
+    Antagonists that turn a rigid joint: each of them only ever pulls, so that its play lies on the pulling side, z = +1, whichever
+    way it travels. It is slack of gap/2 in both: a dead band that is crossed where the load, not the travel, changes its sign.
+
     Source: play operator (Krasnosel'skii and Pokrovskii). Worn gears, a loose coupling, a slack line: tenths of a millimetre.
 
     >>> u = np.array([[0.0], [1e-3], [0.5e-3]])
@@ -42,18 +45,21 @@ class TendonBacklash(Effect):
     )
     shape = ("swap",)
     richer = ("slack",)
+    richer_needs = frozenset({"backbone"})
     guesses = ({"gap": 2e-4},)
     moves_with = "the direction of travel"
 
     def drive(self, command: Signals) -> Signals:
-        moved = command.displacement - self["slack"] - 0.5 * self["gap"] * self._side(command.displacement)
+        moved = command.displacement - self["slack"] - 0.5 * self["gap"] * self._side(command)
         return command.with_(displacement=np.where(command.by_length, moved, command.displacement))
 
     def sense(self, true: Signals) -> Signals:
-        ahead = true.displacement + self["slack"] + 0.5 * self["gap"] * self._side(true.displacement)
+        ahead = true.displacement + self["slack"] + 0.5 * self["gap"] * self._side(true)
         return true.with_(displacement=np.where(true.by_length, true.displacement, ahead))
 
-    def _side(self, travelled: np.ndarray) -> np.ndarray:
-        z = np.empty_like(travelled)
-        lead(np.ascontiguousarray(travelled), self["swap"], z)
+    def _side(self, signals: Signals) -> np.ndarray:
+        if signals.angle.size:
+            return np.ones_like(signals.displacement)
+        z = np.empty_like(signals.displacement)
+        lead(np.ascontiguousarray(signals.displacement), self["swap"], z)
         return z

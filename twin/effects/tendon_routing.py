@@ -22,6 +22,7 @@ class TendonRouting(Effect):
         Parameter("angle", 0.0, "rad", -0.8, 0.8, "the holes' azimuth against the description", std=0.15, scale=0.03),
         Parameter("radius", 0.0, "m", -4e-3, 4e-3, "the holes' distance against the description", std=5e-4, scale=2e-4),
     )
+    needs = frozenset({"backbone"})
     moves_with = "the pull of one tendon"
 
     def edit(self, body) -> None:

@@ -4,30 +4,43 @@ engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic e
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
 move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
-trial.py    a trial, sample by sample
+trial.py    a trial, sample by sample             antagonists.py  a jaw between two tendons
+path.py     the equilibria of a trial
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path as File
 
 import mujoco
 import numpy as np
 
 from twin.effects import Creep, Loads, Route
+from twin.equilibrium.antagonists import Antagonists
 from twin.equilibrium.chain import Chain, Law, Load
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.lengths import STIFFEST
+from twin.equilibrium.path import DIRECT, FOLLOWED, NOT_FOUND, Path
 from twin.equilibrium.trial import Drive, run
+from twin.errors import SolveError
 from twin.robots import Body, available, hinge_pairs, load
 from twin.springs.spring import Spring, no_springs
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
 
-NOT_FOUND, DIRECT, FOLLOWED = 0, 1, 2  # status of a solve
-
-__all__ = ["DIRECT", "FOLLOWED", "NOT_FOUND", "TOLERANCE", "Equilibrium", "Heating", "Path", "compile_solver", "is_compiled"]
+__all__ = [
+    "DIRECT",
+    "FOLLOWED",
+    "NOT_FOUND",
+    "TOLERANCE",
+    "Antagonists",
+    "Equilibrium",
+    "Heating",
+    "Path",
+    "compile_solver",
+    "is_compiled",
+]
 
 
 @dataclass(frozen=True)
@@ -37,29 +50,6 @@ class Heating:
     which: np.ndarray
     ambient: np.ndarray
     spring: Spring
-
-
-@dataclass(frozen=True)
-class Path:
-    """The equilibria of one trial: base tension (n, n_tendon) N, markers (n, n_marker, 3) m, path (n, n_tendon) m, q (n, nv) rad,
-    temperature of springs (n, n_tendon) K, status (n,), `started`; slip states and distal tendon lengths (n_tendon, n_disk) at its
-    end."""
-
-    tension: np.ndarray
-    markers: np.ndarray
-    path: np.ndarray
-    q: np.ndarray
-    temperature: np.ndarray
-    status: np.ndarray
-    started: int
-    slip: np.ndarray
-    distal: np.ndarray
-    LU: np.ndarray = field(repr=False)  # (n, nv, nv), or empty
-
-    @property
-    def unstable_start(self) -> bool:
-        """Whether the loaded, untensioned robot has no stable shape near straight (a load past buckling)."""
-        return self.started != DIRECT
 
 
 class Equilibrium:
@@ -129,7 +119,7 @@ class Equilibrium:
         current in A that holds from one time to the next. `delayed` (n_element, nv) holds the creep strains and is advanced in
         place. `stiffness` (n,) scales the body's. `near`, a solution with LU of a neighbouring problem on the same samples, speeds
         the solve up; with `once` one Newton step a sample is taken from it. Where no equilibrium was found the sample's status is
-        NOT_FOUND and its shape is the one before.
+        NOT_FOUND and its shape is the one before. Raises SolveError for held lengths of tendons that stiffen.
         """
         n, nt = command.shape
         nv = self.model.nv
@@ -138,6 +128,8 @@ class Equilibrium:
         if delayed is None:
             delayed = np.zeros((amplitude.size, nv))
         by_length = np.zeros(nt, bool) if by_length is None else by_length
+        if route.stiffening > 0.0 and by_length.any():
+            raise SolveError(f"a length held by a tendon that stiffens ({route.stiffening:.3g} 1/N) is solved for antagonists only")
         heating = heating or Heating(np.zeros(nt, bool), np.zeros(n), no_springs(nt))
         drive = Drive(
             time=np.array(time, float),
@@ -200,5 +192,6 @@ def is_compiled() -> bool:
 
 def compile_solver() -> None:
     """Compile the static solve (or load it from disk) by solving nothing."""
-    solver = Equilibrium(load(available()[0]).build())
+    bodies = (load(name).build() for name in available())
+    solver = Equilibrium(next(body for body in bodies if "backbone" in body.parts))
     solver.solve(np.zeros(1), np.zeros((1, len(solver.chain.hole))), Loads(np.zeros(3)))

@@ -19,6 +19,8 @@ KINDS = {
     "tension": "tendon_tension",
     "temperature": "sma_temperature",
     "resistance": "sma_resistance",
+    "angle": "joint_angle",
+    "torque": "joint_torque",
 }  # group of outputs -> kind in the report
 
 

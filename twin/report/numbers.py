@@ -10,7 +10,7 @@ from twin.quantities import Fitted
 MM = 1e3  # m -> mm
 SHOWN = {  # group of outputs, or what drives a tendon -> unit and factor from SI
     "marker": ("mm", MM), "displacement": ("mm", MM), "tension": ("N", 1.0), "temperature": ("K", 1.0), "resistance": ("ohm", 1.0),
-    "current": ("A", 1.0),
+    "current": ("A", 1.0), "angle": ("deg", 180.0 / math.pi), "torque": ("N*m", 1.0),
 }  # fmt: skip
 NONE = "\N{EN DASH}"  # where there is no number
 MINUS = "\N{MINUS SIGN}"

@@ -60,7 +60,8 @@ class Body:
     `tendons[i]` lists the sites tendon i + 1 passes, base to tip; `markers` maps a channel prefix ("disk_3") to its site;
     `disks` lists the sites of the disk centres, base to tip; `tip` is where payload and tip force act. `bows`: tendons are straight
     between disks and the backbone bows away from them; else they run in channels of the body. `frame` is that of the markers.
-    `stiffening`: of a body that stretches, from 0 (Hooke) to 1 (neo-Hookean).
+    `stiffening`: of a body that stretches, from 0 (Hooke) to 1 (neo-Hookean). `pivots`: hinges between rigid parts. `parts`: what
+    an effect may need to act on.
     """
 
     spec: mujoco.MjSpec
@@ -73,6 +74,25 @@ class Body:
     bows: bool = True
     frame: Frame = field(default_factory=Frame)
     stiffening: float = 0.0
+    pivots: tuple[str, ...] = ()
+    parts: frozenset[str] = frozenset({"backbone", "markers", "load cells"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jaw(Body):
+    """A rigid jaw on one hinge, turned by a pair of antagonist tendons from a drum.
+
+    Turning the drum by q (rad) pulls tendon 1 in by drum q (m) and pays tendon 2 out by as much; turning the jaw by a from its
+    `rest` (rad) takes pulley (a - rest) of tendon 1 and gives as much of tendon 2; `pulley` (m) is negative where they cross.
+    At rest both pull with `pretension` (N) and give way by `stretch` (m/N); on its way each turns by `wrap` (rad) over idlers.
+    """
+
+    drum: float
+    pulley: float
+    rest: float
+    wrap: float
+    pretension: float
+    stretch: float
 
 
 def hinge_pairs(body: Body) -> Iterator[tuple[str, str]]:

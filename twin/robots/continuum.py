@@ -79,6 +79,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
     )
 
 
+COUNTS = ("disks", "tendons")  # whole numbers its structure needs
 LISTS = {"disks.pitch": "m", "tendons.angle": "rad"}
 OFFSETS = ("markers.offset_x", "markers.offset_y", "markers.offset_z")
 UNITS = {

@@ -27,7 +27,8 @@ class Robot:
     """A described robot; nothing in it is hidden in code.
 
     `parameters` hold SI values; those with a `std` are uncertain in a built robot (the nuisance parameters). `effects` are
-    the laws the robot is known to have: (identifier, parameter values). `accuracy` (m) is the description's own error.
+    the laws the robot is known to have: (identifier, parameter values). `accuracy` is the description's own error,
+    m of its markers or rad of its jaw.
     """
 
     name: str
@@ -120,12 +121,13 @@ def _check(robot: Robot) -> None:
         raise DataError(f"gravity is {robot.gravity.tolist()}; three finite numbers are needed")
     if importlib.util.find_spec(f"twin.robots.{robot.family}") is None:
         raise DataError(f"no family named {robot.family!r}; a family is a module of twin.robots, as 'continuum'")
-    units = importlib.import_module(f"twin.robots.{robot.family}").UNITS | PARAMETERS
+    family = importlib.import_module(f"twin.robots.{robot.family}")
+    units = family.UNITS | PARAMETERS
     for p in robot.parameters:
         needed = units.get(p.name, units.get(p.name.rpartition("_")[0]))
         if needed is not None and p.unit != needed:
             raise DataError(f"parameter {p.name!r} is in {p.unit}; a unit like {needed!r} is needed")
-    for name in ("disks", "tendons"):
+    for name in family.COUNTS:
         if not isinstance(robot.structure.get(name), int):
             raise DataError(f"structure: {name} is {robot.structure.get(name)!r}; a whole number is needed")
     for identifier, values in robot.effects:
