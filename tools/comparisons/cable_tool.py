@@ -15,9 +15,12 @@ import numpy as np
 
 from tools.comparisons.row import Row
 from tools.importers import cable_tool
+from twin.bench import prepare
+from twin.calibrate import Model, Objective, fit
 from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.evaluate import evaluate
 from twin.measurements import Recording, Trial
+from twin.residual import Noise, Whitener
 from twin.robots import load
 from twin.twin import Twin
 
@@ -52,8 +55,33 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
         Row("  loop width by load, measured/twin, deg", "within 25 %", "within 10 %", told, worst <= 0.25, worst <= 0.1),
         Row("  effects named", "friction, slack or elasticity", "", f"{found.verdict}: {', '.join(sorted(claimed))}", named),
         Row("  the same without one of them, deg, held-out run of the fitted", "", "", alone, None),
+        Row("  other tools, ratio and zero fitted at 20 %, at 80 %: linear -> twin", "", "", _others(folder, found), None),
         Row("  time of the diagnosis", "<= 5 min", "<= 1 min", f"{took:.1f} s", took <= 300, took <= 60),
     ], fitted, found  # fmt: skip
+
+
+def _others(folder: Path, found: Diagnosis) -> str:
+    """The error under a load twice the largest that was fitted, on tools of which only ratio and encoder zero are fitted."""
+    told = []
+    for tool in cable_tool.OTHERS:
+        runs = cable_tool.read_other(folder, tool)
+        light, heavy = runs.trials
+        linear = np.polyfit(light.values["joint_1_angle"], light.values["joint_2_angle"], 1)
+        straight = np.polyval(linear, heavy.values["joint_1_angle"]) - heavy.values["joint_2_angle"]
+        twin = _refitted(found.twin, replace(runs, trials=(light,)))
+        after = evaluate(twin, replace(runs, trials=(heavy,)))["rmse"]
+        told.append(f"{np.rad2deg(np.sqrt(np.mean(straight**2))):.2f} -> {after:.2f}")
+    return ", ".join(told) + " deg"
+
+
+def _refitted(twin: Twin, recording: Recording) -> Twin:
+    """The twin with its pulley's radius and its encoder's zero fitted to a recording."""
+    bench = prepare(recording, twin.robot)
+    nothing = [np.zeros((*y.shape, bench.n_tendon)) for y in bench.measured]
+    noise = Noise(np.full(1, cable_tool.REPEATS), np.zeros(bench.n_tendon), np.zeros(1), "repeats")
+    whitener = Whitener(noise, bench.measured, nothing, [i.command for i in bench.inputs])
+    free = tuple(f for f in Model.base(twin.robot, twin).free if f.parameter.name in ("pulley.radius", "jaw.rest"))
+    return fit(Objective(bench, range(len(bench.inputs)), whitener, 1), Model(twin, free)).model.twin
 
 
 def split(recording: Recording) -> tuple[Recording, Recording]:

@@ -16,6 +16,7 @@ from tools.importers.importer import Dropped
 from twin.measurements import Channel, Recording, Trial
 
 TOOL = "Tool_4_Maryland_R_5"
+OTHERS = {"Tool_4_Maryland_L_Roll_3": ("200", "203"), "Tool_4_Maryland_L_Pitch_3": ("000", "003")}  # the jaw's mirror image
 RATES = (0.1, 0.2, 0.3, 0.4, 0.5)  # Hz, first digit of a file's name
 LOADS = (10, 20, 30, 40)  # per cent, second digit
 START_UP = 1.0  # s
@@ -27,28 +28,39 @@ REPEATS = np.deg2rad(0.5)  # rad: how the output's loop repeats from rate to rat
 
 def read(folder: Path) -> tuple[Recording, Dropped]:
     """The twenty runs of one tool at five rates and four loads, named by both, and what was left out."""
-    dropped, trials = Dropped(), []
-    for i, rate in enumerate(RATES):
-        for j, load in enumerate(LOADS):
-            name = f"{TOOL}/{i}{j}.TXT.gz"
-            with gzip.open(folder / name, "rt", encoding="latin-1") as file:
-                rows = np.loadtxt(file, delimiter=",", comments="%")
-            kept = rows[rows[:, 0] > START_UP]
-            dropped.count(name, "start-up transient", len(rows) - len(kept), len(rows))
-            whole = len(kept) // MEAN * MEAN
-            dropped.count(name, f"left over from means of {MEAN}", len(kept) - whole, 0)
-            mean = kept[:whole].reshape(-1, MEAN, rows.shape[1]).mean(axis=1)
-            values = {
-                "joint_1_angle": 2 * np.pi / IN_TURN * mean[:, 1],
-                "joint_1_torque": -TORQUE * mean[:, 2],
-                "joint_2_angle": 2 * np.pi / OUT_TURN * mean[:, 4],
-                "joint_2_torque": TORQUE * mean[:, 5],
-            }
-            label = f"load{load}_{rate:.1f}Hz.csv"
-            trials.append(Trial(label, mean[:, 0], values, other={"load": f"{load} %", "rate": f"{rate} Hz"}))
+    dropped = Dropped()
+    runs = {(rate, load): f"{TOOL}/{i}{j}.TXT.gz" for i, rate in enumerate(RATES) for j, load in enumerate(LOADS)}
+    named = {f"load{load}_{rate:.1f}Hz.csv": name for (rate, load), name in runs.items()}
+    return _recording(TOOL, [_run(folder, name, label, dropped) for label, name in named.items()]), dropped
+
+
+def read_other(folder: Path, tool: str) -> Recording:
+    """The runs at 20 and 80 % load and 0.3 Hz of one of `OTHERS`."""
+    labels = (f"load{load}_0.3Hz.csv" for load in (20, 80))
+    return _recording(tool, [_run(folder, f"{tool}/{n}.TXT.gz", w, Dropped()) for n, w in zip(OTHERS[tool], labels, strict=True)])
+
+
+def _run(folder: Path, name: str, label: str, dropped: Dropped) -> Trial:
+    with gzip.open(folder / name, "rt", encoding="latin-1") as file:
+        rows = np.loadtxt(file, delimiter=",", comments="%")
+    kept = rows[rows[:, 0] > START_UP]
+    dropped.count(name, "start-up transient", len(rows) - len(kept), len(rows))
+    whole = len(kept) // MEAN * MEAN
+    dropped.count(name, f"left over from means of {MEAN}", len(kept) - whole, 0)
+    mean = kept[:whole].reshape(-1, MEAN, rows.shape[1]).mean(axis=1)
+    values = {
+        "joint_1_angle": 2 * np.pi / IN_TURN * mean[:, 1],
+        "joint_1_torque": -TORQUE * mean[:, 2],
+        "joint_2_angle": 2 * np.pi / OUT_TURN * mean[:, 4],
+        "joint_2_torque": TORQUE * mean[:, 5],
+    }
+    return Trial(label, mean[:, 0], values)
+
+
+def _recording(tool: str, trials: list[Trial]) -> Recording:
     channels = (
         Channel("joint_1_angle", "input", "deg", float(np.deg2rad(360 / IN_TURN))), Channel("joint_2_torque", "input", "N*m"),
         Channel("joint_2_angle", "output", "deg", float(REPEATS)), Channel("joint_1_torque", "context", "N*m"),
     )  # fmt: skip
-    source = "hardware: MRDLab/mis-tool-characterization, Tool 4, ODbL (O'Neill, Stephens, Kowalewski, RA-L 2018)"
-    return Recording("cable_tool", "MRDLab cable tool", source, None, channels, tuple(trials)), dropped
+    source = f"hardware: MRDLab/mis-tool-characterization, {tool}, ODbL (O'Neill, Stephens, Kowalewski, RA-L 2018)"
+    return Recording("cable_tool", "MRDLab cable tool", source, None, channels, tuple(trials))

@@ -12,8 +12,8 @@ class TendonElasticity(Effect):
     """Displacement at the motor = shortening of the path + stretch * tension at the base.
 
     Driven by displacement the robot gets less of it the harder it is to bend; driven by tension only the displacement shows it. The
-    fuller law, sought for antagonists: strands bed in and sag straightens, so that a rope gets stiffer the harder it is pulled; from its
-    rest under T_0 it is longer by e with de/dT = stretch exp(-stiffening (T - T_0)).
+    fuller law, sought for antagonists: strands bed in and sag straightens, so that a rope stiffens the harder it is pulled; from
+    its rest under T_0 it is longer by e with de/dT = stretch exp(-stiffening (T - T_0)).
 
     Source: Hooke; stretch = length / (E A) of tendon and mount. Steel rope of 0.3 mm and 0.5 m: 0.05 mm/N; braided line: ten times.
     Exponential stiffening: Fung (1967) of tissue; stranded ropes stiffen likewise at low tension (constructional stretch).

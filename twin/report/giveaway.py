@@ -29,6 +29,7 @@ WORDS = (  # words of a law or of a regressor -> kind of variable; the first tha
     (r"\btime\b|\bsession\b", "clock"),
     (r"\btemperature\b", "temperature"),
     (r"\bpayload\b", "payload"),
+    (r"\btorque\b", "torque"),
     (r"\bposition\b", "position"),
     (r"\bbending\b|\balong the body\b", "reach"),
     (r"\btension|\bpull\b|\bload|^[td]\d", "tension"),
