@@ -66,6 +66,8 @@ def diagnose(
     progress("verdict")
     found = replace(found, best=_predicting(found, held_out, bars.accept))
     best, dropped, small = _gate(objective, evidence, found, bars.material, progress)
+    if not np.isfinite(held_out.error(best.fit.model.twin)):  # without the small ones an unseen trial has no equilibrium
+        best, dropped = found.base, {}
     before, after = base.discrepancy.size, best.discrepancy.size
     line = Spectrum.of(bench, fitted).peak(best.fit.z.reshape(best.discrepancy.mean.shape) - best.discrepancy.mean)
     own = tuple(e.id for e in twin.effects)

@@ -1,6 +1,8 @@
 """Tensions that hold given tendon lengths, where motors command displacements: a tendon pulls or is slack, it never pushes.
 
-For each such tendon   T >= 0,   gap = path(T) - free length - stretch T <= 0,   T gap = 0.
+For each such tendon   T >= 0,   gap = path(T) - free length - stretch T - COMPRESSION sum T <= 0,   T gap = 0,
+
+the sum over the tendons that motors hold: what all of them pull, the backbone carries in compression.
 
 An SMA spring holds its tendon in the same way: on each linear piece Y = Y_0 + slope (e - e_0) of its law (twin/springs/force.py),
 at an elongation e = e_start + path - straight path - stretch T, it is a tendon of free length path - stretch T - Y/slope whose
@@ -25,7 +27,10 @@ from twin.springs.force import piece
 from twin.springs.spring import Spring
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
-STIFFEST = 1e-6  # m/N of any tendon: three taut ones on a straight robot are redundant, 4 um at 4 N decide between them
+STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
+# m/N of the backbone: three taut tendons are redundant, and this decides between them. An inextensible robot has none, 120 mm of
+# NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
+COMPRESSION = 1e-6
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
 STEPS = 40
 SMALLEST = 1e-3  # of a jump
@@ -63,6 +68,24 @@ def linearise(held, s, tension):
             elastic = held.elastic / held.factor[0]
             held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
             held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
+
+
+@jit
+def longer(held, i, j):
+    """How much (m/N) tendon j's tension gives tendon i, both held: by i's own stretch and by the backbone's compression."""
+    own = held.stretch[i] if i == j else 0.0
+    if held.by_spring[i] or held.by_spring[j] or not (held.which[i] and held.which[j]):
+        return own
+    return own + COMPRESSION / held.factor[0]
+
+
+@jit
+def lack(held, t, path, tension):
+    """How much too long (m) tendon t is at a path length (m) and all tensions."""
+    gap = path - held.free[t]
+    for j in range(tension.size):
+        gap -= longer(held, t, j) * tension[j]
+    return gap
 
 
 @jit
@@ -208,28 +231,29 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, held):
     A, B, C, gap, dT = np.empty((nt, nv)), np.empty((nt, nv)), np.empty((nt, nt)), np.empty(nt), np.empty(nt)
     pulls(chain, law, z1, A, B)
     for t in range(nt):
-        gap[t] = s1[t, 0] - held.free[t] - held.stretch[t] * tension[t]
+        gap[t] = lack(held, t, s1[t, 0], tension)
         if held_by[t]:
             for i in range(nv):
                 r[i] += PULL * gap[t] * B[t, i]
     substitute(LU, r)
     for t in range(nt):
         gap[t] -= dot_n(A[t], r)
+    D = B.copy()
     for j in range(nt):
-        if held_by[j]:
-            for i in range(nv):
-                B[j, i] *= 1.0 - PULL * held.stretch[j]
-        substitute(LU, B[j])
         for i in range(nt):
-            C[i, j] = dot_n(A[i], B[j])
-        C[j, j] += held.stretch[j]
+            if held_by[i]:
+                for k in range(nv):
+                    D[j, k] -= PULL * longer(held, i, j) * B[i, k]
+        substitute(LU, D[j])
+        for i in range(nt):
+            C[i, j] = dot_n(A[i], D[j]) + longer(held, i, j)
     if not settle(C, gap, tension, held.which, dT):
         return -1.0
     longest = 0.0
     for i in range(nv):
         step = r[i]
         for t in range(nt):
-            step += dT[t] * B[t, i]
+            step += dT[t] * D[t, i]
         q[i] -= step
         longest = max(longest, abs(step) / chain.unit[i])
     for t in range(nt):
@@ -256,7 +280,7 @@ def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, 
         linearise(held, s1, tension)
         for t in range(nt):
             if held.which[t]:
-                gap = s1[t, 0] - held.free[t] - held.stretch[t] * tension[t]
+                gap = lack(held, t, s1[t, 0], tension)
                 size = max(size, (abs(gap) if tension[t] > 0.0 else gap) / CLOSED)
         if size < tol:
             for t in range(nt):
