@@ -186,6 +186,13 @@ def test_less_of_a_controller_is_worse(kind: str) -> None:
     assert short(kind).rms > 1.5 * short("full").rms
 
 
+def test_a_path_that_is_foreseen_is_followed_closer() -> None:
+    """Springs turn some seconds late; where the path goes is known. On the path with the fastest turns."""
+    rose = paths(LENGTH, RADIUS)["rose (3-D)"]
+    told, untold = (track(Bench(unknown(), 0.0), controller("full"), rose, until=40.0, foresee=f).rms for f in (True, False))
+    assert told < 0.8 * untold
+
+
 def test_it_knows_of_the_robot_what_its_sensors_say() -> None:
     """The same readings give the same voltages, with no robot there to look at."""
     path, seen, bench = paths(LENGTH, RADIUS)["circle"], [], Bench(unknown(), 0.01)
@@ -196,7 +203,7 @@ def test_it_knows_of_the_robot_what_its_sensors_say() -> None:
         return seen[-1]
 
     bench.read = noted  # type: ignore[method-assign]
-    run = track(bench, controller("full"), path, until=-20.0)
+    run = track(bench, controller("full"), path, until=-20.0, foresee=False)
     again = controller("full")
     for (tension, displacement), wanted, voltage in zip(seen, run.wanted, run.voltage, strict=True):
         np.testing.assert_array_equal(again.step(wanted, tension, displacement, 0.05), voltage)

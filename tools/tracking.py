@@ -5,6 +5,7 @@
 
 The plant is a twin with effects its controllers do not know: other friction, other cooling, a wider and shifted loop, a softer body
 that bends unequally, load cells off by per cents, noise, and a payload that nobody declares. Simulated, not hardware.
+All but "PI only" know where the path goes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 
 from twin.control import Guard, PlainLoop, TensionLoop, TipController
 from twin.control.paths import Path, paths
-from twin.control.tip import springs
+from twin.control.tip import AHEAD, springs
 from twin.effects import Loads, named
 from twin.kinematics import HeatedRobot
 from twin.kinematics.robot import ROOM
@@ -98,21 +99,29 @@ class Run:
         return float(np.sqrt(np.mean(np.sum((self.tip - self.wanted)[on] ** 2, axis=1))))
 
 
-def track(bench: Bench, drive: TipController | np.ndarray, path: Path, *, until: float = LAP, disturb: str = "") -> Run:
+def track(
+    bench: Bench, drive: TipController | np.ndarray, path: Path, *, until: float = LAP, disturb: str = "", foresee: bool = True
+) -> Run:
     """One lap, or the part of it `until` (s), by a controller or by voltages (n, n_tendon) noted before. `disturb`: a payload or a
-    draught comes at half of it."""
+    draught comes at half of it. With `foresee` the controller is told where the path goes."""
     start, rest = path(0.0), bench.robot.shape().tip
     times = np.arange(-LEAD - SETTLE, until, DT)
     rows = []
+
+    def at(t: float) -> np.ndarray:
+        return path(min(t / LAP, 1.0)) if t >= 0.0 else rest + min(1.0, (t + LEAD + SETTLE) / LEAD) * (start - rest)
+
     for k, t in enumerate(times):
-        share = min(1.0, (t + LEAD + SETTLE) / LEAD)
-        wanted = path(t / LAP) if t >= 0.0 else rest + share * (start - rest)
+        wanted = at(t)
         if disturb and k == np.searchsorted(times, 0.5 * LAP):
             if disturb == "payload":
                 bench.robot.burden(bench.robot.load.payload + 0.02)
             else:
                 bench.blow(unknown(2.0))
-        voltage = drive[k] if isinstance(drive, np.ndarray) else drive.step(wanted, *bench.read(), DT)
+        if isinstance(drive, np.ndarray):
+            voltage = drive[k]
+        else:
+            voltage = drive.step(wanted, *bench.read(), DT, ahead=at(t + AHEAD) if foresee else None)
         bench.heat(voltage, DT)
         shape = bench.robot.shape()
         rows.append((t, wanted, shape.tip, bench.robot.tension / bench.robot.softness, bench.robot.warm.copy(), voltage))
@@ -128,7 +137,7 @@ def attempt(kind: str, name: str, payload: float, disturb: str = "", until: floa
     if kind == "open loop":
         foreseen = track(Bench(KNOWN, 0.0, seed=1), controller("no tip feedback"), path, until=until).voltage
         return track(Bench(unknown(), payload), foreseen, path, until=until, disturb=disturb)
-    return track(Bench(unknown(), payload), controller(kind), path, until=until, disturb=disturb)
+    return track(Bench(unknown(), payload), controller(kind), path, until=until, disturb=disturb, foresee=kind != "PI only")
 
 
 def main() -> None:

@@ -4,7 +4,9 @@ At every step the shape is estimated from load cells and tendon displacements (`
 coefficient found along). Every PERIOD the tensions for the wanted tip are found by inverse kinematics, the robot starting with the
 friction it has met so far:
 
-    tip* = wanted + v + (tip of the model - tip estimated),   dv/dt = (wanted - tip estimated)/T_I
+    tip* = wanted AHEAD s later + v + (tip of the model - tip estimated),   dv/dt = (wanted - tip estimated)/T_I
+
+A path is known before it is gone, and springs are late: 25 K of their loop take some 2 s up and 8 s down before tension turns.
 
 What a spring can do bounds them. Cold, it holds its plateau (1.9 N at rest here): less is no equilibrium that heat controls, so all
 targets are at least that and a margin: the springs pull against each other, and bending goes both ways. A spring lets go slowly:
@@ -29,6 +31,7 @@ from twin.springs import Spring
 from twin.twin import Twin, heating_of
 
 PERIOD = 0.2  # s, between two inverse solves
+AHEAD = 3.0  # s: of 2 to 5 s tried on four unloaded paths, where the worst of them is best
 MARGIN = 0.1  # N, above the cold plateau
 DROP = 0.25  # N, that a spring lets go at most while PERIOD passes, cooling at 3 K/s
 LIMIT = 4.0  # N
@@ -75,10 +78,17 @@ class TipController:
         self.sum, self.tip, self.age = np.zeros(3), self.robot.shape().tip, np.inf
 
     def step(
-        self, wanted: np.ndarray, tension: np.ndarray, displacement: np.ndarray, dt: float, temperature: np.ndarray | None = None
+        self,
+        wanted: np.ndarray,
+        tension: np.ndarray,
+        displacement: np.ndarray,
+        dt: float,
+        temperature: np.ndarray | None = None,
+        ahead: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Voltages (n_tendon,) V to hold for dt seconds, towards the tip `wanted` (3,) m, from load cells (n_tendon,) N, tendon
-        displacements (n_tendon,) m and, where there are, thermometers (n_tendon,) K. Raises SolveError as `TensionShape`."""
+        """Voltages (n_tendon,) V to hold for dt seconds, towards the tip `wanted` (3,) m now and, where the path is known, `ahead`
+        (3,) m AHEAD s later, from load cells (n_tendon,) N, tendon displacements (n_tendon,) m and, where there are, thermometers
+        (n_tendon,) K. Raises SolveError as `TensionShape`."""
         tension, displacement = np.maximum(tension, 0.0), np.asarray(displacement, float)
         elongation = self.spring.initial_elongation - displacement
         lead = self._sensed(wanted, tension, displacement, dt)
@@ -86,7 +96,8 @@ class TipController:
         if self.age >= PERIOD:
             self.age = 0.0
             least = np.maximum(passive(self.spring, elongation, ROOM) + MARGIN, tension - DROP)
-            self.target = inverse(self.robot, wanted + self.sum - lead, limit=LIMIT, within=2e-3, resting=least).tension
+            aim = (wanted if ahead is None else ahead) + self.sum - lead
+            self.target = inverse(self.robot, aim, limit=LIMIT, within=2e-3, resting=least).tension
         return self.loop.step(self.target, tension, elongation, dt, temperature)
 
     def _sensed(self, wanted: np.ndarray, tension: np.ndarray, displacement: np.ndarray, dt: float) -> np.ndarray:

@@ -57,7 +57,8 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     warm = (warm - warm.mean()) / max(float(warm.std()), 0.5)
     n_tendon = U.shape[1]
     blocks: dict[str, list[tuple[str, np.ndarray]]] = {c: [] for c in COMPONENTS}
-    T = [f"{'d' if b else 'T'}{i + 1}" for i, b in enumerate(bench.by_length)]
+    kinds = zip(bench.by_length, bench.by_current, strict=True)
+    T = [f"{'d' if length else 'I' if current else 'T'}{i + 1}" for i, (length, current) in enumerate(kinds)]
     static = blocks["static"]
     static.append(("1", np.ones(len(U))))
     for a in range(n_tendon):
