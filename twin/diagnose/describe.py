@@ -47,11 +47,11 @@ def describe(
     parts = components(discrepancy)
     main = max(parts, key=lambda c: parts[c])
     words = []
-    if discrepancy.size > bars.left or line[0] <= bars.line:
+    if discrepancy.size > bars.left or line[0] <= bars.faint:
         words.append(f"A smooth part of {discrepancy.size:.2f} sigma is left, largest in {worst_channel(bench, z)}")
         words[-1] += _and(place(bench, discrepancy.mean))
         words.append(f"It moves mostly with {IN_WORDS[main]} ({parts[main]:.2f} sigma), strongest with {strongest!r}")
-    if line[0] > bars.line:
+    if line[0] > bars.faint:
         swing = wave(bench, trials, z - discrepancy.mean, line[1])
         size = float(np.sqrt(2.0 * (swing**2).mean(axis=0).max()))
         words.append(f"A line at {line[1]:.2f} Hz is left, of {size:.1f} sigma in {worst_channel(bench, swing)}")

@@ -42,6 +42,11 @@ class Thresholds:
     left: float = LEFT
     line: float = LINE
 
+    @property
+    def faint(self) -> float:
+        """A line's bar where no effect was found whose law could leave one; the largest of 40 no-effect days was half of it."""
+        return self.line / 3.0
+
 
 def thresholds(objective: Objective, evidence: Evidence, base: Fit, known: Dictionary, seed: int) -> Thresholds:
     """The larger of floor and null quantile, each; from the cache where this design has been simulated before."""

@@ -230,7 +230,7 @@ def _verdict(
     """
     much = max(after, unseen) > max(MUCH, bars.left) or line > bars.line
     if not added:
-        return "unexplained" if much or after > max(ALONE, bars.left) else "noise"
+        return "unexplained" if much or line > bars.faint or after > max(ALONE, bars.left) else "noise"
     if not much and not (after > bars.left and after > SHARE * before):
         return "partly_explained" if strange else "explained"
     return "unexplained" if after > HALF * before else "partly_explained"

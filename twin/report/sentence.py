@@ -33,7 +33,7 @@ def structure_left(diagnosis: Diagnosis) -> str | None:
     if diagnosis.verdict in ("noise", "explained"):
         return None
     sizes = diagnosis.structure
-    if diagnosis.line[0] > diagnosis.bars.line and max(sizes.values(), default=0.0) < 0.15:
+    if diagnosis.line[0] > diagnosis.bars.faint and max(sizes.values(), default=0.0) < 0.15:
         return f"a line at {diagnosis.line[1]:.2f} Hz"
     return IN_WORDS[max(sizes, key=lambda c: sizes[c])]
 
