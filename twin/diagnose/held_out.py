@@ -16,6 +16,7 @@ from twin.residual import Noise, Whitener
 from twin.twin import Twin, readings, report, simulate
 
 ODD = 1.0  # sigma
+WORSE = 1.001  # of an error in SI: less is rounding, and what refitted parameters move
 
 
 class HeldOut:
@@ -45,6 +46,14 @@ class HeldOut:
         except SolveError:
             return float("nan")
         return rms(self.bench, raw, self.headline)
+
+    def worse(self, twin: Twin, than: Twin) -> bool:
+        """Whether a twin does worse here than another: in all channels together, each in its own noise, or in the headline's error.
+
+        An effect that only tendon displacements show leaves the markers' error where it was, but for its last digits.
+        """
+        new, old = (np.concatenate(self._white(t, self.predict(t))[0]) for t in (twin, than))
+        return float((new**2).sum()) > float((old**2).sum()) or self.error(twin) > WORSE * self.error(than)
 
     def structure(self, twin: Twin) -> tuple[float, dict[str, float]]:
         """The smooth error (sigma) the twin makes here, and the RMS by group of outputs that a perfect one would still make."""

@@ -83,7 +83,7 @@ def diagnose(
         apart = None
     unseen, floor = held_out.structure(best.fit.model.twin)
     verdict = "unexplained" if apart else _verdict(added, before, after, unseen, line[0], bars, strange)
-    if added and held_out.error(best.fit.model.twin) > held_out.error(base.fit.model.twin):  # it makes unseen trials worse
+    if added and held_out.worse(best.fit.model.twin, base.fit.model.twin):
         verdict = _verdict((), before, before, held_out.structure(base.fit.model.twin)[0], line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
     if final is base and best is not base:
