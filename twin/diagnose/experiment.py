@@ -107,7 +107,10 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
     for words, inputs, objective, at, d in sorted(apart, key=lambda trial: -float(trial[-1] @ trial[-1])):
         if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it
             break
-        T = _separation(objective, b, at, d)
+        try:
+            T = _separation(objective, b, at, d)
+        except SolveError:  # a neighbour of b has no equilibrium there: no trial to send anyone to
+            continue
         if best is None or best.separation < T:
             best = Experiment(words, inputs, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))), rivals)
     return best if best is not None and best.repeats <= 50 else None

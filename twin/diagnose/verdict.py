@@ -27,7 +27,7 @@ from twin.measurements import Recording
 from twin.residual import Noise
 from twin.twin import Twin, readings, report, simulate, unstable_starts
 
-SHARE = 0.3  # of the structure before: what is left counts if it is above the design's threshold and above this share
+SHARE = 0.2  # of the structure before: what is left counts if it is above the design's threshold and above this share
 MUCH = 0.45  # sigma of structure that counts whatever was there before
 ALONE = 0.3  # sigma of structure that counts where no effect was found: a base model may be off by less
 HALF = 0.5  # effects that leave more than this share of the structure do not explain it
