@@ -90,7 +90,7 @@ def diagnose(
         unseen, floor = held_out.structure(base.fit.model.twin)
     too_small = {c.effect for c in small}
     # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
-    sure = 1.0 - after / before if verdict == "partly_explained" else 1.0
+    sure = 1.0 - after / before if after > bars.left else 1.0
     claims = tuple(
         Claim(
             e,
