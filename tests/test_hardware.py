@@ -71,9 +71,8 @@ def test_runs_of_the_cable_tool_have_the_measured_loads_and_loops(raw: Path) -> 
         percent = int(trial.name[4:6])
         assert trial.values["joint_2_torque"].mean() == pytest.approx(load[percent], abs=1.5e-3)  # given to a thousandth
         low, high = loop[percent]
-        assert (
-            low - 0.8 < comparison.width(trial) < high + 0.8
-        )  # deg: its middle is ours, a fifth of the stroke; theirs is not said
+        # deg: its middle is ours, a fifth of the stroke; theirs is not said
+        assert low - 0.8 < comparison.width(trial) < high + 0.8
     assert all(n > 0 for _, reason, n, _ in dropped.rows if reason == "start-up transient")
 
 

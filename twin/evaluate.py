@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,20 @@ from twin.bench import Bench, prepare
 from twin.measurements import Recording
 from twin.twin import Twin, is_dynamic, readings, report, simulate
 
-UNIT = {
+UNIT = {  # group of outputs -> unit it is shown in, factor from SI
     "marker": ("mm", 1e3), "displacement": ("mm", 1e3), "tension": ("N", 1.0), "temperature": ("K", 1.0),
     "resistance": ("ohm", 1.0), "angle": ("deg", 180.0 / np.pi), "torque": ("N*m", 1.0),
 }  # fmt: skip
-KIND = {
+KIND = {  # group of outputs -> kind in reports
     "marker": "position", "displacement": "tendon_displacement", "tension": "tendon_tension", "temperature": "sma_temperature",
     "resistance": "sma_resistance", "angle": "joint_angle", "torque": "joint_torque",
 }  # fmt: skip
+
+
+def headline(groups: Iterable[str]) -> str:
+    """The group of outputs whose error stands for the twin: markers where there are any, else the first."""
+    groups = list(groups)
+    return "marker" if "marker" in groups else groups[0]
 
 
 def squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
@@ -54,8 +60,8 @@ def evaluate(twin: Twin, recording: Recording) -> dict[str, Any]:
         o.channel.name: {"unit": UNIT[o.group][0], "rmse": _or_none(UNIT[o.group][1] * _channel_rms(everything[:, j]))}
         for j, o in enumerate(bench.outputs)
     }
-    headline = by_kind["position"] if "position" in by_kind else next(iter(by_kind.values()))
-    return {"trials": [t.label for t in recording.trials], **headline, "by_kind": by_kind, "by_channel": by_channel}
+    first = by_kind[KIND[headline(groups)]]
+    return {"trials": [t.label for t in recording.trials], **first, "by_kind": by_kind, "by_channel": by_channel}
 
 
 def _channel_rms(r: np.ndarray) -> float:

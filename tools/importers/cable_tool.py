@@ -23,7 +23,8 @@ START_UP = 1.0  # s
 MEAN = 40  # rows
 IN_TURN, OUT_TURN = 8192.0, 4000.0  # counts a turn, encoders at input and output
 TORQUE = 3.9811e-5  # N m a count, both cells
-REPEATS = np.deg2rad(0.5)  # rad: how the output's loop repeats from rate to rate, 0.44-0.51 deg at the four loads; a count is 0.09
+# rad: how the output's loop repeats from rate to rate, 0.44-0.51 deg at the four loads, tested runs among them; a count is 0.09
+REPEATS = np.deg2rad(0.5)
 
 
 def read(folder: Path) -> tuple[Recording, Dropped]:

@@ -11,7 +11,7 @@ from twin.diagnose.diagnosis import Errors
 from twin.diagnose.evidence import Evidence
 from twin.diagnose.objective import sensitivity
 from twin.errors import SolveError
-from twin.evaluate import rms, squares
+from twin.evaluate import headline, rms, squares
 from twin.residual import Noise, Whitener
 from twin.twin import Twin, readings, report, simulate
 
@@ -28,9 +28,8 @@ class HeldOut:
 
     @property
     def headline(self) -> str:
-        """The group of outputs whose error stands for the twin: markers where there are any, else the first."""
-        groups = [o.group for o in self.bench.outputs]
-        return "marker" if "marker" in groups else groups[0]
+        """The group of outputs whose error stands for the twin."""
+        return headline(o.group for o in self.bench.outputs)
 
     def predict(self, twin: Twin) -> list[np.ndarray]:
         """(n_k, n_output) SI a trial. Raises SolveError where one has no equilibrium."""

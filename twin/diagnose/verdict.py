@@ -75,7 +75,8 @@ def diagnose(
     predictions = {name: _predict_all(t, bench) for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin))}
     off, rest = (w.discrepancy.mean * objective.whitener.noise.sigma for w in (base, best))  # SI
     z = base.fit.z.reshape(off.shape)
-    calibrated, improved = ([t[k] for k in fitted] for t in (predictions["calibrated"], _predict_all(best.fit.model.twin, bench)))
+    predictions["after"] = _predict_all(best.fit.model.twin, bench)
+    calibrated, improved = ([predictions[name][k] for k in fitted] for name in ("calibrated", "after"))
     bent = after > bars.left and bool(misbent(bench, fitted, rest, improved))
     strange = bent or (before > bars.left and change(bench, fitted, z) is not None)
     apart = rigs(bench, fitted, base.fit)
@@ -88,9 +89,10 @@ def diagnose(
     final = base if verdict in ("noise", "unexplained") else best
     if final is base and best is not base:
         unseen, floor = held_out.structure(base.fit.model.twin)
+        predictions["after"] = predictions["calibrated"]
     too_small = {c.effect for c in small}
     # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
-    sure = 1.0 - after / before if after > bars.left else 1.0
+    sure = max(0.0, 1.0 - after / before) if after > bars.left else 1.0
     claims = tuple(
         Claim(
             e,
@@ -110,7 +112,6 @@ def diagnose(
         if rival is not None:
             progress("next experiment")
             experiment = next_experiment(bench, objective.whitener.noise, final.fit, rival.fit, settings.jobs)
-    predictions["after"] = _predict_all(final.fit.model.twin, bench)
     left = final.fit.z.reshape(final.discrepancy.mean.shape)
     strongest = tuple(evidence.strongest(final.discrepancy))
     if verdict in ("noise", "explained"):

@@ -7,7 +7,8 @@ from rich.table import Table
 from rich.text import Text
 
 from twin.diagnose import Diagnosis
-from twin.report.contents import KINDS, experiment_words
+from twin.evaluate import KIND
+from twin.report.contents import experiment_words
 from twin.report.numbers import SHOWN, plus_minus
 from twin.report.sections.before_after import rows
 from twin.report.sections.effects import table
@@ -19,7 +20,7 @@ def console(diagnosis: Diagnosis) -> RenderableType:
     d = diagnosis
     parts: list[RenderableType] = [Text(sentence(d), style="bold"), Text("")]
     for group in groups(d):
-        title = f"{KINDS.get(group, group).replace('_', ' ')} error on held-out trials ({d.bench.recording.source})"
+        title = f"{KIND[group].replace('_', ' ')} error on held-out trials ({d.bench.recording.source})"
         error = _table()
         for name, justify in (("", "left"), (f"RMS, {SHOWN[group][0]}", "right"), ("95 % confidence", "right")):
             error.add_column(name, justify=justify)  # type: ignore[arg-type]

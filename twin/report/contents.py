@@ -8,20 +8,12 @@ from typing import Any
 from twin.bench import Bench, drives
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.identifiability import Visibility
+from twin.evaluate import KIND
 from twin.quantities import Fitted
 from twin.report.numbers import SHOWN, finite
 from twin.report.sentence import groups, headline, sentence, structure_left
 
 FORMAT = "twin-report/1"
-KINDS = {
-    "marker": "position",
-    "displacement": "tendon_displacement",
-    "tension": "tendon_tension",
-    "temperature": "sma_temperature",
-    "resistance": "sma_resistance",
-    "angle": "joint_angle",
-    "torque": "joint_torque",
-}  # group of outputs -> kind in the report
 
 
 def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,7 +101,7 @@ def _parameters(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:
 def _error(d: Diagnosis) -> dict[str, Any]:
     out = {"split": "held-out trials", "trials": labels(d, d.held_trials), **_of_group(d, headline(d))}
     if len(groups(d)) > 1:
-        out["by_kind"] = {KINDS.get(g, g): _of_group(d, g) for g in groups(d)}
+        out["by_kind"] = {KIND[g]: _of_group(d, g) for g in groups(d)}
     return out
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from twin.evaluate import UNIT
 from twin.quantities import Fitted
 
 MM = 1e3  # m -> mm
-SHOWN = {  # group of outputs, or what drives a tendon -> unit and factor from SI
-    "marker": ("mm", MM), "displacement": ("mm", MM), "tension": ("N", 1.0), "temperature": ("K", 1.0), "resistance": ("ohm", 1.0),
-    "current": ("A", 1.0), "angle": ("deg", 180.0 / math.pi), "torque": ("N*m", 1.0),
-}  # fmt: skip
+SHOWN = {**UNIT, "current": ("A", 1.0)}  # group of outputs, or what drives a tendon -> unit and factor from SI
 NONE = "\N{EN DASH}"  # where there is no number
 MINUS = "\N{MINUS SIGN}"
 FRIENDLY = {  # SI unit -> (shown unit, factor)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from twin import evaluate
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.effects import named
@@ -18,9 +19,8 @@ def effect_words(identifier: str) -> str:
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """The group of outputs whose error stands for the twin: markers where there are any, else the first."""
-    after = diagnosis.errors.after
-    return "marker" if "marker" in after else next(iter(after))
+    """The group of outputs whose error stands for the twin."""
+    return evaluate.headline(diagnosis.errors.after)
 
 
 def groups(diagnosis: Diagnosis) -> list[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
-from twin.report.contents import KINDS, labels
+from twin.evaluate import KIND
+from twin.report.contents import labels
 from twin.report.numbers import SHOWN, number, places, upper_first
 from twin.report.plots import ACCENT, BEFORE, MEASURED, Plot, figure
 from twin.report.sections.section import Section, Story
@@ -17,7 +18,7 @@ ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with th
 def section(story: Story) -> Section:
     d = story.diagnosis
     tables = [
-        {"kind": upper_first(KINDS.get(g, g).replace("_", " ")), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)}
+        {"kind": upper_first(KIND[g].replace("_", " ")), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)}
         for g in groups(d)
     ]
     return Section("before-after", "Before and after", "before_after.html", {"tables": tables, "trials": labels(d, d.held_trials)})

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.report.contents import KINDS, driven
+from twin.evaluate import KIND
+from twin.report.contents import driven
 from twin.report.numbers import SHOWN, column
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import groups
@@ -19,7 +20,7 @@ def section(story: Story) -> Section:
         low, high = column([float(sigma.min()), float(sigma.max())])
         rows.append(
             {
-                "kind": KINDS.get(g, g).replace("_", " "),
+                "kind": KIND[g].replace("_", " "),
                 "channels": len(j),
                 "unit": SHOWN[g][0],
                 "sigma": low if low == high else f"{low} to {high}",
