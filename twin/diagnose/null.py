@@ -28,7 +28,7 @@ DRAWS = 24
 GUMBEL_99 = 3.137  # standard deviations above the mean of a Gumbel law: -sqrt(6)/pi (0.5772 + ln(-ln 0.99))
 ACCEPT = 12.0  # evidence an effect must bring, after k log n: odds of e^6, safe over two dozen candidates
 MATERIAL = 0.1  # sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say
-LEFT = 0.15  # sigma of left-over structure
+LEFT = 0.12  # sigma of left-over structure; robots as built left 0.08 at most, of what no parameter spans
 LINE = 30.0  # z-score of a spectral line
 COARSE = 0.2  # designs that differ by less than some such share in length or size are one design
 
@@ -102,7 +102,8 @@ def _cache() -> Path:
 
 
 def _design(bench: Bench, trials: list[int], known: Dictionary) -> str:
-    """A digest of what the statistics depend on: every trial's size, loads and largest commands, coarsely; channels; effects."""
+    """A digest of what the thresholds depend on: every trial's size, loads and largest commands, coarsely; channels; effects;
+    floors."""
 
     def coarse(x: float) -> int:
         return round(np.log(max(abs(x), 1e-9)) / COARSE)
@@ -112,5 +113,7 @@ def _design(bench: Bench, trials: list[int], known: Dictionary) -> str:
          round(i.loads.payload, 4), np.round(i.loads.gravity, 1).tolist())
         for i in (bench.inputs[k] for k in trials)
     ]  # fmt: skip
-    parts = (bench.robot.name, sorted(map(str, rows)), [o.channel.name for o in bench.outputs], [p.effect for p in known.patterns])
+    floors = (DRAWS, ACCEPT, MATERIAL, LEFT, LINE)
+    effects = [p.effect for p in known.patterns]
+    parts = (bench.robot.name, sorted(map(str, rows)), [o.channel.name for o in bench.outputs], effects, floors)
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

@@ -27,10 +27,12 @@ from twin.measurements import Recording
 from twin.residual import Noise
 from twin.twin import Twin, readings, report, simulate, unstable_starts
 
-SHARE = 0.2  # of the structure before: what is left counts if it is above the design's threshold and above this share
+SHARE = 0.15  # of the structure before: what is left counts if it is above the design's threshold and above this share
 MUCH = 0.45  # sigma of structure that counts whatever was there before
 ALONE = 0.3  # sigma of structure that counts where no effect was found: a base model may be off by less
 HALF = 0.5  # effects that leave more than this share of the structure do not explain it
+LIMIT = 1e-3  # of a parameter's range: closer to an end of it, the law is at its limit
+EVEN = 0.5  # odds that a name is right where a law of its set is at its limit
 FAR = 3.0  # standard deviations of its description: a robot's parameter found further away is doubtful
 TEMPER = 20.0  # odds are exp(score / 20): the likelihood takes the laws' form for exact, which makes raw odds absurd
 
@@ -78,7 +80,8 @@ def diagnose(
     predictions["after"] = _predict_all(best.fit.model.twin, bench)
     calibrated, improved = ([predictions[name][k] for k in fitted] for name in ("calibrated", "after"))
     bent = after > bars.left and bool(misbent(bench, fitted, rest, improved))
-    strange = bent or (before > bars.left and change(bench, fitted, z) is not None)
+    strained = _strained(best.fit)
+    strange = bent or bool(strained) or (before > bars.left and change(bench, fitted, z) is not None)
     apart = rigs(bench, fitted, base.fit)
     if apart is not None and apart.fall < base.fit.cost - best.fit.cost:  # what the effects explain needs no second robot
         apart = None
@@ -87,12 +90,14 @@ def diagnose(
     if added and held_out.worse(best.fit.model.twin, base.fit.model.twin):
         verdict = _verdict((), before, before, held_out.structure(base.fit.model.twin)[0], line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
+    strained = strained if final is best else []
     if final is base and best is not base:
         unseen, floor = held_out.structure(base.fit.model.twin)
         predictions["after"] = predictions["calibrated"]
     too_small = {c.effect for c in small}
     # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
     sure = max(0.0, 1.0 - after / before) if after > bars.left else 1.0
+    sure = min(sure, EVEN) if strained else sure
     claims = tuple(
         Claim(
             e,
@@ -122,6 +127,7 @@ def diagnose(
             description += where(bench, fitted, *((rest, improved) if final is best else (off, calibrated)))
         description += since(bench, fitted, z)
         description += mixed(bench, apart) if apart else ""
+        description += "".join(f" The {words}." for words in strained)
         description += unlike(unseen, final.discrepancy.size) if unseen > max(MUCH, bars.left) else ""
         if runners:
             share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)
@@ -153,7 +159,7 @@ def diagnose(
         fitted_trials=tuple(fitted),
         held_trials=tuple(held),
         predictions=predictions,
-        notices=(*notices, *_unlikely(final.fit), *([mixed(bench, apart).strip()] if apart else [])),
+        notices=(*notices, *_unlikely(final.fit), *strained, *([mixed(bench, apart).strip()] if apart else [])),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.all),
     )
@@ -227,7 +233,8 @@ def _verdict(
 ) -> str:
     """From the smooth errors (sigma) before and after on the fitted trials, and after on the unseen ones.
 
-    `strange`: what is left sits at one place of the body, or the calibrated error began at once, as that of no known effect does.
+    `strange`: what is left sits at one place of the body, the calibrated error began at once, as that of no known effect does, or
+    a law is at its limit.
     """
     much = max(after, unseen) > max(MUCH, bars.left) or line > bars.line
     if not added:
@@ -248,6 +255,19 @@ def _unlikely(found: Fit) -> list[str]:
             said.append(
                 f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "
                 f"{p.value:.4g}): check it, or something else hides in it"
+            )
+    return said
+
+
+def _strained(found: Fit) -> list[str]:
+    """Effects whose parameter, one that may go either way, ended at an end of its range, in words: another law is behind them."""
+    said = []
+    for free in found.model.free:
+        p, value = free.parameter, found.model.value(free)
+        if free.effect is not None and p.low == -p.high and p.high - abs(value) < LIMIT * (p.high - p.low):
+            said.append(
+                f"{free.effect.replace('_', ' ')}: {p.name.replace('_', ' ')} came out at the end of its range "
+                f"({value:.3g} {p.unit}); this law is bent to what it does not describe"
             )
     return said
 

@@ -21,7 +21,17 @@ class BackboneAgeing(Effect):
     """
 
     id = "backbone_ageing"
-    parameters = (Parameter("rate", 0.0, "1/s", -1e-4, 1e-4, "functional fatigue, Mullins effect: up to 10 % an hour", scale=3e-6),)
+    parameters = (
+        Parameter(
+            "rate",
+            0.0,
+            "1/s",
+            -2e-4,
+            2e-4,
+            "functional fatigue, Mullins effect: some 10 % an hour; half of it is past any use",
+            scale=3e-6,
+        ),
+    )
     guesses = ({"rate": 1e-5},)
     needs = frozenset({"backbone"})
     moves_with = "the time of day"
