@@ -73,7 +73,7 @@ def test_a_point_on_a_tendons_own_line_needs_that_tendon_alone() -> None:
         tension = 2.0 * np.eye(3)[i]
         answer = inverse(robot, robot.pull(tension).tip)
         robot.rest()
-        np.testing.assert_allclose(answer.tension, tension, atol=1e-4)
+        np.testing.assert_allclose(answer.tension, tension, atol=1e-3)  # 1e-5 m where a newton moves the tip by centimetres
 
 
 def test_friction_makes_the_answer_depend_on_where_one_comes_from() -> None:
@@ -92,7 +92,7 @@ def test_friction_makes_the_answer_depend_on_where_one_comes_from() -> None:
 
 @pytest.mark.parametrize(
     ("tip", "why"),
-    [([0.1, 0.0, 0.1], "mm from the base; the robot is 120.0 mm long"), ([0.03, 0.0, 0.03], "surface"), ([0.06, 0.06, 0.1], "mm")],
+    [([0.1, 0.0, 0.1], "mm from the base; the robot is 120.0 mm long"), ([0.0, 0.04, 0.05], "surface"), ([0.06, 0.06, 0.1], "mm")],
 )
 def test_what_is_out_of_reach_is_said(tip: list[float], why: str) -> None:
     answer = inverse(LoadedRobot(PLAIN, HANGING), np.array(tip))

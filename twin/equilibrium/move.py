@@ -14,7 +14,7 @@ from twin.equilibrium.lengths import pulls
 from twin.equilibrium.linear import substitute
 from twin.equilibrium.newton import is_minimum, newton, place, solve
 
-STRIDE = 0.5  # N: the largest part; 0.5 against 0.02 moves the tip by less than 0.1 mm (tests/test_kinematics.py)
+STRIDE = 0.75  # N: the largest part; 0.75 against 0.02 moves the tip by less than 0.1 mm (tests/test_kinematics.py)
 SHORTEST = 1.0 / 16.0  # of a part: below it the robot is let go where it wants
 TRIALS = 25  # Gauss-Newton steps of `seek`
 CORRECTIONS = 12  # of its answer, the way there considered
@@ -192,12 +192,13 @@ def step(gradient, error, T, least, limit, free, dT):
 def refine(model, data, chain, rest, law, load, target, used, least, limit, tol, near, stride, T0, q0, z0, s0, T, q, z, s, LU):
     """As `seek`, from its answer T, but moving as `pull` does, in parts of `stride` N, whose friction is the one that counts.
 
-    Returns the distance (m), negative where lost.
+    (T, q, z, s) become the state nearest to the target. Returns the distance (m), negative where lost.
     """
     nt = T.size
     gradient, error, fresh = np.empty((nt, 1, 3)), np.empty(3), np.zeros(1, np.bool_)
     site, below = chain.disk[-1:], np.full(1, q.size)
-    goal, dT, best_T, best, share = T.copy(), np.zeros(nt), T.copy(), 1e300, 1.0
+    goal, dT, best, share = T.copy(), np.zeros(nt), 1e300, 1.0
+    best_T, best_q, best_z, best_s = T.copy(), q.copy(), z.copy(), s.copy()
     free = np.empty(nt, np.bool_)
     for _ in range(CORRECTIONS):
         assign(T, T0)
@@ -222,6 +223,10 @@ def refine(model, data, chain, rest, law, load, target, used, least, limit, tol,
             continue
         best, share = size, 1.0
         assign(best_T, T)
+        assign(best_q, q)
+        for t in range(nt):
+            assign(best_z[t], z[t])
+            assign(best_s[t], s[t])
         if size < near or not answer(model, data, chain, rest, law, load, T, q, z, s, LU, site, below, gradient):
             break
         for t in range(nt):
@@ -230,4 +235,8 @@ def refine(model, data, chain, rest, law, load, target, used, least, limit, tol,
         for t in range(nt):
             goal[t] = min(limit, max(least[t], T[t] + dT[t]))
     assign(T, best_T)
+    assign(q, best_q)
+    for t in range(nt):
+        assign(z[t], best_z[t])
+        assign(s[t], best_s[t])
     return best if best < 1e299 else -1.0

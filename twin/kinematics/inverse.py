@@ -8,6 +8,7 @@ those whose bending directions enclose the point; the general search starts ther
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,9 @@ import numpy as np
 from twin.equilibrium import TOLERANCE
 from twin.equilibrium.move import STRIDE, refine, seek
 from twin.errors import SolveError, TwinError
-from twin.kinematics.robot import LoadedRobot, Shape
+from twin.kinematics.robot import LoadedRobot, Shape, State
 
-NEAR = 1e-6  # m: where the search stops
+NEAR = 1e-5  # m: where the search stops
 
 
 @dataclass(frozen=True)
@@ -45,64 +46,48 @@ def inverse(
     if tip.shape != (3,) or not np.isfinite(tip).all():
         raise TwinError(f"a tip position is {tip.tolist()}; three finite numbers in metres are needed")
     least = np.zeros(robot.n_tendon) if resting is None else robot.true(np.asarray(resting, float)) * robot.softness
-    nearest: tuple[float, np.ndarray] | None = None
+    distance, state = math.inf, None
     for used, guess in _starts(robot, tip, least, limit, by_sector):
-        distance, tension = _sought(robot, tip, used, guess, least, limit)
-        if nearest is None or distance < nearest[0]:
-            nearest = distance, tension
+        away, found = _sought(robot, tip, used, guess, least, limit)
+        if away < distance:
+            distance, state = away, found
         if distance < within:
             break
-    if nearest is None or not math.isfinite(nearest[0]):
+    if state is None:
         raise SolveError("no equilibrium was found on the way to this point; rest the robot first")
-    tension = nearest[1]
-    shape = _peek(robot, tension)
-    distance = float(np.linalg.norm(shape.tip - tip))
-    reason = None if distance < within else _reason(robot, tip, tension / robot.softness, distance, limit)
-    return Reach(robot.reported(tension / robot.softness), shape, distance, reason)
+    tension = state[0] / robot.softness
+    reason = None if distance < within else _reason(robot, tip, tension, distance, limit)
+    return Reach(robot.reported(tension), _shape_at(robot, state), distance, reason)
 
 
 def sectors(robot: LoadedRobot) -> list[tuple[float, int, int]]:
     """Neighbouring tendons (direction of i in rad, i, j), counter-clockwise: their bending directions bound a sector."""
-    angle = _directions(robot)
+    angle = robot.directions
     order = np.argsort(angle)
     return [(float(angle[i]), int(i), int(order[(k + 1) % len(order)])) for k, i in enumerate(order)]
 
 
-def _directions(robot: LoadedRobot) -> np.ndarray:
-    """Where each tendon's hole lies at the base, rad from +x towards +y in [0, 2 pi): the robot bends towards it."""
-    chain = robot.solver.chain
-    holes = chain.site[chain.hole[:, 0]]
-    return np.mod(np.arctan2(holes[:, 1], holes[:, 0]) + 1e-9, 2 * np.pi)
-
-
 def _starts(
     robot: LoadedRobot, tip: np.ndarray, least: np.ndarray, limit: float, by_sector: bool
-) -> list[tuple[np.ndarray, np.ndarray]]:
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Which tendons may pull, and a first guess of their tensions, the likeliest first.
 
     A bend of constant curvature k = theta / length with its tip at (rho, z) has theta = 2 atan2(rho, z); its moment is EI k, of
     which each tendon gives tension times lever arm towards its side. What resting tendons give is there already.
     """
-    nt = robot.n_tendon
-    chain = robot.solver.chain
-    lever = float(np.linalg.norm(chain.site[chain.hole[0, 0], :2]))
-    bends = chain.stiffness[(chain.hinge > 0.0) & ~chain.twists]  # two hinges a joint set, K = EI / h
     theta = 2.0 * math.atan2(math.hypot(tip[0], tip[1]), tip[2])
-    want = theta / float((1.0 / bends[::2]).sum()) / lever  # EI theta / length: the sets are springs in a row
+    want = theta * robot.pull_per_bend
     towards = math.atan2(tip[1], tip[0])
-    angle = _directions(robot)
+    angle = robot.directions
     side = np.stack([np.cos(angle), np.sin(angle)])
     lacking = want * np.array([math.cos(towards), math.sin(towards)]) - side @ least / robot.softness
     towards = math.atan2(lacking[1], lacking[0])
-    out = []
-    ranked = sorted(sectors(robot), key=lambda s: -_enclosed(angle[s[1]], angle[s[2]], towards))
-    for _, i, j in ranked:
-        used = np.zeros(nt, bool)
+    for _, i, j in sorted(sectors(robot), key=lambda s: -_enclosed(angle[s[1]], angle[s[2]], towards)):
+        used = np.full(robot.n_tendon, not by_sector)
         used[[i, j]] = True
         guess = least / robot.softness
         guess[[i, j]] += np.clip(np.linalg.lstsq(side[:, [i, j]], lacking, rcond=None)[0], 0.0, 0.9 * limit)
-        out.append((used if by_sector else np.ones(nt, bool), np.minimum(guess, limit) * robot.softness))
-    return out
+        yield used, np.minimum(guess, limit) * robot.softness
 
 
 def _enclosed(a: float, b: float, direction: float) -> float:
@@ -114,28 +99,24 @@ def _enclosed(a: float, b: float, direction: float) -> float:
 
 def _sought(
     robot: LoadedRobot, tip: np.ndarray, used: np.ndarray, guess: np.ndarray, least: np.ndarray, limit: float
-) -> tuple[float, np.ndarray]:
+) -> tuple[float, State]:
+    """The least distance (m) found, infinite where lost, and the state (T, q, z, s) that the robot is in there."""
     T0, q0, z0, s0 = robot.state()
     T, q, z, s = guess.copy(), q0.copy(), z0.copy(), s0.copy()
-    distance = seek(
-        *robot.statics, tip, used, least, limit * robot.softness, TOLERANCE, NEAR,
-        T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU),
-    )  # fmt: skip
-    if distance >= 0.0 and robot.law.mu > 0.0:
-        distance = refine(
-            *robot.statics, tip, used, least, limit * robot.softness, TOLERANCE,
-            NEAR, STRIDE, T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU),
-        )  # fmt: skip
-    return (float(distance) if distance >= 0.0 else math.inf), T
+    ends = (tip, used, least, limit * robot.softness, TOLERANCE, NEAR)
+    distance = seek(*robot.statics, *ends, T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU))
+    if distance >= 0.0:
+        distance = refine(*robot.statics, *ends, STRIDE, T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU))
+    return (float(distance) if distance >= 0.0 else math.inf), (T, q, z, s)
 
 
-def _peek(robot: LoadedRobot, tension: np.ndarray) -> Shape:
-    """The shape `tension` (softened, true) would give; the robot stays."""
+def _shape_at(robot: LoadedRobot, state: State) -> Shape:
+    """The shape the robot has in `state`; it stays as it stands."""
     now = robot.state()
-    try:
-        return robot.pull(robot.reported(tension / robot.softness))
-    finally:
-        robot.restore(now)
+    robot.restore(state)
+    shape = robot.shape()
+    robot.restore(now)
+    return shape
 
 
 def _reason(robot: LoadedRobot, tip: np.ndarray, tension: np.ndarray, distance: float, limit: float) -> str:

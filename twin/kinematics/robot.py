@@ -6,6 +6,7 @@ Forward kinematics is `pull`: the shape under new tensions, reached from the pre
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from twin.errors import SolveError
 from twin.twin import Twin, merged_route
 
 ROOM = 296.15  # K
+State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # (T, q, z, s), see twin.equilibrium.move
 
 
 @dataclass(frozen=True)
@@ -94,11 +96,11 @@ class LoadedRobot:
         self.tension, self.q, self.slip, self.distal = T, q, z, s
         return self.shape()
 
-    def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def state(self) -> State:
         """Copies of (T, q, z, s): what `twin.equilibrium.move.pull` advances."""
         return self.tension.copy(), self.q.copy(), self.slip.copy(), self.distal.copy()
 
-    def restore(self, state: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> None:
+    def restore(self, state: State) -> None:
         """Back to an earlier `state`: a pull that was only tried."""
         self.tension, self.q, self.slip, self.distal = (x.copy() for x in state)
         self.fresh[0] = False
@@ -128,6 +130,22 @@ class LoadedRobot:
         ):  # fmt: skip
             raise SolveError("the shape is not stable: its markers have no derivative")
         return out * self.softness
+
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """Where each tendon's hole lies at the base (n_tendon,), rad from +x towards +y in [0, 2 pi): it bends the robot there."""
+        holes = self.solver.chain.site[self.solver.chain.hole[:, 0]]
+        return np.mod(np.arctan2(holes[:, 1], holes[:, 0]) + 1e-9, 2 * np.pi)
+
+    @cached_property
+    def pull_per_bend(self) -> float:
+        """The tension (N/rad) one tendon needs for a bend of constant curvature: EI / (length * lever arm)."""
+        chain = self.solver.chain
+        lever = float(np.linalg.norm(chain.site[chain.hole[0, 0], :2]))
+        bends = chain.stiffness[
+            (chain.hinge > 0.0) & ~chain.twists
+        ]  # two hinges a joint set, K = EI / h; the sets are springs in a row
+        return 1.0 / float((1.0 / bends[::2]).sum()) / lever
 
     def burden(self, payload: float) -> None:
         """Another mass (kg) at the tip from now on, the tensions kept. Raises SolveError where that has no equilibrium."""
