@@ -26,6 +26,7 @@ from twin.twin import Trace, Twin, readings, report, simulate
 
 ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
+BOUND = 1e-3  # of a parameter's range: closer to an end of it, it stands there
 STEPS = 12  # at most, of a fit
 UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
 
@@ -197,6 +198,11 @@ class Fit:
             for f, s in zip(self.model.free, self.std(), strict=True)
             if f.effect == effect
         }
+
+    def at_bound(self) -> np.ndarray:
+        """Which free parameters (n_free,) stand at an end of their range."""
+        at = [(self.model.value(f), f.parameter) for f in self.model.free]
+        return np.array([min(x - p.low, p.high - x) < BOUND * (p.high - p.low) for x, p in at], bool)
 
     def unfixed(self) -> list[str]:
         """Labels of the parameters the data do not fix: their standard error stays near their prior's."""

@@ -129,11 +129,14 @@ def _solvable_columns(objective: Objective, fit: Fit, neighbours: list[tuple[Mod
 
 
 def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
-    """X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X."""
-    k = fit.J.shape[1]
+    """X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X.
+
+    A parameter at an end of its range imitates nothing: it went as far as it may.
+    """
     S = X.T @ VX
-    JJ = S[:k, :k] + np.diag(prior_weight(fit.model) ** 2) + 1e-9 * np.eye(k)
-    return S - S[:, :k] @ np.linalg.solve(JJ, S[:k, :])
+    own = np.flatnonzero(~fit.at_bound())
+    JJ = S[np.ix_(own, own)] + np.diag(prior_weight(fit.model)[own] ** 2) + 1e-9 * np.eye(len(own))
+    return S - S[:, own] @ np.linalg.solve(JJ, S[own, :])
 
 
 def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective: Objective) -> list[float]:

@@ -31,7 +31,6 @@ SHARE = 0.15  # of the structure before: what is left counts if it is above the 
 MUCH = 0.45  # sigma of structure that counts whatever was there before
 ALONE = 0.3  # sigma of structure that counts where no effect was found: a base model may be off by less
 HALF = 0.5  # effects that leave more than this share of the structure do not explain it
-LIMIT = 1e-3  # of a parameter's range: closer to an end of it, the law is at its limit
 EVEN = 0.5  # odds that a name is right where a law of its set is at its limit
 FAR = 3.0  # standard deviations of its description: a robot's parameter found further away is doubtful
 TEMPER = 20.0  # odds are exp(score / 20): the likelihood takes the laws' form for exact, which makes raw odds absurd
@@ -262,9 +261,9 @@ def _unlikely(found: Fit) -> list[str]:
 def _strained(found: Fit) -> list[str]:
     """Effects whose parameter, one that may go either way, ended at an end of its range, in words: another law is behind them."""
     said = []
-    for free in found.model.free:
+    for free, ended in zip(found.model.free, found.at_bound(), strict=True):
         p, value = free.parameter, found.model.value(free)
-        if free.effect is not None and p.low == -p.high and p.high - abs(value) < LIMIT * (p.high - p.low):
+        if ended and free.effect is not None and p.low == -p.high:
             said.append(
                 f"{free.effect.replace('_', ' ')}: {p.name.replace('_', ' ')} came out at the end of its range "
                 f"({value:.3g} {p.unit}); this law is bent to what it does not describe"
