@@ -10,8 +10,10 @@ import pytest
 from tests.conftest import Day
 from tools.bench.nuisance import built
 from twin.bench import Bench, prepare
-from twin.calibrate import Fit, Model, Objective, fit
+from twin.calibrate import Fit, Model, Objective, fit, prior_weight
 from twin.diagnose import Settings, calibration
+from twin.diagnose.doubts import strained, unlikely
+from twin.diagnose.screen import projected
 from twin.diagnose.split import split
 from twin.measurements import Recording
 from twin.residual import Noise, Whitener
@@ -166,3 +168,44 @@ def _white(prepared: Bench, trials: list[int]) -> Whitener:
     measured = [prepared.measured[k] for k in trials]
     noise = Noise(np.full(len(prepared.outputs), 2.5e-4), np.zeros(3), np.zeros(len(prepared.outputs)), "test")
     return Whitener(noise, measured, [np.zeros((*y.shape, 3)) for y in measured], [prepared.inputs[k].command for k in trials])
+
+
+# ---- the ends of ranges ------------------------------------------------------------------------------------------------------
+
+
+def ended(found: Fit, label: str, high: bool = True) -> Fit:
+    """The same fit with one parameter at an end of its range."""
+    model = found.model
+    x = model.vector()
+    i = next(i for i, f in enumerate(model.free) if f.parameter.name == label)
+    p = model.free[i].parameter
+    x[i] = (p.high if high else p.low) / p.step
+    return replace(found, evaluation=replace(found.evaluation, model=model.at(x)))
+
+
+def test_a_parameter_at_the_end_of_its_range_absorbs_nothing(case: tuple[int, Recording, Fit]) -> None:
+    """A pattern that only the stiffness imitates gains nothing while that is free, and much once that is at its end."""
+    found = case[2]
+    assert not found.at_bound().any()
+    i = next(i for i, f in enumerate(found.model.free) if f.parameter.name == "backbone.youngs_modulus")
+    X = np.column_stack([found.J, found.J[:, i]])
+    others = np.delete(found.J, i, axis=1)
+    weight = np.diag(np.delete(prior_weight(found.model), i) ** 2)
+    c = X[:, -1]
+    alone = c @ c - c @ others @ np.linalg.solve(others.T @ others + weight, others.T @ c)  # what the other parameters leave of it
+    free, held = (float(projected(X, X, f)[-1, -1]) for f in (found, ended(found, "backbone.youngs_modulus")))
+    assert held == pytest.approx(alone, rel=1e-6)  # the same sum; 1e-9 is added to its diagonal
+    assert 0.0 <= free < 0.01 * held  # its prior alone, of 6 %, speaks against
+
+
+def test_a_law_at_the_end_of_its_range_is_said(case: tuple[int, Recording, Fit]) -> None:
+    found = case[2]
+    assert strained(found) == []
+    bent = found.model.with_effect("backbone_precurvature", {"about_x": 0.1, "slope": 0.5}, ("about_x", "about_y", "slope"), 3)
+    wider = replace(found, evaluation=replace(found.evaluation, model=bent))
+    assert strained(wider) == []
+    said = strained(ended(wider, "slope"))
+    assert len(said) == 1
+    assert said[0].startswith("backbone precurvature: slope came out at the end of its range (2)")
+    assert strained(ended(found, "backbone.youngs_modulus")) == []  # the robot's own parameters have a notice of their own
+    assert any("backbone.youngs_modulus" in words for words in unlikely(ended(found, "backbone.youngs_modulus")))

@@ -11,6 +11,7 @@ from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Objective, fit
 from twin.diagnose.describe import change, components, describe, misbent, mixed, nearest, since, unlike, where, worst_channel
 from twin.diagnose.diagnosis import Claim, Diagnosis, Settings
+from twin.diagnose.doubts import strained, unlikely
 from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import next_experiment
 from twin.diagnose.held_out import HeldOut
@@ -32,7 +33,6 @@ MUCH = 0.45  # sigma of structure that counts whatever was there before
 ALONE = 0.3  # sigma of structure that counts where no effect was found: a base model may be off by less
 HALF = 0.5  # effects that leave more than this share of the structure do not explain it
 EVEN = 0.5  # odds that a name is right where a law of its set is at its limit
-FAR = 3.0  # standard deviations of its description: a robot's parameter found further away is doubtful
 TEMPER = 20.0  # odds are exp(score / 20): the likelihood takes the laws' form for exact, which makes raw odds absurd
 
 
@@ -79,8 +79,8 @@ def diagnose(
     predictions["after"] = _predict_all(best.fit.model.twin, bench)
     calibrated, improved = ([predictions[name][k] for k in fitted] for name in ("calibrated", "after"))
     bent = after > bars.left and bool(misbent(bench, fitted, rest, improved))
-    strained = _strained(best.fit)
-    strange = bent or bool(strained) or (before > bars.left and change(bench, fitted, z) is not None)
+    bent_laws = strained(best.fit)
+    strange = bent or bool(bent_laws) or (before > bars.left and change(bench, fitted, z) is not None)
     apart = rigs(bench, fitted, base.fit)
     if apart is not None and apart.fall < base.fit.cost - best.fit.cost:  # what the effects explain needs no second robot
         apart = None
@@ -89,14 +89,14 @@ def diagnose(
     if added and held_out.worse(best.fit.model.twin, base.fit.model.twin):
         verdict = _verdict((), before, before, held_out.structure(base.fit.model.twin)[0], line[0], bars, strange)
     final = base if verdict in ("noise", "unexplained") else best
-    strained = strained if final is best else []
+    bent_laws = bent_laws if final is best else []
     if final is base and best is not base:
         unseen, floor = held_out.structure(base.fit.model.twin)
         predictions["after"] = predictions["calibrated"]
     too_small = {c.effect for c in small}
     # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
     sure = max(0.0, 1.0 - after / before) if after > bars.left else 1.0
-    sure = min(sure, EVEN) if strained else sure
+    sure = min(sure, EVEN) if bent_laws else sure
     claims = tuple(
         Claim(
             e,
@@ -126,7 +126,7 @@ def diagnose(
             description += where(bench, fitted, *((rest, improved) if final is best else (off, calibrated)))
         description += since(bench, fitted, z)
         description += mixed(bench, apart) if apart else ""
-        description += "".join(f" The {words}." for words in strained)
+        description += "".join(f" The {words}." for words in bent_laws)
         description += unlike(unseen, final.discrepancy.size) if unseen > max(MUCH, bars.left) else ""
         if runners:
             share = 1.0 - runners[0].error / held_out.error(final.fit.model.twin)
@@ -158,7 +158,7 @@ def diagnose(
         fitted_trials=tuple(fitted),
         held_trials=tuple(held),
         predictions=predictions,
-        notices=(*notices, *_unlikely(final.fit), *strained, *([mixed(bench, apart).strip()] if apart else [])),
+        notices=(*notices, *unlikely(final.fit), *bent_laws, *([mixed(bench, apart).strip()] if apart else [])),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.all),
     )
@@ -241,34 +241,6 @@ def _verdict(
     if not much and not (after > bars.left and after > SHARE * before):
         return "partly_explained" if strange else "explained"
     return "unexplained" if after > HALF * before else "partly_explained"
-
-
-def _unlikely(found: Fit) -> list[str]:
-    """The robot's own parameters that were driven far from their description, in words."""
-    said = []
-    for free in found.model.free:
-        p = free.parameter
-        value = found.model.twin.values.get(p.name, p.value)
-        if free.effect is None and p.std and abs(value - p.value) > FAR * p.std:
-            how = abs(value - p.value) / p.std
-            said.append(
-                f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "
-                f"{p.value:.4g}): check it, or something else hides in it"
-            )
-    return said
-
-
-def _strained(found: Fit) -> list[str]:
-    """Effects whose parameter, one that may go either way, ended at an end of its range, in words: another law is behind them."""
-    said = []
-    for free, ended in zip(found.model.free, found.at_bound(), strict=True):
-        p, value = free.parameter, found.model.value(free)
-        if ended and free.effect is not None and p.low == -p.high:
-            said.append(
-                f"{free.effect.replace('_', ' ')}: {p.name.replace('_', ' ')} came out at the end of its range "
-                f"({value:.3g} {p.unit}); this law is bent to what it does not describe"
-            )
-    return said
 
 
 def _probability(found: Search, effect: str, small: set[str]) -> float:
