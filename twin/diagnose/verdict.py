@@ -16,7 +16,7 @@ from twin.diagnose.evidence import Evidence, Spectrum
 from twin.diagnose.experiment import next_experiment
 from twin.diagnose.held_out import HeldOut
 from twin.diagnose.identifiability import identifiability
-from twin.diagnose.null import ACCEPT, LEFT, Thresholds, thresholds
+from twin.diagnose.null import ACCEPT, Thresholds, thresholds
 from twin.diagnose.objective import objective_of
 from twin.diagnose.rigs import rigs
 from twin.diagnose.screen import dictionary
@@ -51,7 +51,7 @@ def diagnose(
         *(f"{n}: unstable start, its shape is one of several" for n in unstable_starts(bench, nominal_traces)),
     ]
     objective, evidence, base, held_out, notes = _calibrated(bench, twin, settings, (), progress)
-    odd = held_out.odd(base.fit.model.twin) if base.discrepancy.size < LEFT else []
+    odd = held_out.odd(base.fit.model.twin) if base.discrepancy.size < ALONE else []
     if odd and len(odd) < len(bench.inputs) - 1:  # what these trials show would otherwise be seen by no fit
         shown = ", ".join(bench.inputs[k].name for k in odd)
         notices.append(f"{shown}: first held out, but unlike all others; fitted, and others held out in turn")
@@ -66,7 +66,7 @@ def diagnose(
     found = search(objective, evidence, base, patterns, bars, progress)
     progress("verdict")
     found = replace(found, best=_predicting(found, held_out, bars.accept))
-    best, dropped, small = _gate(objective, evidence, found, bars.material, progress)
+    best, dropped, small = _gate(objective, evidence, found, held_out, bars.material, progress)
     if not np.isfinite(held_out.error(best.fit.model.twin)):  # without the small ones an unseen trial has no equilibrium
         best, dropped = found.base, {}
     before, after = base.discrepancy.size, best.discrepancy.size
@@ -190,9 +190,9 @@ def calibration(recording: Recording, twin: Twin, settings: Settings | None = No
 
 
 def _gate(
-    objective: Objective, evidence: Evidence, found: Search, bar: float, progress: Progress
+    objective: Objective, evidence: Evidence, found: Search, held_out: HeldOut, bar: float, progress: Progress
 ) -> tuple[Weighed, dict[str, Weighed], tuple[Claim, ...]]:
-    """Drop effects below the materiality `bar` (sigma), smallest first.
+    """Drop effects below the materiality `bar` (sigma), and those of several without which unseen trials do better, smallest first.
 
     Returns what stays, its refits with one effect dropped, and what was too small.
     """
@@ -207,12 +207,22 @@ def _gate(
             dropped[e] = refit_without(objective, evidence, found.base, best, e)
         if not dropped:
             return best, {}, tuple(small)
-        least = min(dropped, key=lambda e: _contribution(best, dropped[e], objective))
-        c = _contribution(best, dropped[least], objective)
-        if c >= max(bar, FORM * max(_contribution(best, w, objective) for w in dropped.values())):
+        moved = {e: _contribution(best, w, objective) for e, w in dropped.items()}
+        least = min(moved, key=lambda e: moved[e])
+        if moved[least] < max(bar, FORM * max(moved.values())):
+            small.append(Claim(least, best.fit.fitted(least), float("nan"), 0.0, moved[least]))
+            best = dropped[least]
+            continue
+        harmful = [e for e in moved if len(moved) > 1 and _worse(held_out, best, dropped[e])]
+        if not harmful:
             return best, dropped, tuple(small)
-        small.append(Claim(least, best.fit.fitted(least), float("nan"), 0.0, c))
-        best = dropped[least]
+        best = dropped[min(harmful, key=lambda e: moved[e])]
+
+
+def _worse(held_out: HeldOut, with_effect: Weighed, without: Weighed) -> bool:
+    """On unseen trials; where one of the two has no equilibrium there, it is not said."""
+    twins = [w.fit.model.twin for w in (with_effect, without)]
+    return all(np.isfinite(held_out.error(t)) for t in twins) and held_out.worse(*twins)
 
 
 def _accuracy(bench: Bench, noise: Noise, accuracy: float) -> float:

@@ -16,6 +16,7 @@ from tools.bench.effects.effect import Effect, Situation
 @dataclass(frozen=True)
 class TendonFriction(Effect):
     id: ClassVar[str] = "tendon_friction"
+    most: ClassVar[float] = 8.0  # mu 0.8; dry metal on metal is at 0.6
 
     stroke: float  # m
 
