@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from tests.conftest import Day
+from tools.second_opinion.forward_bic import forward_bic
+from tools.second_opinion.start import Calibrated
 from tools.second_opinion.table import table
+from twin.diagnose import Settings
+from twin.twin import Twin
 
 
 def answer(*named: str, missing: bool | None = None, after: float = 1.0) -> dict:
@@ -35,3 +40,12 @@ def test_answers_are_counted_by_class_of_effects() -> None:
 def test_a_run_without_pairs_has_a_table() -> None:
     row = {"true": [], "floor": 1.0, "calibrated": 1.0, "answers": {"a": answer()}}
     assert cells(table([row]), "held-out after / floor, pairs") == ["-"]
+
+
+def test_an_opinion_starts_where_the_diagnosis_does_and_names_friction(bench: Day) -> None:
+    """2.5 times the drawn friction on six trials: what any selection must see."""
+    recording = bench("tendon_friction", 2.5)[0].select(["slow_1", "slow_2", "pair_3", "circle_1", "circle_2", "wander_3"])
+    start = Calibrated.of(recording, Twin.of("continuum"), Settings())
+    found = forward_bic(start)
+    assert "tendon_friction" in found.named
+    assert start.held_out(found.twin) < 0.8 * start.held_out(start.fit.model.twin)

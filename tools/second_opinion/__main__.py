@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+from tools.attribution_table import made
 from tools.second_opinion.bound_hit import bound_hit
 from tools.second_opinion.forward_bic import forward_bic
 from tools.second_opinion.sparse_regression import sparse_regression
@@ -62,7 +63,7 @@ def main() -> None:
     for line in (args.results / "attribution.jsonl").read_text().splitlines():
         diagnosed = json.loads(line)
         seed = diagnosed["seed"]
-        if seed in done:
+        if seed in done or not made(diagnosed):
             continue
         try:
             answers = opinions(args.results / f"set_{seed}", seed)

@@ -8,10 +8,11 @@ import numpy as np
 
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit, Objective, fit
+from twin.diagnose import Settings
 from twin.diagnose.evidence import COMPONENTS, Discrepancy, Evidence
+from twin.diagnose.objective import objective_of
 from twin.diagnose.screen import Candidate, dictionary, screen
 from twin.diagnose.split import split
-from twin.diagnose.verdict import Settings, _objective  # the diagnosis's own noise and calibration, whatever they become
 from twin.effects import catalogue
 from twin.evaluate import rms
 from twin.measurements import Recording
@@ -41,7 +42,7 @@ class Calibrated:
     def of(recording: Recording, twin: Twin, settings: Settings) -> Calibrated:
         bench = prepare(recording, twin.robot)
         fitted, held = split(bench, settings.seed)
-        start, objective, _ = _objective(bench, twin, fitted, settings)
+        start, objective, _ = objective_of(bench, twin, fitted, settings)
         return Calibrated(bench, held, objective, Evidence(bench, fitted), fit(objective, start, refresh=True))
 
     def screened(self, at: Fit) -> list[Candidate]:
