@@ -16,7 +16,7 @@ from twin.residual import Noise, Whitener
 from twin.twin import Twin, readings, report, simulate
 
 ODD = 1.0  # sigma
-WORSE = 1.001  # of an error in SI: less is rounding, and what refitted parameters move
+WORSE = 1.005  # of the headline's error; refitting alone moves it by some thousandth, as it does where an effect shows elsewhere
 
 
 class HeldOut:
