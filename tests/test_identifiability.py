@@ -34,7 +34,7 @@ def by_hand(*columns: np.ndarray, robot: np.ndarray) -> dict[str, Visibility]:
     effects = (("tendon_friction", "mu"), ("time_delay", "delay"), ("tip_payload", "mass"))
     patterns = tuple(Pattern(e, Start({}, (p,)), (p,), (i,)) for i, ((e, p), _) in enumerate(zip(effects, columns, strict=False)))
     free: Any = (SimpleNamespace(parameter=SimpleNamespace(std=None, step=1.0)),)
-    base: Any = SimpleNamespace(J=robot[:, None], model=SimpleNamespace(free=free))
+    base: Any = SimpleNamespace(J=robot[:, None], model=SimpleNamespace(free=free), at_bound=lambda: np.zeros(1, bool))
     objective: Any = SimpleNamespace(bench=bench(bench_day("default", np.random.default_rng(0))), n=N)
     table = identifiability(objective, base, Dictionary(patterns, np.stack(columns, axis=1)), MATERIAL)
     return {v.effect: v for v in table}
