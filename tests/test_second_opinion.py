@@ -11,7 +11,8 @@ from twin.twin import Twin
 
 
 def answer(*named: str, missing: bool | None = None, after: float = 1.0) -> dict:
-    return {"missing": bool(named) if missing is None else missing, "named": list(named), "after": after, "seconds": 1.0}
+    return {"missing": bool(named) if missing is None else missing, "named": list(named), "after": after, "seconds": 1.0,
+            "flagged": bool(missing) and not named}  # fmt: skip
 
 
 def cells(text: str, label: str) -> list[str]:
@@ -24,17 +25,19 @@ def test_answers_are_counted_by_class_of_effects() -> None:
         {"true": [], "answers": {"a": answer(), "b": answer(missing=True)}},
         {"true": [tilt], "answers": {"a": answer(camera), "b": answer(tilt, friction, after=2.0)}},
         {"true": [tilt], "answers": {"a": answer(missing=True), "b": answer(friction, tilt, after=2.0)}},
+        {"true": ["helix"], "answers": {"a": answer(missing=True), "b": answer(tilt)}},
         {"true": [tilt, contact], "answers": {"a": answer(contact, tilt), "b": answer(contact, friction)}},
     ]
     text = table([{"floor": 1.0, "calibrated": 1.5, **row} for row in rows])
     assert cells(text, "false positives on no-effect sets") == ["0/1", "1/1"]
+    assert cells(text, "out of catalogue, flagged") == ["1/1", "0/1"]
     assert cells(text, "says something is missing, one effect") == ["2/2", "2/2"]
     assert cells(text, "right effect first, one effect") == ["1/2", "1/2"]
     assert cells(text, "exact set, one effect") == ["1/2", "0/2"]
     assert cells(text, "first is a true one, two effects") == ["1/1", "1/1"]
     assert cells(text, "exact set, two effects") == ["1/1", "0/1"]
     assert cells(text, "held-out after / floor, singles") == ["1.00", "(1.00)", "2.00", "(2.00)"]
-    assert cells(text, "worse than calibrated on held-out trials") == ["0/4", "2/4"]
+    assert cells(text, "worse than calibrated on held-out trials") == ["0/5", "2/5"]
 
 
 def test_a_run_without_pairs_has_a_table() -> None:

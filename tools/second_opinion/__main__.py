@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from tools.attribution_table import made
+from tools.attribution_table import flagged, made
 from tools.second_opinion.bound_hit import bound_hit
 from tools.second_opinion.forward_bic import forward_bic
 from tools.second_opinion.sparse_regression import sparse_regression
@@ -40,14 +40,16 @@ def opinions(folder: Path, seed: int) -> dict[str, dict]:
         began = time.perf_counter()
         found = opinion(start)
         seconds = shared + time.perf_counter() - began
-        out[name] = {"missing": found.missing, "named": found.named, "after": start.held_out(found.twin), "seconds": seconds}
+        silent = found.missing and not found.named
+        after = start.held_out(found.twin)
+        out[name] = {"missing": found.missing, "named": found.named, "flagged": silent, "after": after, "seconds": seconds}
     return out
 
 
 def ours(row: dict) -> dict:
     """The diagnosis's own answer in the same form."""
     missing = bool(row["claims"]) or row["verdict"] == "unexplained"
-    return {"missing": missing, "named": row["claims"], "after": row["after"], "seconds": row["seconds"]}
+    return {"missing": missing, "named": row["claims"], "flagged": flagged(row), "after": row["after"], "seconds": row["seconds"]}
 
 
 def main() -> None:

@@ -7,13 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from tools.attribution_table import same
+from twin.effects import catalogue
 
 
 def table(rows: list[dict]) -> str:
     """One column an opinion; effects are compared by class, as for the diagnosis."""
     none = [r for r in rows if not r["true"]]
-    single = [r for r in rows if len(r["true"]) == 1]
+    single = [r for r in rows if len(r["true"]) == 1 and set(r["true"]) <= set(catalogue())]
     pairs = [r for r in rows if len(r["true"]) == 2]
+    unknown = [r for r in rows if len(r["true"]) == 1 and r not in single]
     names = list(rows[0]["answers"])
 
     def line(label: str, cell: Callable[[str], str]) -> str:
@@ -26,7 +28,7 @@ def table(rows: list[dict]) -> str:
         return lambda name: f"{np.median(v := values(name)):.2f} ({np.quantile(v, 0.9):.2f})" if values(name) else "-"
 
     lines = [
-        f"{len(rows)} sets: {len(none)} none, {len(single)} single, {len(pairs)} pairs",
+        f"{len(rows)} sets: {len(none)} none, {len(single)} single, {len(pairs)} pairs, {len(unknown)} out of catalogue",
         line("", str),
         line("false positives on no-effect sets", share(none, lambda r, a: a["missing"])),
         line("says something is missing, one effect", share(single, lambda r, a: a["missing"])),
@@ -34,6 +36,7 @@ def table(rows: list[dict]) -> str:
         line("exact set, one effect", share(single, _exact)),
         line("first is a true one, two effects", share(pairs, _first)),
         line("exact set, two effects", share(pairs, _exact)),
+        line("out of catalogue, flagged", share(unknown, lambda r, a: a["flagged"])),
         line("held-out after / floor, no effect", spread(lambda n: [r["answers"][n]["after"] / r["floor"] for r in none])),
         line("held-out after / floor, singles", spread(lambda n: [r["answers"][n]["after"] / r["floor"] for r in single])),
         line("held-out after / floor, pairs", spread(lambda n: [r["answers"][n]["after"] / r["floor"] for r in pairs])),
