@@ -43,6 +43,11 @@ def test_the_other_verdicts(verdict, start, end):
     assert words.endswith(end)
 
 
+def test_a_name_in_doubt_that_leaves_little_is_not_said_to_leave_much():
+    d = diagnosis("partly_explained", structure_after=0.05)
+    assert sentence(d).endswith("Little is left, but something speaks against it: see what is left, and the notices.")
+
+
 def test_a_spectral_line_alone_is_named():
     words = sentence(diagnosis("unexplained", structure={"static": 0.01}, line=(50.0, 3.2)))
     assert "moves mostly with a line at 3.20 Hz" in words

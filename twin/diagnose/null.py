@@ -27,8 +27,8 @@ from twin.diagnose.screen import Dictionary, projected
 DRAWS = 24
 GUMBEL_99 = 3.137  # standard deviations above the mean of a Gumbel law: -sqrt(6)/pi (0.5772 + ln(-ln 0.99))
 ACCEPT = 12.0  # evidence an effect must bring, after k log n: odds of e^6, safe over two dozen candidates
-# sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say. On 430 bench days 2 of 353 right
-# claims were smaller, and 12 wrong ones, most of robots with a flaw that no parameter spans (tools/attribution.md).
+# sigma: an effect that moves the prediction by less is not claimed, whatever the statistics say. On 495 bench days 3 of 361 right
+# claims were smaller, and 13 of 72 wrong ones, most of robots with a flaw that no parameter spans (tools/attribution.md).
 MATERIAL = 0.13
 LEFT = 0.12  # sigma of left-over structure; robots as built left 0.08 at most, of what no parameter spans
 LINE = 30.0  # z-score of a spectral line

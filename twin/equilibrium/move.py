@@ -14,7 +14,7 @@ from twin.equilibrium.lengths import pulls
 from twin.equilibrium.linear import substitute
 from twin.equilibrium.newton import is_minimum, newton, place, solve
 
-STRIDE = 0.75  # N: the largest part; 0.75 against 0.02 moves the tip by less than 0.1 mm (tests/test_kinematics.py)
+STRIDE = 0.75  # N: the largest part; 0.75 against 0.02 moves the tip by some 0.1 mm at most (tests/test_kinematics.py)
 SHORTEST = 1.0 / 16.0  # of a part: below it the robot is let go where it wants
 TRIALS = 25  # Gauss-Newton steps of `seek`
 CORRECTIONS = 12  # of its answer, the way there considered

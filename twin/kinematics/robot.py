@@ -142,9 +142,8 @@ class LoadedRobot:
         """The tension (N/rad) one tendon needs for a bend of constant curvature: EI / (length * lever arm)."""
         chain = self.solver.chain
         lever = float(np.linalg.norm(chain.site[chain.hole[0, 0], :2]))
-        bends = chain.stiffness[
-            (chain.hinge > 0.0) & ~chain.twists
-        ]  # two hinges a joint set, K = EI / h; the sets are springs in a row
+        # Two hinges a joint set, K = EI / h; the sets are springs in a row.
+        bends = chain.stiffness[(chain.hinge > 0.0) & ~chain.twists]
         return 1.0 / float((1.0 / bends[::2]).sum()) / lever
 
     def burden(self, payload: float) -> None:

@@ -33,7 +33,7 @@ def structure_left(diagnosis: Diagnosis) -> str | None:
     if diagnosis.verdict in ("noise", "explained"):
         return None
     sizes = diagnosis.structure
-    if diagnosis.line[0] > diagnosis.bars.faint and max(sizes.values(), default=0.0) < 0.15:
+    if diagnosis.line[0] > diagnosis.bars.faint and max(sizes.values(), default=0.0) < diagnosis.bars.left:
         return f"a line at {diagnosis.line[1]:.2f} Hz"
     return IN_WORDS[max(sizes, key=lambda c: sizes[c])]
 
@@ -99,5 +99,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     change = f"the error {verb} from {before} to {after} {unit} (noise floor {floor} {unit})"
     others = rivals(d)
     doubt = f" These data cannot tell {'them' if many else 'it'} from {' or '.join(others[:2])}." if others else ""
-    rest = f" What is left moves mostly with {left}." if left else ""
+    little = left and d.structure_after <= d.bars.left and d.line[0] <= d.bars.faint
+    rest = " Little is left, but something speaks against it: see what is left, and the notices." if little else ""
+    rest = f" What is left moves mostly with {left}." if left and not little else rest
     return f"{start}: {names}. {upper_first(explains + unseen)} {change}.{doubt}{rest}"
