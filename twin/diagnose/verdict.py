@@ -22,7 +22,7 @@ from twin.diagnose.rigs import rigs
 from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
 from twin.diagnose.split import split
-from twin.errors import DataError
+from twin.errors import DataError, SolveError
 from twin.evaluate import UNIT
 from twin.measurements import Recording
 from twin.residual import Noise
@@ -65,9 +65,9 @@ def diagnose(
     table = identifiability(objective, base.fit, patterns, bars.material)
     found = search(objective, evidence, base, patterns, bars, progress)
     progress("verdict")
-    found = replace(found, best=_predicting(found, held_out, bars.accept))
+    found = replace(found, best=_predicting(found, bench, bars.accept))
     best, dropped, small = _gate(objective, evidence, found, held_out, bars.material, progress)
-    if not np.isfinite(held_out.error(best.fit.model.twin)):  # without the small ones an unseen trial has no equilibrium
+    if not _solves(best.fit.model.twin, bench):  # without the small ones
         best, dropped = found.base, {}
     before, after = base.discrepancy.size, best.discrepancy.size
     line = Spectrum.of(bench, fitted).peak(best.fit.z.reshape(best.discrepancy.mean.shape) - best.discrepancy.mean)
@@ -262,10 +262,19 @@ def _probability(found: Search, effect: str, small: set[str]) -> float:
     return float(weights[inside].sum() / weights.sum())
 
 
-def _predicting(found: Search, held_out: HeldOut, accept: float) -> Weighed:
-    """The best set that has an equilibrium in every held-out trial too: a stiff wall may leave a trial none."""
+def _predicting(found: Search, bench: Bench, accept: float) -> Weighed:
+    """The best set that every trial, fitted or held out, can be predicted with."""
     ranked = [found.best, *sorted(found.all, key=lambda w: accept * len(w.effects) - w.score)]
-    return next((w for w in ranked if np.isfinite(held_out.error(w.fit.model.twin))), found.base)
+    return next((w for w in ranked if _solves(w.fit.model.twin, bench)), found.base)
+
+
+def _solves(twin: Twin, bench: Bench) -> bool:
+    """A stiff wall may leave a held-out trial no equilibrium, and a fitted one one that only its neighbours in the fit lead to."""
+    try:
+        simulate(twin, bench)
+    except SolveError:
+        return False
+    return True
 
 
 def _predict_all(twin: Twin, bench: Bench) -> list[np.ndarray]:
