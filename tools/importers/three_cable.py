@@ -16,7 +16,7 @@ from tools.importers.importer import Dropped
 from twin.measurements import Channel, Recording, Trial
 
 PER_STEP = 1e-4  # m of cable per unit of action
-NOISE = 5e-5  # m: second differences of neighbouring rows (README: 0.04-0.06 mm)
+NOISE = 1.5e-4  # m: what neighbouring sweeps, 0.1 mm of cable apart, repeat to; the camera alone: 0.05 mm
 FIRST, THIN = 8, 6  # rows kept at a sweep's start; of the rest one in so many
 EVERY = 7  # one sweep in so many is taken
 BLOCK = 10200  # rows of the first block
