@@ -17,11 +17,11 @@ STEPS = 30  # of the inverse; each takes off the error's slope, below one where 
 class TransmissionError(Effect):
     """Tendon taken up by drive i at command u = u + sine_i sin(2 pi u/turn) + cosine_i (1 - cos(2 pi u/turn)).
 
-    A static error of each drive, the same whichever way it travels and wherever the other tendons are; `turn` is the tendon taken up
-    in one period and common to all drives, which are alike. It is counted from u = 0, where the tendons were zeroed.
+    A static error of each drive, the same whichever way it travels and wherever the other tendons are; `turn` is the tendon taken
+    up in one period and common to all drives, which are alike. It is counted from u = 0, where the tendons were zeroed.
 
-    Source: first harmonic of a transmission's position error. A drum of radius R whose axis is off its centre by e has turn = 2 pi R
-    and amplitude e; a gear's runout, an encoder off-centre or a hobby servo's crooked potentiometer do the same.
+    Source: first harmonic of a transmission's position error. A drum of radius R whose axis is off its centre by e has
+    turn = 2 pi R and amplitude e; a gear's runout, an encoder off-centre, a hobby servo's crooked potentiometer do the same.
 
     >>> u, z = np.array([[0.0], [2.5e-3]]), np.zeros
     >>> s = Signals(z(2), z(2), 0 * u, u, z((2, 0, 3)), z(2), np.array([True]))
@@ -38,11 +38,12 @@ class TransmissionError(Effect):
     )
     shape = ("turn",)
     needs = frozenset({"backbone"})
-    moves_with = "the travel of one drive"
+    moves_with = "the pull of one tendon, by how far it is drawn in"
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """The drives that displacements command and that move, all at once: they are of one make."""
+        """The drives that move, all at once: they are of one make. Only where displacements command all tendons: where tensions do,
+        a drive's error is its encoder's alone and bends nothing."""
         held = [s.displacement[:, s.by_length] for s in predicted if s.by_length.all() and not s.angle.size]
         if not held:
             return
