@@ -113,7 +113,7 @@ def usual() -> dict[str, Visibility]:
 
 def test_every_effect_has_a_row_and_only_what_is_not_logged_is_never_seen(usual: dict[str, Visibility]) -> None:
     of_springs = {name for name, law in catalogue().items() if law(n_tendon=3).acts_in("spring")}  # none pull here
-    assert set(usual) == set(catalogue()) - of_springs
+    assert set(usual) == set(catalogue()) - of_springs - {"transmission_error"}  # sought where displacements command
     for effect, v in usual.items():
         assert 0.0 <= v.share <= 1.0
         assert v.seen <= v.apart

@@ -44,6 +44,10 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
             Row(f"three-cable, tip error on {name}", "<= 70 %", "<= 50 %", told, after <= 0.7 * before, after <= 0.5 * before)
         )
     found = DEAD_BAND in claimed
+    small = [c for c in diagnosis.below_materiality if c.effect == DEAD_BAND]
+    if small:
+        gap = small[0].parameters["gap"]
+        said += f"; as diagnosed {5e2 * gap.value:.2f} +- {5e2 * (gap.std or 0.0):.2f} mm, below materiality"
     nearest = ", ".join(c.effect for c in diagnosis.runners_up)
     lines.append(
         Row(
@@ -54,6 +58,7 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
             found,
         )
     )
+    lines.append(Row("three-cable, what the error moves with named", "named", "", f"claimed: {claimed or 'none'}", bool(claimed)))
     lines.append(
         Row("three-cable, diagnosis", "<= 5 min", "<= 1 min", f"{spent:.0f} s, {diagnosis.verdict}", spent <= 300, spent <= 60)
     )

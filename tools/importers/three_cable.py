@@ -16,7 +16,9 @@ from tools.importers.importer import Dropped
 from twin.measurements import Channel, Recording, Trial
 
 PER_STEP = 1e-4  # m of cable per unit of action
-NOISE = 5e-5  # m: second differences of neighbouring rows (README: 0.04-0.06 mm)
+# m an axis: a sweep less the mean of its two neighbours, 0.1 mm of cable apart, is 0.33 mm RMS in space over block 1, which is
+# sqrt(3/2 * 3) times this. The camera alone has 0.05 mm (second differences along a sweep), but the robot sticks and slips.
+NOISE = 1.5e-4
 FIRST, THIN = 8, 6  # rows kept at a sweep's start; of the rest one in so many
 EVERY = 7  # one sweep in so many is taken
 BLOCK = 10200  # rows of the first block
