@@ -17,7 +17,7 @@ from twin.errors import SolveError
 WIDTH = 3  # models carried from level to level
 BEHIND = 400.0  # a model this far behind the best is not extended
 DEEPEST = 3  # effects at once
-FORM = 0.15  # of the largest effect's contribution: a smaller one may be what the large one's law gets wrong
+FORM = 0.15  # of the largest contribution: a smaller one may be what the large one's law gets wrong, unless it takes most of that
 PROMISE = 0.25  # of a material gain: what a first-order pattern must promise to be worth a refit
 ROUGHLY = 2e-4  # of the cost: the last step's fall at which a refit is weighed; what is left is second order in it
 

@@ -192,7 +192,8 @@ def calibration(recording: Recording, twin: Twin, settings: Settings | None = No
 def _gate(
     objective: Objective, evidence: Evidence, found: Search, held_out: HeldOut, bar: float, progress: Progress
 ) -> tuple[Weighed, dict[str, Weighed], tuple[Claim, ...]]:
-    """Drop effects below the materiality `bar` (sigma), and those of several without which unseen trials do better, smallest first.
+    """Drop, smallest first: effects below the materiality `bar` (sigma), those that may be what a much larger one's law gets wrong,
+    and those of several without which unseen trials do better.
 
     Returns what stays, its refits with one effect dropped, and what was too small.
     """
@@ -209,7 +210,8 @@ def _gate(
             return best, {}, tuple(small)
         moved = {e: _contribution(best, w, objective) for e, w in dropped.items()}
         least = min(moved, key=lambda e: moved[e])
-        if moved[least] < max(bar, FORM * max(moved.values())):
+        beside_large = moved[least] < FORM * max(moved.values()) and not _takes_most(held_out, best, dropped[least])
+        if moved[least] < bar or beside_large:
             small.append(Claim(least, best.fit.fitted(least), float("nan"), 0.0, moved[least]))
             best = dropped[least]
             continue
@@ -217,6 +219,15 @@ def _gate(
         if not harmful:
             return best, dropped, tuple(small)
         best = dropped[min(harmful, key=lambda e: moved[e])]
+
+
+def _takes_most(held_out: HeldOut, with_effect: Weighed, without: Weighed) -> bool:
+    """Whether an effect explains half of all that is left without it, on unseen trials too: a large law's faults leave more."""
+    try:
+        sizes = [(w.discrepancy.size, held_out.structure(w.fit.model.twin)[0]) for w in (with_effect, without)]
+    except SolveError:
+        return False
+    return all(after <= HALF * before for after, before in zip(*sizes, strict=True))
 
 
 def _worse(held_out: HeldOut, with_effect: Weighed, without: Weighed) -> bool:
