@@ -49,7 +49,9 @@ def test_holds_of_the_tentacle_are_where_the_derived_table_has_them(raw: Path, t
 
 
 def test_sweeps_of_the_three_cable_robot_rise_with_one_cable_and_stay_in_their_block(raw: Path) -> None:
-    recording, _ = three_cable.read(raw / "three-cable")
+    recording, dropped = three_cable.read(raw / "three-cable")
+    kept = sum(len(t.time) for t in recording.trials)
+    assert kept + sum(n for _, _, n, _ in dropped.rows) == sum(of for _, _, _, of in dropped.rows), "every sample is accounted for"
     assert {t.name[:6] for t in recording.trials} == {"block1", "block2"}
     for trial in recording.trials:
         pulls = np.stack([trial.values[f"tendon_{i}_displacement"] for i in (1, 2, 3)])

@@ -15,6 +15,6 @@ class Dropped:
         self.rows.append((file, reason, dropped, of))
 
     def __str__(self) -> str:
-        told = [f"  {file}: {n} of {of} samples dropped, {reason}" for file, reason, n, of in self.rows if n]
+        told = [f"  {file}: {n}{f' of {of}' if of else ''} samples dropped, {reason}" for file, reason, n, of in self.rows if n]
         total, of = sum(r[2] for r in self.rows), sum(r[3] for r in self.rows)
         return "\n".join([*told, f"  {total} of {of} samples dropped in all"])

@@ -16,9 +16,9 @@ from tools.importers.importer import Dropped
 from twin.measurements import Channel, Recording, Trial
 
 PER_STEP = 1e-4  # m of cable per unit of action
-# m an axis: a sweep less the mean of its two neighbours, 0.1 mm of cable apart, is 0.33 mm RMS in space over block 1, which is
-# sqrt(3/2 * 3) times this. The camera alone has 0.05 mm (second differences along a sweep), but the robot sticks and slips.
-NOISE = 1.5e-4
+# m an axis: a sweep less the mean of those 0.3 mm of cable before and after it, over sqrt(3/2); 0.5 and 0.7 mm away as much. Next
+# to each other, 0.1 mm, sweeps stick alike (0.16 mm); the camera alone has 0.05 mm (second differences along a sweep).
+NOISE = 2e-4
 FIRST, THIN = 8, 6  # rows kept at a sweep's start; of the rest one in so many
 EVERY = 7  # one sweep in so many is taken
 BLOCK = 10200  # rows of the first block
@@ -36,7 +36,6 @@ def read(folder: Path) -> tuple[Recording, Dropped]:
         "Dataset.txt", f"sweeps shorter than {SHORTEST} rows", sum(len(s) for s in sweeps if len(s) < SHORTEST), len(rows)
     )
     taken = whole[::EVERY]
-    dropped.count("Dataset.txt", f"all but one sweep in {EVERY}", sum(map(len, whole)) - sum(map(len, taken)), 0)
     for sweep in taken:
         kept = np.r_[sweep[:FIRST], sweep[FIRST::THIN]]
         thinned += len(sweep) - len(kept)
@@ -47,6 +46,7 @@ def read(folder: Path) -> tuple[Recording, Dropped]:
         values |= {f"marker_1_{axis}": tip[:, j] for j, axis in enumerate("xyz")}
         block = 1 if sweep[0] < BLOCK else 2
         trials.append(Trial(f"block{block}_{held}.csv", (kept - kept[0]).astype(float), values, start=float(sweep[0])))
+    dropped.count("Dataset.txt", f"all but one sweep in {EVERY}", sum(map(len, whole)) - sum(map(len, taken)), 0)
     dropped.count("Dataset.txt", f"beyond row {FIRST} of a sweep all but one in {THIN}", thinned, 0)
     channels = [Channel(f"tendon_{i}_displacement", "input", "mm", 5e-6) for i in (1, 2, 3)]
     channels += [Channel(f"marker_1_{axis}", "output", "mm", NOISE) for axis in "xyz"]
