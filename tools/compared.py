@@ -27,6 +27,20 @@ def _routed(i: int, angle: float, radius: float) -> np.ndarray:
     return out
 
 
+TRAVEL = np.repeat(np.linspace(-6e-3, 1e-2, 33)[:, None], 3, axis=1)  # m, of the bench's motors
+
+
+def _wave(taken_up: np.ndarray) -> np.ndarray:
+    """What drives take up beside their command over `TRAVEL`, less a gain of all, which is the hole radius's, a nuisance."""
+    off = taken_up - TRAVEL
+    return off - TRAVEL * (off * TRAVEL).sum() / (TRAVEL**2).sum()
+
+
+def _harmonic(v: dict[str, float]) -> np.ndarray:
+    phase = 2.0 * np.pi * TRAVEL / v["turn"]
+    return TRAVEL + _each(v, "sine") * np.sin(phase) + _each(v, "cosine") * (1.0 - np.cos(phase))
+
+
 DOWN = np.array([0.0, 0.0, 9.81])
 # an effect of the bench with fields of its own, the twin's parameters of it
 Compare = Callable[[Any, dict[str, float]], tuple[object, object, float]]
@@ -67,6 +81,7 @@ COMPARED: dict[str, Compare] = {
     "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
     "tendon_backlash": lambda t, v: (1e-4 * t.strength, v["gap"], OTHER),  # swaps sides by another law there
     "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
+    "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER),  # a whole drum there
     "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),
     # Starts and finishes of the phases move by different amounts there: their means are what this law knows.
     "sma_hysteresis": lambda t, v: (
