@@ -1,8 +1,8 @@
 """A drum whose axis is off its centre, 0.1 mm times strength, draws in more or less tendon than its turning says.
 
 The tendon leaves the drum (radius R) on its tangent through a guide g 40 mm away. With its centre at c = e (cos(theta + p),
-sin(theta + p)) the piece from guide to drum is sqrt(|g - c|^2 - R^2) and touches the drum at angle(g - c) + arccos(R / |g - c|). The
-drive takes R theta for what is drawn in; the drum draws in R theta and what both pieces change by. Drums are alike, each has its p.
+sin(theta + p)) the piece from guide to drum is sqrt(|g - c|^2 - R^2) and touches the drum at angle(g - c) + arccos(R / |g - c|).
+The drive takes R theta for what is drawn in; the drum draws in R theta and what both pieces change by. Drums are alike but for p.
 """
 
 from __future__ import annotations
