@@ -16,7 +16,7 @@ import numpy as np
 
 from tools.comparisons.cable_tool import split as runs
 from tools.comparisons.tentacle import HOOKE, calibrated
-from tools.comparisons.three_cable import with_dead_band
+from tools.comparisons.three_cable import halves
 from tools.importers import cable_tool, tentacle, three_cable
 from twin.bench import Bench, prepare
 from twin.diagnose import Settings, diagnose
@@ -61,18 +61,22 @@ def draw_tentacle(folder: Path) -> None:
 
 
 def draw_three_cable(folder: Path) -> None:
-    """The tip's error along a sweep, for the calibrated robot and with a dead band."""
+    """The tip's error over sweeps that no fit has seen, for the robot calibrated and diagnosed on every other sweep of block 1."""
     recording, _ = three_cable.read(folder)
     bench = prepare(recording, load("three_cable"))
-    block = [k for k, i in enumerate(bench.inputs) if i.name.startswith("block1")]
-    base, slack, _ = with_dead_band(bench, block[::2])
-    figure, axis = plt.subplots(figsize=(5.0, 2.8), layout="constrained")
-    for twin, colour, name in ((base, BEFORE, "calibrated"), (slack, AFTER, "with a dead band")):
-        off = np.stack([bench.measured[k] - y for k, y in zip(block[1::2], predicted(bench, twin, block[1::2]), strict=True)])
-        pull = 1e3 * bench.inputs[block[1]].command[:, 2]
-        axis.plot(pull, 1e3 * np.sqrt((off**2).sum(axis=2).mean(axis=0)), ".-", color=colour, label=name)
-    axis.set(xlabel="shortening of cable 3, mm", ylabel="tip error, mm", ylim=(0, None))
-    axis.legend(frameon=False)
+    fitted, beside, other = halves(recording, 1)
+    found = diagnose(recording.select(fitted), Twin.of(load("three_cable")), Settings(jobs=1))
+    figure, axes = plt.subplots(1, 2, figsize=(8.0, 2.8), sharey=True, layout="constrained")
+    for twin, colour, name in ((found.calibrated, BEFORE, "calibrated"), (found.twin, AFTER, "after the diagnosis")):
+        for axis, rows, cable in ((axes[0], beside, 1), (axes[1], other, 0)):
+            off = [bench.measured[k] - y for k, y in zip(rows, predicted(bench, twin, rows), strict=True)]
+            error = [1e3 * np.sqrt((e**2).sum(axis=1).mean()) for e in off]
+            axis.plot([1e3 * bench.inputs[k].command[0, cable] for k in rows], error, ".-", color=colour, label=name)
+    axes[0].set(xlabel="cable 2 held at, mm", ylabel="tip error of a sweep, mm", ylim=(0, None))
+    axes[0].set_title("block 1, the other sweeps", fontsize=9, loc="left")
+    axes[1].set(xlabel="cable 1 held at, mm")
+    axes[1].set_title("block 2, where cable 1 first moves", fontsize=9, loc="left")
+    axes[0].legend(frameon=False)
     figure.savefig(models_folder() / "three_cable/sweep.svg", metadata={"Date": None})
 
 
