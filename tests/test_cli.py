@@ -136,7 +136,7 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
     for seconds in (4.0, 3.0, 2.0):  # into the calibration on a slow machine; a fast one may be done by then
         running = subprocess.Popen(
             command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it, and so would this
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it, and so would this
         )  # fmt: skip
         time.sleep(seconds)
         running.send_signal(signal.SIGINT)
