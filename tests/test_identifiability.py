@@ -11,6 +11,7 @@ import pytest
 
 from tests.test_design import DISPLACEMENTS, TEMPERATURE, bench
 from tools.bench.design import Day, bench_day
+from tools.bench.effects import all_effects
 from twin.bench import Bench
 from twin.calibrate import Fit, Model, Objective
 from twin.diagnose.identifiability import CLEAR, Visibility, identifiability
@@ -112,8 +113,9 @@ def usual() -> dict[str, Visibility]:
 
 
 def test_every_effect_has_a_row_and_only_what_is_not_logged_is_never_seen(usual: dict[str, Visibility]) -> None:
+    of_lengths = {name for name in catalogue() if all_effects()[name].by_length}  # tensions are commanded here
     of_springs = {name for name, law in catalogue().items() if law(n_tendon=3).acts_in("spring")}  # none pull here
-    assert set(usual) == set(catalogue()) - of_springs - {"transmission_error"}  # sought where displacements command
+    assert set(usual) == set(catalogue()) - of_springs - of_lengths
     for effect, v in usual.items():
         assert 0.0 <= v.share <= 1.0
         assert v.seen <= v.apart

@@ -41,6 +41,14 @@ def test_it_is_what_refits_without_each_trial_give() -> None:
     assert left_out(objective, fit) > float(np.mean(fit.z**2)), "what is left out is predicted worse than what is fitted"
 
 
+def test_what_one_trial_alone_shows_does_not_end_it() -> None:
+    """J'J of 1e12 beside a ridge of 1e-9: the difference of two such sums would be singular."""
+    objective, fit, J, _ = linear(np.random.default_rng(3))
+    J[:, 1] = 0.0
+    J[: TRIALS[0], 1] = 1e6
+    assert np.isfinite(left_out(objective, fit))
+
+
 def weighed(*effects: str, score: float, size: float, unseen: float) -> Any:
     twin = SimpleNamespace(effects=effects, unseen=unseen)
     fit = SimpleNamespace(model=SimpleNamespace(twin=twin))

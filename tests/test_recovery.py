@@ -26,14 +26,13 @@ from twin.robots import load
 from twin.twin import Twin
 
 STRENGTH = {"load_cell_bias": 4.0, "load_cell_drift": 3.0, "base_tilt": 4.0, "tip_payload": 4.0, "contact": 1.6, "time_delay": 0.8,
-            "actuator_saturation": 3.5, "tendon_backlash": 4.0, "load_cell_crosstalk": 1.0}  # fmt: skip
-
-ELSEWHERE = {"transmission_error"}  # only where displacements command: test_transmission_error.py
+            "actuator_saturation": 3.5, "tendon_backlash": 4.0, "load_cell_crosstalk": 1.0, "transmission_error": 4.0}  # fmt: skip
 
 
 def fitted_alone(bench: Day, effect: str) -> tuple[Fit, Fit, Truth]:
     """Base and base + effect fitted to a day with that effect."""
-    design = "by_current" if all_effects()[effect].by_current else "hanging"
+    law = all_effects()[effect]
+    design = "by_current" if law.by_current else "by_length" if law.by_length else "hanging"
     recording, truth = bench(effect, STRENGTH.get(effect, 2.0), design=design)
     assert truth is not None
     robot = load("continuum")
@@ -50,7 +49,7 @@ def fitted_alone(bench: Day, effect: str) -> tuple[Fit, Fit, Truth]:
     return base, _fuller(objective, evidence, best, (effect,), ACCEPT, lambda words: None).fit, truth
 
 
-@pytest.mark.parametrize("effect", sorted(set(catalogue()) - ELSEWHERE))
+@pytest.mark.parametrize("effect", sorted(catalogue()))
 def test_it_recovers_its_own_parameters(bench: Day, effect: str) -> None:
     base, fitted, truth = fitted_alone(bench, effect)
     values = next(e for e in fitted.model.twin.effects if e.id == effect).values

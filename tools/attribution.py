@@ -39,7 +39,6 @@ DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_
 BLOCK = ("none", "one", "one", "one", "pair", "unknown", "one", "none", "one", "one", "one", "one", "pair", "unknown",
          "one", "one", "one", "pair", "unknown", "none")  # fmt: skip
 BY_TENSION = {"actuator_saturation"}  # where lengths are commanded the bench has no such law
-BY_LENGTH = {"transmission_error"}  # where tensions are commanded it bends nothing
 NO_SPRINGS = {"actuator_saturation", "actuator_lag", "tendon_backlash", "backbone_creep"}  # not on the bench where springs pull
 
 
@@ -81,10 +80,10 @@ def plan(sets: int, seed: int) -> list[Case]:
         amplitude, design = float(rng.choice(AMPLITUDES)), str(rng.choice(DESIGNS))
         if (BY_TENSION & set(effects) and design == "by_length") or (NO_SPRINGS & set(effects) and design == "by_current"):
             design = "default"
-        if BY_LENGTH & set(effects):
+        if any(all_effects()[e].by_length for e in effects):
             design = "by_length"
             if any(e in BY_TENSION or all_effects()[e].by_current for e in effects):
-                design, effects, kind = "default", tuple(e for e in effects if e not in BY_LENGTH), "one"
+                design, effects, kind = "default", tuple(e for e in effects if not all_effects()[e].by_length), "one"
         if any(all_effects()[e].by_current for e in effects):
             design = "by_current"
             effects = tuple(e for e in effects if e not in NO_SPRINGS)

@@ -41,6 +41,7 @@ class Effect:
     seen_by_length: ClassVar[str] = "marker"  # the same where the motors command displacements: marker | tension
     needs_ambient: ClassVar[bool] = False
     by_current: ClassVar[bool] = False  # seen only where springs pull
+    by_length: ClassVar[bool] = False  # bends the robot only where motors command displacements
     logs_command: ClassVar[bool] = False  # the input logged is the commanded tension, not the load cell
 
     @classmethod

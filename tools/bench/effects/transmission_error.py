@@ -23,6 +23,7 @@ class TransmissionError(Effect):
     id: ClassVar[str] = "transmission_error"
     most: ClassVar[float] = 10.0
     seen_in: ClassVar[str] = "displacement"
+    by_length: ClassVar[bool] = True
 
     radius: float  # m
     phases: tuple[float, ...]  # rad
