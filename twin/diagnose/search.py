@@ -146,10 +146,10 @@ def _leaner(
     accept: float,
     progress: Progress,
 ) -> Weighed:
-    """Drop every effect whose removal costs less evidence than `accept`."""
-    while len(best.effects) > 1:
+    """Drop every effect beside the base's whose removal costs less evidence than `accept`; the last one stays."""
+    while len(added := [e for e in best.effects if e not in base.effects]) > 1:
         reduced = []
-        for effect in best.effects:
+        for effect in added:
             rest = tuple(e for e in best.effects if e != effect)
             if rest not in known:
                 progress(f"without {effect}")

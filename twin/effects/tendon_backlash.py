@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from twin.compiled import jit
-from twin.effects.effect import Effect, Signals
+from twin.effects.effect import Effect, Signals, Start
 from twin.quantities import Parameter
+
+GUESS = 2e-4  # m
 
 
 @jit
@@ -23,8 +27,9 @@ def lead(travelled, swap, z):
 class TendonBacklash(Effect):
     """Displacement at the motor = that of the tendon + slack + gap/2 z, z = +1 after pulling in, -1 after paying out.
 
-    The side z changes over the travel `swap`; with swap = gap/2 the tendon stands still while the motor crosses the gap (the play
-    operator), with less it is a spring-loaded one. `slack` is what must be taken up before the tendon pulls.
+    The gap of drive i is `gap`, common to all, and gap_i of its own. The side z changes over the travel `swap`; with swap = gap/2 the
+    tendon stands still while the motor crosses the gap (the play operator), with less it is a spring-loaded one. `slack` is what must
+    be taken up before the tendon pulls.
 
     Antagonists that turn a rigid joint: each of them only ever pulls, so that its play lies on the pulling side, z = +1, whichever
     way it travels. It is slack of gap/2 in both: a dead band that is crossed where the load, not the travel, changes its sign.
@@ -43,19 +48,32 @@ class TendonBacklash(Effect):
         Parameter("swap", 1e-4, "m", 1e-5, 1e-2, "half the gap for pure play; ours", scale=5e-5),
         Parameter("slack", 0.0, "m", -2e-2, 2e-2, "a line cut too long; negative: pre-tensioned", scale=5e-5),
     )
+    per_tendon = (Parameter("gap", 0.0, "m", 0.0, 2e-2, "one drive's, beside that of all; as gap", scale=5e-5),)
     shape = ("swap",)
     richer = ("slack",)
     richer_needs = frozenset({"backbone"})
-    guesses = ({"gap": 2e-4},)
     moves_with = "the direction of travel"
 
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Play in all drives alike; and, of several that bend a body, in one that moves."""
+        yield Start({"gap": GUESS}, ("gap", "swap"))
+        if n_tendon == 1 or any(s.angle.size for s in predicted):
+            return
+        travel = np.ptp(np.concatenate([s.displacement for s in predicted]), axis=0)
+        for i in np.flatnonzero(travel > GUESS) + 1:
+            yield Start({f"gap_{i}": GUESS}, (f"gap_{i}", "swap"))
+
     def drive(self, command: Signals) -> Signals:
-        moved = command.displacement - self["slack"] - 0.5 * self["gap"] * self._side(command)
+        moved = command.displacement - self["slack"] - 0.5 * self._gap() * self._side(command)
         return command.with_(displacement=np.where(command.by_length, moved, command.displacement))
 
     def sense(self, true: Signals) -> Signals:
-        ahead = true.displacement + self["slack"] + 0.5 * self["gap"] * self._side(true)
+        ahead = true.displacement + self["slack"] + 0.5 * self._gap() * self._side(true)
         return true.with_(displacement=np.where(true.by_length, true.displacement, ahead))
+
+    def _gap(self) -> np.ndarray:
+        return self["gap"] + self.each("gap")
 
     def _side(self, signals: Signals) -> np.ndarray:
         if signals.angle.size:
