@@ -5,8 +5,8 @@ A sweep, one cable drawn in step by step with the others held, becomes a trial; 
 There are no time stamps: a row counts as a second. The first rows of a sweep are all kept, for the dead band is there, then one in
 `THIN`.
 
-Far to one side the camera has two answers for one pose, (1.5, -2.1, 0.6) mm apart, and flickers between them; near its other edge too.
-Nothing in a row says which answer it is, so that a sweep ends before its first such jump.
+Far to one side, and near the other edge, the camera has two answers for one pose, (1.5, -2.1, 0.6) mm apart, and flickers between
+them. Nothing in a row says which answer it is, so that a sweep ends before its first such jump.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ PER_STEP = 1e-4  # m of cable per unit of action
 NOISE = 2e-4
 FIRST, THIN = 6, 8  # rows kept at a sweep's start; of the rest one in so many
 EVERY = 5  # one sweep in so many is taken: odd, since in the second block two cables take turns
-# m: a step from row to row that is off the median of the nine around it by more is a flicker. Of all steps 98.8 % are off by less than
-# 1 mm, 0.9 % by 2 to 4 mm, 0.3 % by something between.
+# m: a step from row to row that is off the median of the nine around it by more is a flicker. Of all steps 98.8 % are off by less
+# than 1 mm, 0.9 % by 2 to 4 mm, 0.3 % by something between.
 FLICKER = 1.5e-3
 BLOCK = 10200  # rows of the first block
 SHORTEST = 20  # rows of a sweep worth a trial: the last one of the file is cut off
@@ -67,7 +67,7 @@ def read(folder: Path) -> tuple[Recording, Dropped]:
 
 
 def _steady(tip: np.ndarray) -> int:
-    """How many rows of a sweep (n, 3) m come before the first flicker. Its first two steps are no flicker: the last release dies away."""
+    """How many rows of a sweep (n, 3) m come before the first flicker; in its first two steps the last release dies away."""
     steps = np.diff(tip, axis=0)
     off = np.linalg.norm(steps - median_filter(steps, size=(9, 1)), axis=1)
     jumps = np.flatnonzero(off[2:] > FLICKER) + 2

@@ -72,7 +72,7 @@ def search(
                     continue
                 progress(f"level {level}: {' + '.join((*member.effects, candidate.effect))}")
                 found = _extended(objective, evidence, member, candidate.effect, dict(candidate.start.values), candidate.start.free)
-                if found is not None and (found.effects not in fresh or found.score > fresh[found.effects].score):
+                if found is not None and (found.effects not in fresh or _better(found, fresh[found.effects])):
                     fresh[found.effects] = found
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
         fresh = {
@@ -130,6 +130,13 @@ def _fuller(
         if fuller.score > found.score + accept:
             found = fuller
     return found
+
+
+def _better(found: Weighed, than: Weighed) -> bool:
+    """Of two fits of the same effects. With the same parameters free they are minima of one cost, and the lower one is the fit."""
+    if set(found.fit.model.free) == set(than.fit.model.free):
+        return found.fit.cost < than.fit.cost
+    return found.score > than.score
 
 
 def _own(fitted: Fit) -> np.ndarray:

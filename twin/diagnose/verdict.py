@@ -290,8 +290,8 @@ def _most_predictive(
     """The best set by evidence around a core whose every effect halves the squared error on trials left out in turn.
 
     Where laws and robot are far from the data, what no law follows is smooth, and to the evidence a smooth error costs the same
-    small or large: its names are worth little, and nothing is sought beside the right one. What an effect predicts does not depend on
-    that. Beside the core effects are sought as beside any base.
+    small or large: its names are worth little, and nothing is sought beside the right one. What an effect predicts does not depend
+    on that. Beside the core effects are sought as beside any base.
     """
     errors = {w.effects: left_out(objective, w.fit) / HALF ** len(w.effects) for w in (found.base, *found.all)}
     better = [w for w in found.all if errors[w.effects] < errors[found.base.effects]]
@@ -299,6 +299,9 @@ def _most_predictive(
     core = next((w for w in ranked if _halved(objective, held_out, found.base, w)), None)
     if core is None:
         return found
+    core = weigh(
+        objective, evidence, fit(objective, core.fit.model, near=core.fit.evaluation, refresh=True)
+    )  # a base, not a rough fit
     around = search(objective, evidence, core, dictionary(objective, core.fit), bars, progress)
     known = {w.effects: w for w in sorted((*found.all, *around.all), key=lambda w: w.score)}
     return Search(found.base, around.best, tuple(sorted(known.values(), key=lambda w: -w.score)))
