@@ -12,6 +12,7 @@ import pytest
 from tests.conftest import Day
 from tools.bench.effects import all_effects
 from tools.bench.effects.effect import Effect as Truth
+from tools.bench.effects.tendon_backlash import TendonBacklash as Play
 from tools.compared import COMPARED, OTHER, distance
 from twin.bench import prepare
 from twin.calibrate import Fit, fit
@@ -29,11 +30,11 @@ STRENGTH = {"load_cell_bias": 4.0, "load_cell_drift": 3.0, "base_tilt": 4.0, "ti
             "actuator_saturation": 3.5, "tendon_backlash": 4.0, "load_cell_crosstalk": 1.0, "transmission_error": 4.0}  # fmt: skip
 
 
-def fitted_alone(bench: Day, effect: str) -> tuple[Fit, Fit, Truth]:
+def fitted_alone(bench: Day, effect: str, seed: int = 5) -> tuple[Fit, Fit, Truth]:
     """Base and base + effect fitted to a day with that effect."""
     law = all_effects()[effect]
     design = "by_current" if law.by_current else "by_length" if law.by_length else "hanging"
-    recording, truth = bench(effect, STRENGTH.get(effect, 2.0), design=design)
+    recording, truth = bench(effect, STRENGTH.get(effect, 2.0), seed=seed, design=design)
     assert truth is not None
     robot = load("continuum")
     prepared = prepare(recording, robot)
@@ -60,6 +61,16 @@ def test_it_recovers_its_own_parameters(bench: Day, effect: str) -> None:
     before, after = (float(np.mean(f.z[f.z != 0] ** 2)) for f in (base, fitted))
     assert after - 1.0 < 0.25 * (before - 1.0)
     assert tolerance == OTHER or effect == "contact" or after < 1.15
+
+
+@pytest.mark.parametrize(("seed", "worn"), [(5, (0.0, 0.0, 1.0)), (7, (1.0, 1.0, 1.0))])
+def test_the_worn_drive_is_told_from_its_neighbours(bench: Day, seed: int, worn: tuple[float, ...]) -> None:
+    _, fitted, truth = fitted_alone(bench, "tendon_backlash", seed)
+    assert isinstance(truth, Play)
+    assert truth.worn == worn
+    law = next(e for e in fitted.model.twin.effects if e.id == "tendon_backlash")
+    gaps = law["gap"] + law.each("gap")
+    assert [bool(g > 0.5 * gaps.max()) for g in gaps] == [bool(w) for w in worn]
 
 
 def test_every_effect_of_the_catalogue_is_compared() -> None:

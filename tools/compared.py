@@ -79,7 +79,8 @@ COMPARED: dict[str, Compare] = {
     ),
     "temperature_softening": lambda t, v: (0.005 * t.strength, v["rate"], SAME),
     "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
-    "tendon_backlash": lambda t, v: (1e-4 * t.strength, v["gap"], OTHER),  # swaps sides by another law there
+    # It swaps sides by another law there.
+    "tendon_backlash": lambda t, v: (1e-4 * t.strength * np.array(t.worn), v["gap"] + np.array(_each(v, "gap")), OTHER),
     "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
     "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER),  # a whole drum there
     "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),

@@ -79,9 +79,12 @@ def with_all(bench: Bench, rows: Sequence[int]) -> tuple[Twin, Twin, str]:
         found = min(
             (fit(objective, found.model.with_effect(name, s.values, s.free, bench.n_tendon)) for s in begun), key=lambda f: f.cost
         )
-    mu, slide, gap = (found.fitted(e)[p] for e, p in (("tendon_friction", "mu"), ("tendon_friction", "presliding"), (PLAY, "gap")))
+    friction, play = found.fitted("tendon_friction"), found.fitted(PLAY)
+    mu, slide, (where, gap) = friction["mu"], friction["presliding"], next(p for p in play.items() if p[0].startswith("gap"))
     numbers = (mu.value, mu.std or 0.0, *(1e3 * (v or 0.0) for v in (slide.value, slide.std, gap.value, gap.std)))
-    said = "by hand: friction {:.2f} +- {:.2f}, sliding after {:.1f} +- {:.1f} mm, play {:.2f} +- {:.2f} mm of cable"
+    said = (
+        f"by hand: friction {{:.2f}} +- {{:.2f}}, sliding after {{:.1f}} +- {{:.1f}} mm, {where} {{:.2f}} +- {{:.2f}} mm of cable"
+    )
     return base.model.twin, found.model.twin, said.format(*numbers)
 
 

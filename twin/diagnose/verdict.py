@@ -68,8 +68,8 @@ def diagnose(
     progress("verdict")
     found = replace(found, best=_predicting(found, bench, bars.accept))
     if not _halved(objective, held_out, base, found.best):
-        found = _most_predictive(found, objective, evidence, held_out, bars, progress)
-        found = replace(found, best=_predicting(found, bench, bars.accept))
+        core = _most_predictive(found, objective, held_out)
+        found = _beside(core, found, objective, evidence, bench, bars, progress) if core else found
     best, dropped, small = _gate(objective, evidence, found, held_out, bars.material, progress)
     if not _solves(best.fit.model.twin, bench):  # without the small ones
         best, dropped = found.base, {}
@@ -284,27 +284,28 @@ def _predicting(found: Search, bench: Bench, accept: float) -> Weighed:
     return next((w for w in ranked if _solves(w.fit.model.twin, bench)), found.base)
 
 
-def _most_predictive(
-    found: Search, objective: Objective, evidence: Evidence, held_out: HeldOut, bars: Thresholds, progress: Progress
-) -> Search:
-    """The best set by evidence around a core whose every effect halves the squared error on trials left out in turn.
+def _most_predictive(found: Search, objective: Objective, held_out: HeldOut) -> Weighed | None:
+    """Of the sets whose every effect halves the squared error on trials left out in turn, the one that errs least there.
 
     Where laws and robot are far from the data, what no law follows is smooth, and to the evidence a smooth error costs the same
-    small or large: its names are worth little, and nothing is sought beside the right one. What an effect predicts does not depend
-    on that. Beside the core effects are sought as beside any base.
+    small or large: its names are worth little. What an effect predicts does not depend on that.
     """
     errors = {w.effects: left_out(objective, w.fit) / HALF ** len(w.effects) for w in (found.base, *found.all)}
     better = [w for w in found.all if errors[w.effects] < errors[found.base.effects]]
     ranked = sorted(better, key=lambda w: errors[w.effects])
-    core = next((w for w in ranked if _halved(objective, held_out, found.base, w)), None)
-    if core is None:
-        return found
-    core = weigh(
-        objective, evidence, fit(objective, core.fit.model, near=core.fit.evaluation, refresh=True)
-    )  # a base, not a rough fit
-    around = search(objective, evidence, core, dictionary(objective, core.fit), bars, progress)
-    known = {w.effects: w for w in sorted((*found.all, *around.all), key=lambda w: w.score)}
-    return Search(found.base, around.best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+    return next((w for w in ranked if _halved(objective, held_out, found.base, w)), None)
+
+
+def _beside(
+    core: Weighed, found: Search, objective: Objective, evidence: Evidence, bench: Bench, bars: Thresholds, progress: Progress
+) -> Search:
+    """What else there is, sought as beside any base: converged first, and nothing of it is dropped."""
+    converged = fit(objective, core.fit.model, near=core.fit.evaluation, refresh=True)
+    core = weigh(objective, evidence, converged)
+    around = search(objective, evidence, core, dictionary(objective, converged), bars, progress)
+    best = around.best if _solves(around.best.fit.model.twin, bench) else core
+    known = {w.effects: w for w in (*found.all, *around.all)}
+    return Search(found.base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
 def _halved(objective: Objective, held_out: HeldOut, base: Weighed, best: Weighed) -> bool:
