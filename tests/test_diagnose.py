@@ -153,7 +153,7 @@ def test_fitted_trials_do_reach_the_fit(bench: Day, friction: Diagnosis) -> None
     shifted = tuple(
         replace(t, values={**t.values, "disk_8_x": t.values["disk_8_x"] + 1e-4}) if t.name == name else t for t in recording.trials
     )
-    found, _ = calibration(replace(recording, trials=shifted), Twin.of(ROBOT), Settings())
+    found, *_ = calibration(replace(recording, trials=shifted), Twin.of(ROBOT), Settings())
     assert found.model.twin != friction.calibrated
 
 

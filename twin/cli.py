@@ -124,7 +124,9 @@ class Calibrate:
         recording, twin = _load(self.set, self.twin)
         settings = Settings(seed=self.seed, jobs=self.jobs)
         with _working(f"calibrating on {recording.title}"):
-            fitted, held_out = calibration(recording, twin, settings)
+            fitted, held_out, notices = calibration(recording, twin, settings)
+        for notice in notices:
+            out.print(f"note: {notice}", highlight=False)
         found = fitted.fitted(None)
         table = Table("parameter", "value", "standard error", "unit")
         for name, f in found.items():

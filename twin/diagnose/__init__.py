@@ -1,6 +1,7 @@
 """Which effect, or none, explains what calibration leaves.
 
 diagnosis.py   the types that travel to the report
+spikes.py      marker samples that stand alone
 split.py       trials no fit may see
 objective.py   what every fit minimises: residuals made white
 null.py        what noise alone would show on this design

@@ -22,6 +22,7 @@ from twin.diagnose.objective import objective_of
 from twin.diagnose.rigs import rigs
 from twin.diagnose.screen import dictionary
 from twin.diagnose.search import FORM, Progress, Search, Weighed, refit_without, search, weigh
+from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import split
 from twin.errors import DataError, SolveError
 from twin.evaluate import UNIT
@@ -47,8 +48,11 @@ def diagnose(
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one held out")
     progress("nominal prediction")
     nominal_traces = simulate(twin, bench)
+    nominal = [readings(bench, report(twin.effects, t.true)) for t in nominal_traces]
+    bench, alone = without_spikes(bench, nominal)
     notices = [
         *bench.notices,
+        *alone,
         *(f"{n}: unstable start, its shape is one of several" for n in unstable_starts(bench, nominal_traces)),
     ]
     objective, evidence, base, held_out, notes = _calibrated(bench, twin, settings, (), progress)
@@ -77,7 +81,7 @@ def diagnose(
     line = Spectrum.of(bench, fitted).peak(best.fit.z.reshape(best.discrepancy.mean.shape) - best.discrepancy.mean)
     own = tuple(e.id for e in twin.effects)
     added = tuple(e for e in best.effects if e not in own)
-    predictions = {name: _predict_all(t, bench) for name, t in (("nominal", twin), ("calibrated", base.fit.model.twin))}
+    predictions = {"nominal": nominal, "calibrated": _predict_all(base.fit.model.twin, bench)}
     off, rest = (w.discrepancy.mean * objective.whitener.noise.sigma for w in (base, best))  # SI
     z = base.fit.z.reshape(off.shape)
     predictions["after"] = _predict_all(best.fit.model.twin, bench)
@@ -182,16 +186,17 @@ def _calibrated(
     return objective, evidence, base, HeldOut(bench, held, objective.whitener.noise), notes
 
 
-def calibration(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str]:
-    """The robot's own uncertain parameters fitted, no effect sought; and the RMS error on held-out trials in words."""
+def calibration(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str, tuple[str, ...]]:
+    """The robot's own uncertain parameters fitted, no effect sought; the RMS error on held-out trials in words; and notices."""
     settings = settings or Settings()
     bench = prepare(recording, twin.robot)
+    bench, alone = without_spikes(bench, _predict_all(twin, bench))
     fitted, held = split(bench, settings.seed)
     start, objective, _ = objective_of(bench, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
     held_out = HeldOut(bench, held, objective.whitener.noise)
     unit, factor = UNIT[held_out.headline]
-    return found, f"{factor * held_out.error(found.model.twin):.3f} {unit}"
+    return found, f"{factor * held_out.error(found.model.twin):.3f} {unit}", (*bench.notices, *alone)
 
 
 def _gate(

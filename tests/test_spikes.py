@@ -1,0 +1,85 @@
+"""Marker samples that stand alone are left out and said; what moves the body is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import Day
+from twin.bench import Bench, prepare
+from twin.diagnose.spikes import FAR, RARE, without_spikes
+from twin.robots import load
+from twin.twin import Twin, readings, report, simulate
+
+
+@pytest.fixture(scope="module")
+def quiet(bench: Day) -> tuple[Bench, list[np.ndarray]]:
+    """A day without effect, markers with 0.25 mm of noise, and what the nominal robot predicts of it."""
+    prepared = prepare(bench(None)[0], load("continuum"))
+    twin = Twin.of(load("continuum"))
+    return prepared, [readings(prepared, report(twin.effects, t.true)) for t in simulate(twin, prepared)]
+
+
+def of_marker(bench: Bench, m: int) -> list[int]:
+    return [j for j, o in enumerate(bench.outputs) if o.group == "marker" and o.index == m]
+
+
+def missing(bench: Bench) -> int:
+    return sum(int(np.isnan(y).sum()) for y in bench.measured)
+
+
+def planted(bench: Bench, trial: int, rows: list[int], columns: list[int], off: np.ndarray) -> Bench:
+    measured = [y.copy() for y in bench.measured]
+    measured[trial][np.ix_(rows, columns)] += off
+    return replace(bench, measured=tuple(measured))
+
+
+def test_noise_alone_has_no_spikes(quiet: tuple[Bench, list[np.ndarray]]) -> None:
+    bench, predicted = quiet
+    found, words = without_spikes(bench, predicted)
+    assert not words
+    assert missing(found) == missing(bench)
+
+
+@pytest.mark.parametrize("marker", [0, 4, 7])
+def test_a_spike_is_left_out_whole_and_said(quiet: tuple[Bench, list[np.ndarray]], marker: int) -> None:
+    bench, predicted = quiet
+    columns = of_marker(bench, marker)
+    clean = [k for k in range(20, 60) if np.isfinite(bench.measured[0][k - 6 : k + 7]).all()][:1]
+    found, words = without_spikes(planted(bench, 0, clean, columns, np.array([9e-3, -9e-3, 6e-3])), predicted)
+    assert np.isnan(found.measured[0][np.ix_(clean, columns)]).all()
+    assert missing(found) == missing(bench) + 3
+    assert len(words) == 1
+    assert f"{bench.outputs[columns[0]].channel.name.rsplit('_', 1)[0]} 1," in words[0]
+
+
+def test_what_moves_the_whole_body_stays(quiet: tuple[Bench, list[np.ndarray]]) -> None:
+    """A jolt of one row, as large at each marker as the robot's own travel there."""
+    bench, predicted = quiet
+    moved = np.concatenate([y - y.mean(axis=0) for y in predicted])
+    jolt = np.where([o.group == "marker" for o in bench.outputs], 3.0 * moved.std(axis=0), 0.0)
+    _, words = without_spikes(planted(bench, 0, [30], list(range(len(bench.outputs))), jolt), predicted)
+    assert not words
+
+
+def test_a_marker_that_is_wrong_too_often_is_left_in_and_named(quiet: tuple[Bench, list[np.ndarray]]) -> None:
+    bench, predicted = quiet
+    columns, rng, worse = of_marker(bench, 4), np.random.default_rng(1), bench
+    for k, y in enumerate(bench.measured):
+        rows = np.flatnonzero(rng.random(len(y)) < 2.0 * RARE).tolist()
+        worse = planted(worse, k, rows, columns, np.array([8e-3, 8e-3, 0.0]))
+    found, words = without_spikes(worse, predicted)
+    assert missing(found) == missing(worse)
+    assert len(words) == 1
+    assert "left in" in words[0]
+
+
+def test_a_delay_of_fast_motion_leaves_no_spikes(bench: Day) -> None:
+    recording, _ = bench("time_delay", 8.0)
+    prepared, twin = prepare(recording, load("continuum")), Twin.of(load("continuum"))
+    predicted = [readings(prepared, report(twin.effects, t.true)) for t in simulate(twin, prepared)]
+    off = np.concatenate([y - p for y, p in zip(prepared.measured, predicted, strict=True)])[:, of_marker(prepared, 7)]
+    assert np.nanmax(np.abs(np.diff(off, axis=0))) > FAR * 2.5e-4, "the delay must jump further than a spike has to"
+    assert not without_spikes(prepared, predicted)[1]

@@ -1,0 +1,76 @@
+"""Marker samples that stand alone: off their neighbours in time, while the markers beside them are not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.bench import Bench
+
+WINDOW = 7  # rows: a spike lasts three at most
+FAR = 8.0  # typical departures from the median of the window; white noise never, Student noise of 5 degrees once in some thousand
+SHARED = 0.25  # of its part of a motion: another marker that moves by less was not moved by the body
+RARE = 0.05  # a marker of which more samples stand alone has no spikes but a fault
+
+
+def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench, list[str]]:
+    """The bench with lone marker samples missing, and what was left out, in words.
+
+    `predicted` (n_k, n_output), of any twin of the robot, takes the commanded motion off the measured one. What is left departs
+    from its median over `WINDOW` rows by d (m), one a marker (Hampel filter: Pearson et al., EURASIP J. Adv. Signal Process.
+    2016:87). A body that moves takes all markers along, each by some part of its travel, the RMS of `predicted`: a sample stands
+    alone if others would have shown that and none did.
+    """
+    markers: dict[str, list[int]] = {}
+    for column, output in enumerate(bench.outputs):
+        if output.group == "marker":
+            markers.setdefault(output.channel.name.rsplit("_", 1)[0], []).append(column)
+    columns = [np.array(c) for c in markers.values()]
+    if len(columns) < 2:
+        return bench, []
+    departed = [_departure(y - p, columns) for y, p in zip(bench.measured, predicted, strict=True)]
+    moved = np.concatenate([y - y.mean(axis=0) for y in predicted])
+    travel = np.array([np.sqrt((moved[:, c] ** 2).sum(axis=1).mean()) for c in columns]) + 1e-9
+    d = np.concatenate(departed)
+    alone = _alone(d, travel)
+    counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
+    faulty = {name for name, count in counts.items() if count > RARE * len(alone)}
+    words = [
+        f"{name}: {counts[name]} of {len(alone)} samples stand alone in time and along the body, too many for accidents: left in,"
+        " look at this marker"
+        for name in sorted(faulty)
+    ]
+    alone[:, [name in faulty for name in markers]] = False
+    if alone.any():
+        told = ", ".join(f"{name} {count}" for name, count in counts.items() if count and name not in faulty)
+        words.append(f"left out, alone in time and along the body: samples of {told}, up to {1e3 * d[alone].max():.1f} mm off")
+    measured = [y.copy() for y in bench.measured]
+    for y, hit in zip(measured, np.split(alone, np.cumsum([len(x) for x in departed])[:-1]), strict=True):
+        for j, column in enumerate(columns):
+            y[np.ix_(hit[:, j], column)] = np.nan
+    return replace(bench, measured=tuple(measured)), words
+
+
+def _departure(off: np.ndarray, columns: Sequence[np.ndarray]) -> np.ndarray:
+    """(n, n_marker) m from the median of `WINDOW` rows, at the ends of the nearest whole window; NaN where one of them is missing,
+    which would shift the median of a fast motion."""
+    if len(off) < WINDOW:
+        return np.full((len(off), len(columns)), np.nan)
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(off, WINDOW, axis=0), axis=2)
+    departed = off - np.pad(middle, ((WINDOW // 2, WINDOW // 2), (0, 0)), mode="edge")
+    return np.stack([np.linalg.norm(departed[:, c], axis=1) for c in columns], axis=1)
+
+
+def _alone(departed: np.ndarray, travel: np.ndarray) -> np.ndarray:
+    """Which of the departures (n, m) no motion of the body explains; travel (m,)."""
+    out = np.zeros(departed.shape, bool)
+    typical = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in departed.T])
+    rows, own = np.nonzero(departed > FAR * typical)
+    theirs = (departed[rows, own] / travel[own])[:, None] * travel  # what the others' part would be
+    telling = (theirs > FAR * typical) & np.isfinite(departed[rows]) & (np.arange(len(travel)) != own[:, None])
+    shared = telling & (departed[rows] > SHARED * theirs)
+    lone = telling.any(axis=1) & ~shared.any(axis=1)
+    out[rows[lone], own[lone]] = True
+    return out
