@@ -11,7 +11,7 @@ from twin.bench import Bench
 
 WINDOW = 7  # rows: a spike lasts three at most
 FAR = 8.0  # typical departures from the median of the window; white noise never, Student noise of 5 degrees once in some thousand
-SHARED = 0.25  # of its part of a motion: another marker that moves by less was not moved by the body
+SHARED = 0.25  # of its part of a motion, and the same way within 60 deg: another marker that moves less was not moved by the body
 RARE = 0.05  # a marker of which more samples stand alone has no spikes but a fault
 
 
@@ -33,8 +33,7 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
     departed = [_departure(y - p, columns) for y, p in zip(bench.measured, predicted, strict=True)]
     moved = np.concatenate([y - y.mean(axis=0) for y in predicted])
     travel = np.array([np.sqrt((moved[:, c] ** 2).sum(axis=1).mean()) for c in columns]) + 1e-9
-    d = np.concatenate(departed)
-    alone = _alone(d, travel)
+    alone = _alone(np.concatenate(departed), travel)
     counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
     faulty = {name for name, count in counts.items() if count > RARE * len(alone)}
     words = [
@@ -45,7 +44,8 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
     alone[:, [name in faulty for name in markers]] = False
     if alone.any():
         told = ", ".join(f"{name} {count}" for name, count in counts.items() if count and name not in faulty)
-        words.append(f"left out, alone in time and along the body: samples of {told}, up to {1e3 * d[alone].max():.1f} mm off")
+        far = 1e3 * float(_size(np.concatenate(departed))[alone].max())
+        words.append(f"left out, alone in time and along the body: samples of {told}, up to {far:.1f} mm off")
     measured = [y.copy() for y in bench.measured]
     for y, hit in zip(measured, np.split(alone, np.cumsum([len(x) for x in departed])[:-1]), strict=True):
         for j, column in enumerate(columns):
@@ -54,23 +54,39 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
 
 
 def _departure(off: np.ndarray, columns: Sequence[np.ndarray]) -> np.ndarray:
-    """(n, n_marker) m from the median of `WINDOW` rows, at the ends of the nearest whole window; NaN where one of them is missing,
-    which would shift the median of a fast motion."""
+    """(n, n_marker, 3) m from the median of `WINDOW` rows, at the ends of the nearest whole window; NaN where missing.
+
+    In a median a missing row stands on the line between its neighbours: without it a fast motion would shift the middle.
+    """
     if len(off) < WINDOW:
-        return np.full((len(off), len(columns)), np.nan)
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(off, WINDOW, axis=0), axis=2)
+        return np.full((len(off), len(columns), 3), np.nan)
+    whole, row = off.copy(), np.arange(len(off))
+    for column in whole.T:
+        known = np.isfinite(column)
+        column[~known] = np.interp(row[~known], row[known], column[known]) if known.any() else 0.0
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(whole, WINDOW, axis=0), axis=2)
     departed = off - np.pad(middle, ((WINDOW // 2, WINDOW // 2), (0, 0)), mode="edge")
-    return np.stack([np.linalg.norm(departed[:, c], axis=1) for c in columns], axis=1)
+    out = np.zeros((len(off), len(columns), 3))
+    for j, column in enumerate(columns):
+        out[:, j, : len(column)] = departed[:, column]
+    return out
+
+
+def _size(departed: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(departed, axis=-1)
 
 
 def _alone(departed: np.ndarray, travel: np.ndarray) -> np.ndarray:
-    """Which of the departures (n, m) no motion of the body explains; travel (m,)."""
-    out = np.zeros(departed.shape, bool)
-    typical = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in departed.T])
-    rows, own = np.nonzero(departed > FAR * typical)
-    theirs = (departed[rows, own] / travel[own])[:, None] * travel  # what the others' part would be
-    telling = (theirs > FAR * typical) & np.isfinite(departed[rows]) & (np.arange(len(travel)) != own[:, None])
-    shared = telling & (departed[rows] > SHARED * theirs)
+    """Which of the departures (n, m, 3) no motion of the body explains, (n, m); travel (m,)."""
+    size = _size(departed)
+    typical = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in size.T])
+    rows, own = np.nonzero(size > FAR * typical)
+    theirs = (size[rows, own] / travel[own])[:, None] * travel  # what the others' part would be
+    telling = (theirs > FAR * typical) & np.isfinite(size[rows]) & (np.arange(len(travel)) != own[:, None])
+    along = np.einsum("kmx,kx->km", departed[rows], departed[rows, own])
+    alike = along > 0.5 * size[rows] * size[rows, own][:, None]
+    shared = telling & alike & (size[rows] > SHARED * theirs)
     lone = telling.any(axis=1) & ~shared.any(axis=1)
+    out = np.zeros(size.shape, bool)
     out[rows[lone], own[lone]] = True
     return out
