@@ -52,7 +52,7 @@ def test_a_spike_is_left_out_whole_and_said(quiet: tuple[Bench, list[np.ndarray]
     assert np.isnan(found.measured[0][np.ix_(clean, columns)]).all()
     assert missing(found) == missing(bench) + 3
     assert len(words) == 1
-    assert f"{bench.outputs[columns[0]].channel.name.rsplit('_', 1)[0]} 1," in words[0]
+    assert f"{bench.outputs[columns[0]].channel.name.rsplit('_', 1)[0]} 1)" in words[0]
 
 
 def test_what_moves_the_whole_body_stays(quiet: tuple[Bench, list[np.ndarray]]) -> None:

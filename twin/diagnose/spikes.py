@@ -37,15 +37,17 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
     counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
     faulty = {name for name, count in counts.items() if count > RARE * len(alone)}
     words = [
-        f"{name}: {counts[name]} of {len(alone)} samples stand alone in time and along the body, too many for accidents: left in,"
-        " look at this marker"
+        f"{name}: {counts[name]} of {len(alone)} samples are off their neighbours in time and no motion of the body, too many"
+        " for accidents: left in, look at this marker"
         for name in sorted(faulty)
     ]
     alone[:, [name in faulty for name in markers]] = False
     if alone.any():
         told = ", ".join(f"{name} {count}" for name, count in counts.items() if count and name not in faulty)
         far = 1e3 * float(_size(np.concatenate(departed))[alone].max())
-        words.append(f"left out, alone in time and along the body: samples of {told}, up to {far:.1f} mm off")
+        words.append(
+            f"spikes left out, off their neighbours in time and no motion of the body (samples: {told}), up to {far:.1f} mm"
+        )
     measured = [y.copy() for y in bench.measured]
     for y, hit in zip(measured, np.split(alone, np.cumsum([len(x) for x in departed])[:-1]), strict=True):
         for j, column in enumerate(columns):
