@@ -27,7 +27,7 @@ def lead(travelled, swap, z):
 class TendonBacklash(Effect):
     """Displacement at the motor = that of the tendon + slack + gap/2 z, z = +1 after pulling in, -1 after paying out.
 
-    The gap of drive i is `gap`, common to all, and gap_i of its own. The side z changes over the travel `swap`; with swap = gap/2
+    The gap of drive i is `gap`, common to all, plus its own gap_i. The side z changes over the travel `swap`; with swap = gap/2
     the tendon stands still while the motor crosses the gap (the play operator), with less it is a spring-loaded one. `slack` is
     what must be taken up before the tendon pulls.
 
