@@ -10,6 +10,7 @@ import pytest
 
 from twin.diagnose import verdict
 from twin.diagnose.left_out import left_out
+from twin.diagnose.search import _better
 
 TRIALS = (5, 8, 7)  # rows
 STD = 0.7  # of the first parameter's prior, in steps; the second has none
@@ -98,3 +99,32 @@ def test_a_small_effect_beside_a_large_one_must_take_half_of_what_is_left_on_uns
     both = weighed("large", "small", score=0.0, size=left, unseen=unseen)
     alone = weighed("large", score=0.0, size=1.0, unseen=1.0)
     assert verdict._takes_most(held_out, both, alone) is kept
+
+
+@pytest.mark.parametrize("stands", [True, False])
+def test_what_is_found_beside_the_core_is_taken_if_every_trial_can_be_predicted_with_it(
+    monkeypatch: pytest.MonkeyPatch, stands: bool
+) -> None:
+    base, core = weighed(score=9.0, size=6.0, unseen=4.0), weighed("drive", score=5.0, size=3.0, unseen=2.0)
+    both = weighed("drive", "play", score=7.0, size=2.0, unseen=1.0)
+    core.fit.evaluation = None
+    monkeypatch.setattr(verdict, "fit", lambda *_, **__: core.fit)
+    monkeypatch.setattr(verdict, "weigh", lambda *_: core)
+    monkeypatch.setattr(verdict, "dictionary", lambda *_: None)
+    monkeypatch.setattr(verdict, "search", lambda *_: SimpleNamespace(best=both, all=(both, core)))
+    monkeypatch.setattr(verdict, "_solves", lambda twin, bench: stands or "play" not in twin.effects)
+    found, nothing = cast(Any, SimpleNamespace(base=base, best=base, all=(base, core))), cast(Any, None)
+    widened = verdict._beside(core, found, nothing, nothing, nothing, nothing, nothing)
+    assert widened.best is (both if stands else core)
+    assert widened.base is base
+    assert [w.effects for w in widened.all] == [(), ("drive", "play"), ("drive",)]
+
+
+def test_of_two_fits_of_one_law_the_lower_cost_wins_and_of_two_laws_the_evidence() -> None:
+    def fitted(cost: float, score: float, *free: str) -> Any:
+        return SimpleNamespace(fit=SimpleNamespace(cost=cost, model=SimpleNamespace(free=free)), score=score)
+
+    trapped, better = fitted(9.0, 40.0, "turn", "sine"), fitted(5.0, 30.0, "turn", "sine")
+    assert _better(better, trapped)
+    assert not _better(trapped, better)
+    assert _better(trapped, fitted(1.0, 30.0, "turn", "sine", "cosine"))

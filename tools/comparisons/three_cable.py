@@ -81,11 +81,9 @@ def with_all(bench: Bench, rows: Sequence[int]) -> tuple[Twin, Twin, str]:
         )
     friction, play = found.fitted("tendon_friction"), found.fitted(PLAY)
     mu, slide, (where, gap) = friction["mu"], friction["presliding"], next(p for p in play.items() if p[0].startswith("gap"))
-    numbers = (mu.value, mu.std or 0.0, *(1e3 * (v or 0.0) for v in (slide.value, slide.std, gap.value, gap.std)))
-    said = (
-        f"by hand: friction {{:.2f}} +- {{:.2f}}, sliding after {{:.1f}} +- {{:.1f}} mm, {where} {{:.2f}} +- {{:.2f}} mm of cable"
-    )
-    return base.model.twin, found.model.twin, said.format(*numbers)
+    slid, slid_std, wide, wide_std = (1e3 * (v or 0.0) for v in (slide.value, slide.std, gap.value, gap.std))
+    said = f"mu {mu.value:.2f} +- {mu.std or 0.0:.2f}, sliding after {slid:.1f} +- {slid_std:.1f} mm"
+    return base.model.twin, found.model.twin, f"by hand: {said}, {where} {wide:.2f} +- {wide_std:.2f} mm of cable"
 
 
 def tip_error(twin: Twin, bench: Bench, rows: Sequence[int]) -> float:

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from twin.bench import Bench
+from twin.diagnose.objective import ROUGHLY
 
 WINDOW = 7  # rows: a spike lasts three at most
-FAR = 8.0  # typical departures from the median of the window; white noise never, Student noise of 5 degrees once in some thousand
+FAR = 8.0  # typical departures from the median of the window; Student noise of 5 degrees goes so far once in 7,000 samples
 SHARED = 0.25  # of its part of a motion, and the same way within 60 deg: another marker that moves less was not moved by the body
 RARE = 0.05  # a marker of which more samples stand alone has no spikes but a fault
 
@@ -33,7 +34,8 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
     departed = [_departure(y - p, columns) for y, p in zip(bench.measured, predicted, strict=True)]
     moved = np.concatenate([y - y.mean(axis=0) for y in predicted])
     travel = np.array([np.sqrt((moved[:, c] ** 2).sum(axis=1).mean()) for c in columns]) + 1e-9
-    alone = _alone(np.concatenate(departed), travel)
+    declared = np.array([bench.outputs[c[0]].channel.noise or ROUGHLY["marker"] for c in columns])
+    alone = _alone(np.concatenate(departed), travel, declared)
     counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
     faulty = {name for name, count in counts.items() if count > RARE * len(alone)}
     words = [
@@ -78,10 +80,11 @@ def _size(departed: np.ndarray) -> np.ndarray:
     return np.linalg.norm(departed, axis=-1)
 
 
-def _alone(departed: np.ndarray, travel: np.ndarray) -> np.ndarray:
-    """Which of the departures (n, m, 3) no motion of the body explains, (n, m); travel (m,)."""
+def _alone(departed: np.ndarray, travel: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Which of the departures (n, m, 3) no motion of the body explains, (n, m); travel and declared noise (m,)."""
     size = _size(departed)
-    typical = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in size.T])
+    seen = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in size.T])
+    typical = np.maximum(seen, noise)  # markers that mostly stand still, or of a coarse camera, depart by nothing
     rows, own = np.nonzero(size > FAR * typical)
     theirs = (size[rows, own] / travel[own])[:, None] * travel  # what the others' part would be
     telling = (theirs > FAR * typical) & np.isfinite(size[rows]) & (np.arange(len(travel)) != own[:, None])
