@@ -10,18 +10,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.test_equilibrium import SIDEWAYS, swept
+from twin.body import Problem
 from twin.effects import Loads, Route, catalogue
 from twin.equilibrium import Equilibrium
-from twin.equilibrium.chain import Law, Load, balance
+from twin.equilibrium.chain import State, balance
 from twin.equilibrium.elastic import BEAM_COLUMN, COUPLING
 from twin.equilibrium.newton import place
-from twin.robots import Body, hinge_pairs, load
+from twin.hinges import HingeChain, hinge_pairs
+from twin.robots import load
 
 
 class Energy:
     """The chain's energy from scipy's rotations and MuJoCo's forward kinematics; none of the solver's code."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: HingeChain) -> None:
         self.body, self.model = body, body.spec.compile()
         self.data = mujoco.MjData(self.model)
         self.stiffness = self.model.jnt_stiffness.reshape(self.model.nv, -1)[:, 0]
@@ -80,7 +82,7 @@ def slope(f: Callable[[np.ndarray], np.ndarray | float], q: np.ndarray, step: fl
 WALL = np.array([-1.0, 0.0, 0.0, -0.02, 300.0])
 
 
-def edited(**effects: dict[str, float]) -> Body:
+def edited(**effects: dict[str, float]) -> HingeChain:
     body = load("continuum").build({"backbone.radius_taper": 0.01, "disks.pitch_3": 0.0145})
     for name, values in effects.items():
         catalogue()[name](values).edit(body)
@@ -106,10 +108,9 @@ def residual(e: Equilibrium, q, rest, T, loads: Loads, route: Route, z0=None, s0
     z0, s0 = (np.zeros((3, 8)) if x is None else x for x in (z0, s0))
     z, s, r = np.zeros((3, 8)), np.zeros((3, 8)), np.empty(48)
     J = np.empty((48, 48)) if tangent else np.empty((0, 0))
-    place(e.model._address, e.data._address, e.chain, q)
-    law = Law(float(route.mu), float(route.presliding), np.array(loads.wall, float))
-    load_ = Load(np.array(loads.gravity), float(loads.payload), np.array(loads.force))
-    balance(q, rest, e.chain, T, law, load_, z0, s0, z, s, r, J)
+    at = e.statics(Problem(np.zeros(1), T[None], loads, route))._replace(rest=rest)
+    place(at, q)
+    balance(at, State(T, q, z0, s0), z, s, r, J)
     return r, J, z, s
 
 
@@ -137,7 +138,7 @@ def test_a_solution_is_a_minimum_of_the_energy() -> None:
     energy, e = Energy(body), Equilibrium(body)
     t, T = swept((0, 0, 0), (3, 1, 0), (0.5, 3, 2), each=3)
     loads = Loads(SIDEWAYS, 0.02, wall=WALL)
-    path = e.solve(t, T, loads)
+    path = e.solve(Problem(t, T, loads))
     rest, rng = np.zeros(48), np.random.default_rng(0)
     for q, tension in zip(path.q, T, strict=True):
         # N m: the solver stops at 1e-7 rad in every hinge, of 0.21 N m/rad; a bound three times as wide for stiffer edits

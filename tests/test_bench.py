@@ -23,7 +23,7 @@ EI = 77.59e9 * np.pi / 4 * 0.4e-3**4
 
 
 def ten_disks() -> Rod:
-    """The robot of the reference table in shared/mujoco.md: ten disks at 12 mm, 0.504 g each."""
+    """The robot of the reference table: ten disks at 12 mm, 0.504 g each."""
     return Rod(
         pitch=np.full(10, 0.012),
         disk_mass=np.full(10, 0.504e-3),

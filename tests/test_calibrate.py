@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,15 +13,16 @@ import pytest
 from tests.conftest import Day
 from tools.bench.nuisance import built
 from twin.bench import Bench, prepare
-from twin.calibrate import Fit, Model, Objective, fit, prior_weight
+from twin.calibrate import Evaluation, Fit, Free, Model, Objective, fit, prior_weight
 from twin.diagnose import Settings, calibration
 from twin.diagnose.doubts import strained, unlikely
-from twin.diagnose.screen import projected
+from twin.diagnose.ranking import projected
 from twin.diagnose.split import split
 from twin.measurements import Recording
+from twin.quantities import Parameter
 from twin.residual import Noise, Whitener
 from twin.robots import load
-from twin.twin import Twin
+from twin.twin import Trace, Twin
 
 SEEDS = (5, 6)
 ROBOT = load("continuum")
@@ -209,3 +213,120 @@ def test_a_law_at_the_end_of_its_range_is_said(case: tuple[int, Recording, Fit])
     assert said[0].startswith("backbone precurvature: slope came out at the end of its range (2)")
     assert strained(ended(found, "backbone.youngs_modulus")) == []  # the robot's own parameters have a notice of their own
     assert any("backbone.youngs_modulus" in words for words in unlikely(ended(found, "backbone.youngs_modulus")))
+
+
+def test_standard_errors_widen_where_the_residual_is_larger_than_its_noise() -> None:
+    """With residuals three times as large as the noise they were divided by, three times the errors of ordinary least squares; with
+    smaller ones no less than the noise makes."""
+    rng = np.random.default_rng(0)
+    p = Parameter("x", 0.0, "m", -10.0, 10.0, "by hand", scale=0.5)
+    model = Model(Twin.of(ROBOT), (Free(None, p),))
+    J = rng.normal(size=(400, 1))
+
+    def spread(size: float) -> float:
+        z = rng.normal(size=400)
+        z *= size * np.sqrt(399) / np.linalg.norm(z)  # mean square size^2 over 399 degrees of freedom
+        return float(Fit(Evaluation(model, [], [], z), J, 0.0).std()[0])
+
+    noise = 0.5 / float(np.linalg.norm(J))  # SI: a step over the root of J'J
+    assert spread(1.0) == pytest.approx(noise)
+    assert spread(3.0) == pytest.approx(3.0 * noise)
+    assert spread(0.5) == pytest.approx(noise)
+
+
+# ---- coverage: do intervals hold the truth as often as they say ----------------------------------------------------------------
+
+
+class Linear(Objective):
+    """A bench whose white outputs are A x, x in steps, measured as y with noise of one sigma."""
+
+    def __init__(self, A: np.ndarray, y: np.ndarray) -> None:
+        nothing: Any = SimpleNamespace(measured=[])
+        super().__init__(nothing, [], nothing, 1)
+        self.A, self.y = A, y
+
+    def evaluate(self, model: Model, near: list[Trace] | None = None) -> Evaluation:
+        return Evaluation(model, [], [], self.y - self.A @ model.vector())
+
+    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
+        return -self.A[:, list(which)]
+
+
+# Two numbers believed to some spread beforehand, which the data fix well and badly, and two of which nothing is believed.
+BELIEVED = (0.8, 0.3, None, None)
+LOOKS = (0.3, 0.03, 0.2, 1.0)  # size of each one's pattern: standard errors of 1/3, 3, 1/2 and 1/10 steps from 100 samples alone
+STEP = 0.5  # SI
+FREE = tuple(
+    Free(None, Parameter(f"p{i}", 0.0, "m", -50.0, 50.0, "made", std=None if s is None else s * STEP, scale=STEP))
+    for i, s in enumerate(BELIEVED)
+)
+
+
+def drawn(rng: np.random.Generator, louder: float = 1.0) -> tuple[np.ndarray, Fit]:
+    """What is true (SI), drawn as believed, and what is fitted to it through noise of `louder` times the sigma it is divided by."""
+    A = rng.normal(size=(100, 4)) * LOOKS
+    # std takes a step's share: STEP * s believed in SI is s steps
+    x = np.array([rng.normal() * s if s is not None else rng.uniform(-3.0, 3.0) for s in BELIEVED])
+    y = A @ x + louder * rng.normal(size=100)
+    return x * STEP, fit(Linear(A, y), Model(Twin.of(ROBOT), FREE))
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    """90 % intervals, value +- 1.645 standard errors, over 400 linear days: 85 to 95 % of each parameter (1.5 % by chance, and some
+    1 % wide for the residual's own scatter, which only ever widens). Half the error would hold 59 %, twice the error 99.9 %."""
+    rng = np.random.default_rng(0)
+    days = [drawn(rng) for _ in range(400)]
+    held = [np.abs([f.model.value(p) for p in FREE] - true) < 1.645 * f.std() for true, f in days]
+    assert np.all(np.abs(np.mean(held, axis=0) - 0.90) < 0.05)
+    # Mean square of the error over its standard error: one, known to sqrt(2 / 1600), less 4 % for the widening.
+    pull = np.array([([f.model.value(p) for p in FREE] - true) / f.std() for true, f in days])
+    assert 0.86 < np.mean(pull**2) < 1.06
+
+
+def test_intervals_hold_where_the_noise_is_larger_than_it_was_taken_for() -> None:
+    """Twice the sigma that residuals were divided by: of the numbers that the data alone fix, as many are held."""
+    rng = np.random.default_rng(1)
+    days = [drawn(rng, louder=2.0) for _ in range(300)]
+    held = [np.abs([f.model.value(p) for p in FREE] - true) < 1.645 * f.std() for true, f in days]
+    assert np.all(np.abs(np.mean(held, axis=0)[2:] - 0.90) < 0.05)  # 1.7 % by chance
+
+
+def test_a_fit_of_a_linear_bench_is_its_posterior() -> None:
+    """Mean and covariance of a Gaussian with a Gaussian prior, by least squares with the prior as further rows."""
+    rng = np.random.default_rng(2)
+    A, y = rng.normal(size=(100, 4)) * LOOKS, 3.0 * rng.normal(size=100)
+    f = fit(Linear(A, y), Model(Twin.of(ROBOT), FREE))
+    rows = np.diag([0.0 if s is None else 1.0 / s for s in BELIEVED])
+    whole, zero = np.vstack([A, rows]), np.zeros(4)
+    x = np.linalg.lstsq(whole, np.append(y, zero), rcond=None)[0]
+    np.testing.assert_allclose(f.model.vector(), x, atol=1e-3)  # steps; a fit stops when its cost falls by less than 1e-5 of itself
+    spread = np.sqrt(np.diag(np.linalg.inv(whole.T @ whole)) * np.sum((y - A @ x) ** 2) / 96.0)
+    np.testing.assert_allclose(f.std(), STEP * spread, rtol=1e-3)
+    assert f.cost == pytest.approx(np.sum((y - A @ x) ** 2) + np.sum((rows @ x) ** 2), rel=1e-4)
+    # Share of each number that the data, not the belief, made: the trace of the hat matrix over the data's rows.
+    hat = whole @ np.linalg.pinv(whole)
+    assert f.effective_parameters() == pytest.approx(np.trace(hat[:100, :100]), rel=1e-6)
+
+
+def test_derivatives_of_a_neighbour_serve_as_well() -> None:
+    """Of a linear bench they are its own: those given are kept, those that lack are taken."""
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(100, 4)) * LOOKS
+    bench, model = Linear(A, rng.normal(size=100)), Model(Twin.of(ROBOT), FREE)
+    whole = fit(bench, model)
+    for given in (0, 2, 4):
+        again = fit(bench, model, J=-A[:, :given])
+        np.testing.assert_array_equal(again.J, whole.J)
+        np.testing.assert_allclose(again.model.vector(), whole.model.vector(), rtol=1e-12)
+
+
+def test_a_thousandth_of_its_range_from_an_end_a_parameter_stands_there() -> None:
+    model = Model(Twin.of(ROBOT), FREE)  # from -50 to 50, so 0.1 is at the end
+    for value, at in ((-49.95, True), (-49.85, False), (0.0, False), (49.85, False), (49.95, True)):
+        moved = model.at(np.array([value / STEP, 0.0, 0.0, 0.0]))
+        assert Fit(Evaluation(moved, [], [], np.zeros(5)), np.zeros((5, 4)), 0.0).at_bound().tolist() == [at, False, False, False]
+
+
+def test_a_belief_that_data_hardly_narrow_is_called_unfixed() -> None:
+    """Of the two believed numbers only the one with the faint pattern; of the others nothing was believed that could stay."""
+    assert drawn(np.random.default_rng(4))[1].unfixed() == ["p1"]

@@ -15,7 +15,13 @@ from pathlib import Path
 
 import pytest
 
+from twin import cli
+from twin import diagnose as diagnosis
+from twin.diagnose import Settings
+from twin.errors import DataError
+from twin.measurements import Recording
 from twin.robots.robot import models_folder
+from twin.twin import Twin
 
 SAMPLE = models_folder() / "continuum/samples/friday"
 
@@ -55,7 +61,7 @@ def test_the_better_twin_predicts_again(diagnosed: tuple[Path, subprocess.Comple
     assert after["rmse"] < 0.5 * before["rmse"]
     assert set(after["by_channel"]) == {f"disk_{k}_{a}" for k in range(1, 9) for a in "xyz"}
     report = json.loads((folder / "report.json").read_text())["error"]
-    # All trials here, the held-out ones there: the same noise, so the same size (a fifth covers the trials' differences).
+    # All trials here, the sealed ones there: the same noise, so the same size (a fifth covers the trials' differences).
     assert after["rmse"] == pytest.approx(report["after"], rel=0.2)
 
 
@@ -78,6 +84,11 @@ def test_calibrate_writes_a_twin(tmp_path: Path) -> None:
     assert table["robot"] == "continuum"
     assert "backbone.youngs_modulus" in table["parameters"]
     assert table["provenance"]["data_hash"]
+    assert "GPa" in done.stdout  # the unit of the robot's file
+    before = (tmp_path / "calibrated.toml").read_bytes()
+    again = twin("calibrate", str(SAMPLE), "--out", "calibrated.toml", cwd=tmp_path)
+    assert (again.returncode, "--force" in again.stderr) == (2, True)
+    assert (tmp_path / "calibrated.toml").read_bytes() == before
 
 
 @pytest.mark.parametrize("command", ["robots", "effects"])
@@ -147,3 +158,20 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
     assert running.returncode == 1
     assert "Traceback" not in said
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["diagnose", "calibrate"])
+def test_the_seed_asked_for_is_the_seed_used(command: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It draws which trials are sealed: another seed must reach the work."""
+    used: list[Settings] = []
+
+    def stop(recording: Recording, twin: Twin, settings: Settings, *rest: object) -> None:
+        used.append(settings)
+        raise DataError("far enough")
+
+    monkeypatch.setattr(diagnosis, "diagnose", stop)
+    monkeypatch.setattr(diagnosis, "calibration", stop)
+    monkeypatch.setattr(sys, "argv", ["twin", command, str(SAMPLE), "--seed", "41", "--jobs", "3", "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert used == [Settings(seed=41, jobs=3)]

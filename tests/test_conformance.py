@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from twin.bench import prepare
-from twin.effects import Effect, catalogue, named
+from twin.effects import Drive, Effect, catalogue, named
 from twin.errors import SolveError, TwinError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
@@ -128,7 +128,7 @@ def starts(law: type[Effect], data: Recording) -> list[Effect]:
     robot = load("continuum")
     bench = prepare(data, robot)
     predicted = [t.true for t in simulate(Twin(robot), bench)]
-    held = [s.with_(by_length=np.ones(3, bool)) for s in predicted]  # some laws are sought only where displacements command
+    held = [s.with_(drives=(Drive.DISPLACEMENT,) * 3) for s in predicted]  # some laws are sought only where displacements command
     found = list(law.starts(predicted, 3)) or list(law.starts(held, 3))
     assert found, "a law needs somewhere to start a fit"
     return [law({**s.values}, 3) for s in found[:4]]

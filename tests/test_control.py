@@ -10,13 +10,13 @@ import pytest
 
 from tools.examples import circle, heat
 from tools.tracking import KNOWN, LENGTH, RADIUS, Bench, Run, attempt, controller, track, unknown
+from twin.bench import ROOM
 from twin.control import PI, RBF, Guard, PlainLoop, TensionLoop
 from twin.control.guard import loop_temperatures
 from twin.control.paths import on_surface, paths
 from twin.control.tension import passive
 from twin.control.tip import bent
 from twin.effects import named
-from twin.kinematics.robot import ROOM
 from twin.robots import load
 from twin.springs import pull
 from twin.springs.force import piece
@@ -69,7 +69,7 @@ def test_temperatures_of_the_loop_are_where_the_law_gives_that_tension(wanted: f
     for way in (np.linspace(ROOM, low, 2000), np.append(np.linspace(ROOM, 420.0, 200), np.linspace(420.0, up, 2000))):
         s = 0.7
         for T in way:
-            s = piece(SPRING, 0, T, HELD[0], HELD[0], s)[0]
+            s = piece(SPRING.records, 0, T, HELD[0], HELD[0], s)[0]
         assert s == pytest.approx(wanted, abs=0.01)  # N: the bisection's 0.03 K on flanks of some 0.1 N/K
 
 
@@ -95,7 +95,7 @@ def test_no_spring_exceeds_its_ceiling_in_a_thousand_cycles(factor: float, therm
         measured = np.array([warm + 0.5 * rng.normal()]) if thermometer else None
         U = guard.allowed(np.full(1, 99.0 if heating else -1.0), HELD, dt, measured)
         assert 0.0 <= U[0] <= guard.supply
-        warm = float(heated(plant, 0, warm, HELD[0], U[0] / SPRING.resistance[0], ROOM, dt))
+        warm = float(heated(plant.records, 0, warm, HELD[0], U[0] / SPRING.resistance[0], ROOM, dt))
         hottest, longest = max(hottest, warm), longest + dt
         if heating and (warm > guard.ceiling - 60.0 + 55.0 * (cycles % 2) or longest > 12.0):
             heating, longest = False, 0.0
@@ -110,7 +110,7 @@ def test_no_spring_exceeds_its_ceiling_in_a_thousand_cycles(factor: float, therm
 def test_without_the_guard_it_would_be_exceeded() -> None:
     warm = ROOM
     for _ in range(400):
-        warm = float(heated(SPRING, 0, warm, HELD[0], 0.9 / SPRING.resistance[0], ROOM, 0.05))
+        warm = float(heated(SPRING.records, 0, warm, HELD[0], 0.9 / SPRING.resistance[0], ROOM, 0.05))
     assert warm > Guard(SPRING, ROOM).ceiling + 50.0
 
 
@@ -126,8 +126,8 @@ def held_spring(loop: TensionLoop | PlainLoop, target: np.ndarray, dt: float = 0
     warm, s, out = ROOM, 0.7, []
     for goal in target:
         U = loop.step(np.array([goal]), np.array([s + 0.01 * rng.normal()]), HELD, dt)
-        warm = float(heated(plant, 0, warm, HELD[0], U[0] / SPRING.resistance[0], ROOM, dt))
-        s = max(0.0, piece(plant, 0, warm, HELD[0], HELD[0], s)[0])
+        warm = float(heated(plant.records, 0, warm, HELD[0], U[0] / SPRING.resistance[0], ROOM, dt))
+        s = max(0.0, piece(plant.records, 0, warm, HELD[0], HELD[0], s)[0])
         out.append((s, warm))
     return np.array(out).T[0], np.array(out).T[1]
 

@@ -17,10 +17,11 @@ from tools.bench.effects.vibration import Vibration
 from twin.bench import Bench, prepare
 from twin.calibrate import Fit
 from twin.diagnose import Settings, calibration
-from twin.diagnose.describe import change, describe, nearest, place, since, wave, where
 from twin.diagnose.evidence import Discrepancy, Evidence, Spectrum
 from twin.diagnose.null import Thresholds
+from twin.diagnose.places import place, where
 from twin.diagnose.split import split
+from twin.diagnose.words import change, nearest, since, structure, wave
 from twin.measurements import Recording
 from twin.robots import load
 from twin.twin import Twin, readings, report
@@ -75,7 +76,7 @@ def test_a_vibration_is_a_line_that_grows_to_the_tip(bench: Day) -> None:
     day, fitted, found, discrepancy = calibrated(recording)
     z = found.z.reshape(discrepancy.mean.shape)
     line = Spectrum.of(day, fitted).peak(z - discrepancy.mean)
-    words = describe(day, fitted, z, discrepancy, "T1", line, Thresholds())
+    words = structure(day, fitted, z, discrepancy, "T1", line, Thresholds())
     said = re.search(r"^A line at ([\d.]+) Hz is left, of ([\d.]+) sigma in disk_8_(x|y); it grows from disk_1 to disk_8\.$", words)
     assert said, words
     # The grid's step is half a cycle in the longest trial, 103 s.
@@ -164,6 +165,6 @@ def test_a_wave_is_taken_out_of_noise_whatever_its_phase(plan: Bench) -> None:
 
 
 def test_the_nearest_effect_is_a_hint_only_where_it_helps() -> None:
-    said = " Of the known effects base tilt with contact comes nearest, but takes only 30 % off the held-out error."
+    said = " Of the known effects base tilt with contact comes nearest, but takes only 30 % off the error on trials left out."
     assert nearest(("base_tilt", "contact"), 0.3) == said
     assert nearest(("base_tilt",), 0.05) == nearest(("base_tilt",), float("nan")) == ""

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from twin.bench import prepare
+from twin.body import Path, Problem
 from twin.dynamics import Dynamics
-from twin.effects import Creep, Loads, Route, catalogue
-from twin.equilibrium import Equilibrium, Path
+from twin.effects import Loads, Route, catalogue
+from twin.equilibrium import Equilibrium
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
 from twin.twin import Twin, is_dynamic
@@ -39,7 +40,7 @@ def statics() -> Equilibrium:
 
 
 def moved(time: np.ndarray, tension: np.ndarray, loads: Loads, route: Route | None = None, **how: float) -> Path:
-    return robot(**how).solve(time, tension, loads, route or Route(), Creep(), NONE.copy())
+    return robot(**how).solve(Problem(time, tension, loads, route or Route()))
 
 
 def tips(path: Path) -> np.ndarray:
@@ -65,7 +66,7 @@ loaded = pytest.mark.parametrize("loads", [Loads(HANGING, 0.01), Loads(SIDEWAYS,
 def missed(loads: Loads, route: Route, ramp: float) -> np.ndarray:
     """Distance (m) of all markers at rest, by pose, from the static path of the same tensions."""
     t, T, rest = ramps(POSES, ramp, hold=3.0)
-    dynamic, static = moved(t, T, loads, route, damping=0.03), statics().solve(t, T, loads, route)
+    dynamic, static = moved(t, T, loads, route, damping=0.03), statics().solve(Problem(t, T, loads, route))
     assert np.abs(np.diff(tips(static)[rest], axis=0)).max(axis=1).min() > 0.01  # from pose to pose there is a way to go
     np.testing.assert_allclose(dynamic.path[rest], static.path[rest], rtol=0, atol=5e-5)  # m, as the markers below
     return np.linalg.norm(dynamic.markers[rest] - static.markers[rest], axis=2).max(axis=1)
@@ -101,8 +102,8 @@ def test_it_settles_against_a_wall(stiffness: float, ramp: float, softness: floa
     loads = Loads(HANGING, 0.01, np.array([0.0, 0.03, 0.0]), np.array([*OBSTACLE, stiffness]))
     t, T, _ = ramps([(0, 0, 0), (2.0, 0.5, 0)], ramp, hold=3.0)
     soft = np.full(t.size, softness)
-    dynamic = robot(damping=0.03).solve(t, T, loads, Route(), Creep(), NONE.copy(), stiffness=soft)
-    static, free = (statics().solve(t, T, x, stiffness=soft) for x in (loads, Loads(HANGING, 0.01)))
+    dynamic = robot(damping=0.03).solve(Problem(t, T, loads, Route(), stiffness=soft))
+    static, free = (statics().solve(Problem(t, T, x, stiffness=soft)) for x in (loads, Loads(HANGING, 0.01)))
     assert np.linalg.norm(tips(static)[-1] - tips(free)[-1]) > 5e-3  # m: wall and force are felt
     np.testing.assert_allclose(dynamic.markers[-1], static.markers[-1], rtol=0, atol=1e-6)  # m: no memory, as above
 
@@ -144,11 +145,11 @@ def energy(path: Path, t: np.ndarray, T: np.ndarray) -> np.ndarray:
 
     E(q) - E(q_end) along the straight line between them, by the work of the residual (Gauss-Legendre, 12 points).
     """
-    from twin.equilibrium.chain import Law, Load, balance
+    from twin.equilibrium.chain import State, balance
     from twin.equilibrium.newton import place
 
     e = statics()
-    law, load_ = Law(0.0, 4e-4, np.zeros(5)), Load(SIDEWAYS, 0.0, np.zeros(3))
+    under = e.statics(Problem(t, T, Loads(SIDEWAYS)))
     x, w = np.polynomial.legendre.leggauss(12)
     velocity = np.gradient(path.q, t, axis=0)
     out, M, r = np.empty(len(t)), np.empty((48, 48)), np.empty(48)
@@ -156,11 +157,11 @@ def energy(path: Path, t: np.ndarray, T: np.ndarray) -> np.ndarray:
         way, work = q - path.q[-1], 0.0
         for a, b in zip(0.5 + 0.5 * x, 0.5 * w, strict=True):
             at = path.q[-1] + a * way
-            place(e.model._address, e.data._address, e.chain, at)
+            place(under, at)
             z, s = np.zeros((3, 8)), np.zeros((3, 8))
-            balance(at, np.zeros(48), e.chain, T[i], law, load_, z, s, z.copy(), s.copy(), r, np.empty((0, 0)))
+            balance(under, State(T[i], at, z, s), z.copy(), s.copy(), r, np.empty((0, 0)))
             work += b * float(r @ way)
-        place(e.model._address, e.data._address, e.chain, q)
+        place(under, q)
         mujoco.mj_forward(e.model, e.data)
         mujoco.mj_fullM(e.model, e.data, M)
         out[i] = work + 0.5 * velocity[i] @ M @ velocity[i]

@@ -9,8 +9,9 @@ import pytest
 
 from tools.bench.rod import NoEquilibrium, Rod, follow
 from tools.bench.rod import solve as rod_solve
+from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.effects import Loads, Route, catalogue
-from twin.equilibrium import DIRECT, NOT_FOUND, Equilibrium
+from twin.equilibrium import Equilibrium
 from twin.robots import load
 
 G = 9.81
@@ -54,7 +55,7 @@ def test_the_tip_is_the_rods(case: str, planar: bool) -> None:
         heaviest = 0.01 if g[2] < 0 else 0.03  # upright beyond 25 g it buckles
         payload = rng.uniform(0, heaviest)
         tension = np.array([rng.uniform(0, 4), 0, 0]) if planar else rng.uniform(0, 4, 3) * (rng.uniform(size=3) < 0.7)
-        path = solver().solve(np.zeros(1), tension[None], Loads(g, payload))
+        path = solver().solve(Problem(np.zeros(1), tension[None], Loads(g, payload)))
         assert path.status.all()
         assert not path.unstable_start
         try:
@@ -73,7 +74,7 @@ def test_the_tip_is_the_rods(case: str, planar: bool) -> None:
 def test_with_friction_the_tip_is_the_rods(mu: float) -> None:
     """Loading, unloading and loading again, both laws with so short a pre-sliding that holes slide or reverse at once."""
     t, T = swept((0, 0, 0), (3, 0, 0), (1, 0, 0), (2.5, 1, 0), each=60)
-    ours = tips(solver().solve(t, T, Loads(SIDEWAYS, 0.01), Route(mu, 2e-5)))
+    ours = tips(solver().solve(Problem(t, T, Loads(SIDEWAYS, 0.01), Route(mu, 2e-5))))
     lead = np.array([0.25, 0.5, 0.75])
     drive, weight = np.vstack([np.zeros((3, 3)), T]), np.append(lead, np.ones(len(T)))
     rod = follow(Rod(), drive, gravity=SIDEWAYS, payload=0.01, weight=weight, mu=mu, stroke=2e-5)
@@ -109,7 +110,9 @@ def test_one_tendon_bends_it_into_arcs(radius: float, tension: float) -> None:
         slope = EI * theta / h + 2 * tension * (-h / theta**2 * s + (h / theta - radius) * c / 2)
         curve = EI / h + 2 * tension * (2 * h / theta**3 * s - h / theta**2 * c - (h / theta - radius) * s / 4)
         theta -= slope / curve
-    tip = tips(unweighted(radius - 8e-3).solve(np.zeros(1), np.array([[tension, 0, 0]]), Loads(NOWHERE), tolerance=EXACT))[0]
+    tip = tips(unweighted(radius - 8e-3).solve(Problem(np.zeros(1), np.array([[tension, 0, 0]]), Loads(NOWHERE), tolerance=EXACT)))[
+        0
+    ]
     # m: the chord's distance from the arc changes by th h / 8 within an interval, which makes the curvature uneven by that
     # share of r, at most 0.9 %: its mean is in the formula, the rest is even within each interval and counts by its square.
     np.testing.assert_allclose(tip, bent_by(8 * theta), rtol=0, atol=2e-4 * bent_by(8 * theta)[0])
@@ -117,7 +120,7 @@ def test_one_tendon_bends_it_into_arcs(radius: float, tension: float) -> None:
 
 def test_constant_curvature_of_the_published_comparison() -> None:
     """Tip of 9.212 / 119.527 mm at 0.5 N and 4 mm, the formula other libraries are compared by (tendon along the arc)."""
-    tip = tips(unweighted(-4e-3).solve(np.zeros(1), np.array([[0.5, 0, 0]]), Loads(NOWHERE)))[0]
+    tip = tips(unweighted(-4e-3).solve(Problem(np.zeros(1), np.array([[0.5, 0, 0]]), Loads(NOWHERE))))[0]
     # mm: straight cable between eight disks instead of one along the arc shortens less: 0.05 mm, 0.5 % of the bend. A published
     # Cosserat solver with straight cable between five disks says 9.247.
     np.testing.assert_allclose(1e3 * tip, [9.212, 0.0, 119.527], rtol=0, atol=0.07)
@@ -125,7 +128,9 @@ def test_constant_curvature_of_the_published_comparison() -> None:
 
 def test_a_tip_force_bends_it_as_a_cantilever() -> None:
     force = 1e-4
-    tip = tips(solver().solve(np.zeros(1), np.zeros((1, 3)), Loads(NOWHERE, force=np.array([0, force, 0])), tolerance=EXACT))[0]
+    tip = tips(
+        solver().solve(Problem(np.zeros(1), np.zeros((1, 3)), Loads(NOWHERE, force=np.array([0, force, 0])), tolerance=EXACT))
+    )[0]
     # m: F L^3 / (3 EI) = 37 um. Two joint sets with a coupling integrate a linear moment exactly but for the rod's part within
     # each interval, (h / L)^2 / 4 = 0.4 % at most.
     np.testing.assert_allclose(tip, [0, force * LENGTH**3 / (3 * EI), LENGTH], rtol=0, atol=1.5e-7)
@@ -137,11 +142,11 @@ def test_it_buckles_where_euler_says() -> None:
     limit = np.pi**2 * EI / (4 * LENGTH**2) * (1 - weight / (7.837 * EI / LENGTH**2)) / G
     slack, time = np.zeros((1, 3)), np.zeros(1)
     # Dunkerley's sum is within a few per cent, and the disks' weights sit a sixteenth of the length higher than W's.
-    assert not solver().solve(time, slack, Loads(UPRIGHT, 0.95 * limit)).unstable_start
-    assert solver().solve(time, slack, Loads(UPRIGHT, 1.05 * limit)).unstable_start
-    assert solver().solve(time, slack, Loads(UPRIGHT, 0.03), FRICTION).unstable_start
-    assert not solver().solve(time, slack, Loads(HANGING, 0.03)).unstable_start
-    assert not solver().solve(time, slack, Loads(SIDEWAYS, 0.03)).unstable_start
+    assert not solver().solve(Problem(time, slack, Loads(UPRIGHT, 0.95 * limit))).unstable_start
+    assert solver().solve(Problem(time, slack, Loads(UPRIGHT, 1.05 * limit))).unstable_start
+    assert solver().solve(Problem(time, slack, Loads(UPRIGHT, 0.03), FRICTION)).unstable_start
+    assert not solver().solve(Problem(time, slack, Loads(HANGING, 0.03))).unstable_start
+    assert not solver().solve(Problem(time, slack, Loads(SIDEWAYS, 0.03))).unstable_start
 
 
 # ---- the solver ------------------------------------------------------------------------------------------------------------
@@ -157,8 +162,8 @@ def random_walk(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def test_warm_is_cold() -> None:
     t, T = random_walk(60, 1)
     loads = Loads(SIDEWAYS, 0.02)
-    warm = tips(solver().solve(t, T, loads, tolerance=EXACT))
-    cold = np.stack([tips(solver().solve(t[:1], T[k : k + 1], loads, tolerance=EXACT))[0] for k in range(60)])
+    warm = tips(solver().solve(Problem(t, T, loads, tolerance=EXACT)))
+    cold = np.stack([tips(solver().solve(Problem(t[:1], T[k : k + 1], loads, tolerance=EXACT)))[0] for k in range(60)])
     np.testing.assert_allclose(warm, cold, rtol=0, atol=1e-10)  # m: 48 hinges within 1e-11 rad over 0.12 m, all one way
 
 
@@ -166,10 +171,10 @@ def test_warm_is_cold() -> None:
 def test_near_a_neighbour_is_plain(mu: float) -> None:
     t, T = random_walk(60, 2)
     loads, route = Loads(SIDEWAYS, 0.02), Route(mu, 4e-4)
-    neighbour = solver().solve(t, T, loads, route, keep=True)
+    neighbour = solver().solve(Problem(t, T, loads, route, keep=True))
     softer = Equilibrium(load("continuum").build({"backbone.youngs_modulus": 0.99 * 77.59e9}))
-    plain = tips(softer.solve(t, T, loads, route))
-    near = tips(softer.solve(t, T, loads, route, near=neighbour))
+    plain = tips(softer.solve(Problem(t, T, loads, route)))
+    near = tips(softer.solve(Problem(t, T, loads, route, near=neighbour)))
     assert np.abs(plain - tips(neighbour)).max() > 1e-4  # there was a way to go
     # m: both within 1e-7 rad in every hinge; 48 of them one way move the tip by 3e-7 m; slip carries such errors along
     np.testing.assert_allclose(near, plain, rtol=0, atol=1e-6)
@@ -177,9 +182,9 @@ def test_near_a_neighbour_is_plain(mu: float) -> None:
 
 def test_same_question_same_answer() -> None:
     t, T = random_walk(60, 3)
-    one = Equilibrium(load("continuum").build()).solve(t, T, Loads(SIDEWAYS, 0.02), FRICTION)
-    solver().solve(t, T[::-1], Loads(UPRIGHT, 0.01), FRICTION)  # what was solved before must not matter
-    two = solver().solve(t, T, Loads(SIDEWAYS, 0.02), FRICTION)
+    one = Equilibrium(load("continuum").build()).solve(Problem(t, T, Loads(SIDEWAYS, 0.02), FRICTION))
+    solver().solve(Problem(t, T[::-1], Loads(UPRIGHT, 0.01), FRICTION))  # what was solved before must not matter
+    two = solver().solve(Problem(t, T, Loads(SIDEWAYS, 0.02), FRICTION))
     np.testing.assert_array_equal(one.q, two.q)
     np.testing.assert_array_equal(one.markers, two.markers)
 
@@ -191,7 +196,7 @@ def test_a_tension_that_is_no_number_is_flagged_and_forgotten(at: int, mu: float
     holed = T.copy()
     holed[at, 1] = np.nan
     loads, route = Loads(SIDEWAYS, 0.02), Route(mu, 4e-4)
-    path, whole = solver().solve(t, holed, loads, route), solver().solve(t, T, loads, route)
+    path, whole = solver().solve(Problem(t, holed, loads, route)), solver().solve(Problem(t, T, loads, route))
     assert path.status[at] == NOT_FOUND
     assert np.all(np.delete(path.status, at) != NOT_FOUND)
     assert np.isfinite(path.markers).all()
@@ -208,8 +213,8 @@ def test_loads_that_are_no_numbers_are_flagged(what: str) -> None:
         "payload": Loads(HANGING, np.nan),
         "force": Loads(HANGING, force=np.array([0, np.inf, 0])),
     }[what]
-    path = solver().solve(np.arange(2.0), np.ones((2, 3)), loads, FRICTION)
+    path = solver().solve(Problem(np.arange(2.0), np.ones((2, 3)), loads, FRICTION))
     assert np.all(path.status == NOT_FOUND)
     assert path.unstable_start
     # And it is over with them.
-    assert solver().solve(np.arange(2.0), np.ones((2, 3)), Loads(HANGING)).status.all()
+    assert solver().solve(Problem(np.arange(2.0), np.ones((2, 3)), Loads(HANGING))).status.all()

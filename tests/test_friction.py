@@ -10,6 +10,7 @@ import pytest
 from tests.test_balance import Energy, slope
 from tests.test_equilibrium import EXACT, FRICTION, HANGING, NOWHERE, SIDEWAYS, solver, swept, tips
 from tools.bench.rod import Rod, follow
+from twin.body import Problem
 from twin.effects import Loads, Route
 from twin.equilibrium import Equilibrium
 from twin.robots import load
@@ -21,7 +22,7 @@ def test_a_sliding_tendon_loses_what_the_capstan_says(pulling: bool) -> None:
     mu, body = 0.2, load("continuum").build()
     energy, e = Energy(body), Equilibrium(body)
     t, T = swept((0, 0, 0), (3, 0, 0), each=60) if pulling else swept((0, 0, 0), (4, 0, 0), (2, 0, 0), each=60)
-    path = e.solve(t, T, Loads(NOWHERE), Route(mu, 2e-5), tolerance=EXACT)
+    path = e.solve(Problem(t, T, Loads(NOWHERE), Route(mu, 2e-5), tolerance=EXACT))
     q = path.q[-1]
     np.testing.assert_array_equal(path.slip[0, 1:], 1.0 if pulling else -1.0)
     lengths = slope(lambda x: energy.segments(x)[0], q)  # (nv, 8)
@@ -39,8 +40,8 @@ def test_a_sliding_tendon_loses_what_the_capstan_says(pulling: bool) -> None:
 
 def test_friction_remembers_the_way_and_holds_still() -> None:
     t, T = swept((0, 0, 0), (4, 0, 0), (2, 0, 0), (2, 0, 0))
-    with_it = 1e3 * tips(solver().solve(t, T, Loads(HANGING), FRICTION))
-    without = 1e3 * tips(solver().solve(t, T, Loads(HANGING)))
+    with_it = 1e3 * tips(solver().solve(Problem(t, T, Loads(HANGING), FRICTION)))
+    without = 1e3 * tips(solver().solve(Problem(t, T, Loads(HANGING))))
     up, down = 20, 80  # samples at 2 N
     # mm: a released tendon pulls harder along the robot than a pulled one: 66.6 and 72.5 mm of x around 69.5 at mu 0.2 without
     # gravity (equilibrium.md); gravity takes part of it. A millimetre either way is a fifth of that.
@@ -53,7 +54,7 @@ def test_friction_remembers_the_way_and_holds_still() -> None:
 
 def test_friction_does_not_know_the_clock() -> None:
     t, T = swept((0, 0, 0), (3, 1, 0), (1, 2, 0))
-    fast, slow = (tips(solver().solve(x, T, Loads(HANGING), FRICTION)) for x in (t / 50, 7 * t**1.1))
+    fast, slow = (tips(solver().solve(Problem(x, T, Loads(HANGING), FRICTION))) for x in (t / 50, 7 * t**1.1))
     np.testing.assert_array_equal(fast, slow)
 
 
@@ -61,8 +62,8 @@ def test_loads_come_in_the_stated_order() -> None:
     """Gravity and payload first, then the first tensions from slack: a log that starts pulled is one that was ramped there."""
     loads = Loads(SIDEWAYS, 0.03)
     t, T = swept((0, 0, 0), (3, 1, 0), each=64)
-    ramped = tips(solver().solve(t, T, loads, FRICTION))[-1]
-    at_once = tips(solver().solve(np.zeros(1), T[-1:], loads, FRICTION))[0]
+    ramped = tips(solver().solve(Problem(t, T, loads, FRICTION)))[-1]
+    at_once = tips(solver().solve(Problem(np.zeros(1), T[-1:], loads, FRICTION)))[0]
     # m: the documented difference of 8 steps from 64
     np.testing.assert_allclose(at_once, ramped, rtol=0, atol=5e-5)
     # The order matters: pulled while weightless and loaded afterwards, the same robot hangs millimetres away. That it does in
@@ -77,8 +78,8 @@ def test_loads_come_in_the_stated_order() -> None:
 def test_more_steps_on_the_way_change_nothing_much() -> None:
     """Slip is integrated implicitly from sample to sample: a log of every tenth sample gives the same loop."""
     t, T = swept((0, 0, 0), (3, 0, 1), (0.5, 2, 0), (3, 0, 0), each=100)
-    fine = tips(solver().solve(t, T, Loads(SIDEWAYS, 0.02), FRICTION))
-    coarse = tips(solver().solve(t[::10], T[::10], Loads(SIDEWAYS, 0.02), FRICTION))
+    fine = tips(solver().solve(Problem(t, T, Loads(SIDEWAYS, 0.02), FRICTION)))
+    coarse = tips(solver().solve(Problem(t[::10], T[::10], Loads(SIDEWAYS, 0.02), FRICTION)))
     # m: 0.3 N a sample against 0.03 N. Worst measured 0.22 mm between one step and 16 where a hole reverses on the way.
     np.testing.assert_allclose(coarse, fine[::10], rtol=0, atol=2.2e-4)
 
@@ -91,7 +92,7 @@ def test_few_samples_tell_the_same_history_as_many() -> None:
     solver = Equilibrium(load("continuum").build())
     loads, rubbing = Loads(np.array([0.0, 0.0, 9.81]), payload=0.01), Route(mu=0.28, presliding=2e-5)
     fine = np.concatenate([corner[:1], *(a + (b - a) * np.arange(1, 65)[:, None] / 64 for a, b in pairwise(corner))])
-    few = solver.solve(np.arange(len(corner)) * 1.0, corner, loads, rubbing)
-    many = solver.solve(np.arange(len(fine)) / 64, fine, loads, rubbing)
+    few = solver.solve(Problem(np.arange(len(corner)) * 1.0, corner, loads, rubbing))
+    many = solver.solve(Problem(np.arange(len(fine)) / 64, fine, loads, rubbing))
     assert few.status.all()
     assert np.linalg.norm(few.markers - many.markers[::64], axis=2).max() < 8e-4

@@ -20,13 +20,16 @@ from twin.measurements import Trial, read, write
 from twin.robots import load
 from twin.twin import Twin
 
-RAW = Path(os.environ.get("TWIN_MEASURED", Path(__file__).resolve().parents[2] / "shared/measured"))
+RAW = Path(os.environ.get("TWIN_MEASURED", Path(__file__).resolve().parents[1] / "measured"))
 
 
 @pytest.fixture
 def raw() -> Path:
     if not RAW.is_dir():
-        warnings.warn(f"NOT TESTED: the public rigs' raw data are not in {RAW}", stacklevel=1)
+        warnings.warn(
+            f"NOT TESTED: the public rigs' raw data are not in {RAW} (python -m tools.fetch_measured)",
+            stacklevel=1,
+        )
         pytest.skip(f"raw data not in {RAW}")
     return RAW
 

@@ -14,8 +14,9 @@ from tools.bench.design import Day, bench_day
 from tools.bench.effects import all_effects
 from twin.bench import Bench
 from twin.calibrate import Fit, Model, Objective
-from twin.diagnose.identifiability import CLEAR, Visibility, identifiability
-from twin.diagnose.screen import Dictionary, Pattern, dictionary
+from twin.diagnose.identifiability import Visibility, identifiability
+from twin.diagnose.patterns import Dictionary, Pattern, dictionary
+from twin.diagnose.thresholds import CLEAR
 from twin.effects import Start, catalogue
 from twin.residual import Noise, Whitener
 from twin.twin import Twin

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.effects import Loads, named
+from twin.body import Problem
+from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.errors import TwinError
 from twin.kinematics import HeatedRobot, LoadedRobot, inverse
 from twin.kinematics.tip_wrench import tip_wrench
 from twin.robots import load
-from twin.twin import Twin, heating_of
+from twin.twin import Twin
 
 HANGING = Loads(np.array([0.0, 0.0, 9.81]))
 SIDEWAYS = Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
@@ -30,8 +31,8 @@ def test_forward_is_what_a_trial_gives(twin: Twin) -> None:
     when = np.linspace(0.0, 1.0, 120)
     tension = np.stack([2.5 * np.sin(3 * when) ** 2, 1.5 * when, 0.3 * np.cos(2 * when) ** 2], axis=1)
     robot = LoadedRobot(twin, SIDEWAYS)
-    route = named("tendon_friction")({"mu": 0.15}, 3).route() if twin is RUBBING else None
-    path = Equilibrium(load("continuum").build()).solve(when, tension, SIDEWAYS, route)
+    route = named("tendon_friction")({"mu": 0.15}, 3).route() if twin is RUBBING else Route()
+    path = Equilibrium(load("continuum").build()).solve(Problem(when, tension, SIDEWAYS, route))
     stepped = np.array([robot.pull(T).markers for T in tension])
     # The trial ramps its first tensions in other parts, which friction remembers (RAMP in equilibrium/trial.py: 0.015 mm).
     np.testing.assert_allclose(stepped, path.markers, atol=2e-5 if twin is RUBBING else 2e-7)  # two solves within 1e-7 rad
@@ -64,7 +65,7 @@ def test_what_the_robot_reaches_is_found(twin: Twin, by_sector: bool) -> None:
         if by_sector:
             assert (answer.tension > 1e-9).sum() <= 2
             assert answer.tension == pytest.approx(tension, abs=0.02)  # one answer: that which led there
-        other.tension, other.q, other.slip, other.distal = robot.state()
+        other.restore(robot.state())
 
 
 def test_a_point_on_a_tendons_own_line_needs_that_tendon_alone() -> None:
@@ -151,7 +152,7 @@ def test_the_gradient_is_the_difference(twin: Twin) -> None:
     robot.pull(start + 0.05)  # all slide towards the base, and go on doing so
     gradient, here, step = robot.gradient(), robot.state(), 1e-4
     for t in range(3):
-        robot.tension, robot.q, robot.slip, robot.distal = (x.copy() for x in here)
+        robot.restore(here)
         before = robot.shape().markers
         moved = (robot.pull(start + 0.05 + step * np.eye(3)[t]).markers - before) / step
         scale = np.abs(moved).max()
@@ -188,13 +189,38 @@ def test_springs_step_by_step_are_a_trial_of_currents() -> None:
     current = np.repeat(rng.uniform(0.0, 2.0, (8, 3)), 10, axis=0)
     robot = HeatedRobot(RUBBING, SIDEWAYS)
     assert robot.shape().markers.shape == (9, 3)
-    solved = Equilibrium(load("continuum").build()).solve(
-        when, current, SIDEWAYS, named("tendon_friction")({"mu": 0.15}, 3).route(),
-        heating=heating_of(RUBBING, np.full(len(when), 296.15), np.ones(3, bool)),
-    )  # fmt: skip
+    solved = Equilibrium(load("continuum").build()).solve(Problem(
+        when, current, SIDEWAYS, named("tendon_friction")({"mu": 0.15}, 3).route(), (Drive.CURRENT,) * 3,
+        heating=RUBBING.heating(np.full(len(when), 296.15)),
+    ))  # fmt: skip
     for i in range(1, len(when)):
         tension = robot.step(current[i - 1], when[i] - when[i - 1])
-        np.testing.assert_allclose(robot.warm, solved.temperature[i], atol=1e-6)  # K
+        np.testing.assert_allclose(robot.warm, solved.others["temperature"][i], atol=1e-6)  # K
         np.testing.assert_allclose(tension, solved.tension[i], atol=1e-5)  # N: two solves within 1e-7 rad
         np.testing.assert_allclose(robot.shape().markers, solved.markers[i], atol=5e-7)
     assert np.ptp(solved.tension) > 1.0
+
+
+def test_a_soft_robot_is_one_of_a_softer_material() -> None:
+    """At 10 K above where stiffness is quoted and 2 % a kelvin: as a backbone of 0.8 E, in shape, tensions, their derivatives and
+    the tensions a point needs."""
+    soft = Twin(load("continuum"), {}, (named("temperature_softening")({"rate": 0.02}, 3),))
+    nominal = next(p.value for p in load("continuum").parameters if p.name == "backbone.youngs_modulus")
+    softer = Twin(load("continuum"), {"backbone.youngs_modulus": 0.8 * nominal})
+    loads = Loads(np.array([0.0, -9.81, 2.0]), payload=0.01, force=np.array([0.02, 0.0, 0.01]))
+    warm, other = LoadedRobot(soft, loads, temperature=306.15), LoadedRobot(softer, loads)
+    for tension in ([0.0, 0.0, 0.0], [1.5, 0.0, 0.4], [0.5, 2.0, 0.0]):
+        a, b = warm.pull(np.array(tension)), other.pull(np.array(tension))
+        np.testing.assert_allclose(a.markers, b.markers, atol=5e-7)  # m: two solves within 1e-7 rad
+        np.testing.assert_allclose(a.displacement, b.displacement, atol=5e-8)
+        np.testing.assert_allclose(a.tension, tension, atol=1e-12)
+        np.testing.assert_allclose(warm.gradient(), other.gradient(), atol=5e-6)  # m/N, of some 3e-2
+    warm.burden(0.02)
+    other.burden(0.02)
+    np.testing.assert_allclose(warm.shape().markers, other.shape().markers, atol=5e-7)
+    tip = warm.shape().tip
+    for robot in (warm, other):
+        robot.rest()
+    answers = [inverse(robot, tip) for robot in (warm, other)]
+    np.testing.assert_allclose(answers[0].tension, answers[1].tension, atol=2e-3)  # N: 1e-5 m where 1 N moves centimetres
+    assert answers[0].tension == pytest.approx([0.5, 2.0, 0.0], abs=0.05)

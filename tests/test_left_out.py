@@ -1,130 +1,95 @@
-"""What a fit would have predicted of trials left out, and what is chosen by it."""
+"""What a fit would have predicted of trials left out: against refits, by hand."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
-from twin.diagnose import verdict
-from twin.diagnose.left_out import left_out
-from twin.diagnose.search import _better
+from twin.diagnose.left_out import LeftOut, left_out
 
 TRIALS = (5, 8, 7)  # rows
 STD = 0.7  # of the first parameter's prior, in steps; the second has none
 
 
-def linear(rng: np.random.Generator) -> tuple[Any, Any, np.ndarray, np.ndarray]:
-    """A linear least-squares problem dressed as an Objective and a Fit at its solution; and its J, and z at x = 0."""
-    J = rng.normal(size=(sum(TRIALS), 2))
-    z0 = rng.normal(size=sum(TRIALS)) + 3.0
-    weight = np.array([1.0 / STD, 0.0])
-    x = np.linalg.solve(J.T @ J + np.diag(weight**2), -J.T @ z0)
-    free = [SimpleNamespace(parameter=SimpleNamespace(std=std, step=1.0)) for std in (STD, None)]
-    fit = SimpleNamespace(J=J, z=z0 + J @ x, model=SimpleNamespace(free=free), at_bound=lambda: np.zeros(2, bool))
-    measured = [np.zeros((n, 1)) for n in TRIALS]
-    objective = SimpleNamespace(bench=SimpleNamespace(measured=measured), trials=range(len(TRIALS)), n=sum(TRIALS))
-    return objective, fit, J, z0
+def linear(rng: np.random.Generator, rows: tuple[int, ...] = TRIALS, off: float = 0.0) -> tuple[Any, Any, np.ndarray, np.ndarray]:
+    """A linear least-squares problem dressed as a Study and a Fit, `off` its solution; and its J, and z at x = 0."""
+    J = rng.normal(size=(sum(rows), 2))
+    z0 = rng.normal(size=sum(rows)) + 3.0
+    x = solved(J, z0, np.ones(sum(rows), bool)) + off
+    free = [SimpleNamespace(parameter=SimpleNamespace(std=std, step=1.0, value=0.0)) for std in (STD, None)]
+    model = SimpleNamespace(free=free, vector=lambda: x)
+    fit = SimpleNamespace(J=J, z=z0 + J @ x, model=model, at_bound=lambda: np.zeros(2, bool))
+    outputs = [SimpleNamespace(group="marker")]
+    bench = SimpleNamespace(inputs=[SimpleNamespace(time=np.arange(n)) for n in rows], outputs=outputs)
+    objective = SimpleNamespace(n=sum(rows))
+    evidence = SimpleNamespace(present=np.ones((sum(rows), 1), bool))
+    return SimpleNamespace(bench=bench, trials=range(len(rows)), objective=objective, evidence=evidence), fit, J, z0
+
+
+def solved(J: np.ndarray, z0: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """The fit to the kept rows."""
+    return np.linalg.solve(J[kept].T @ J[kept] + np.diag([STD**-2, 0.0]), -J[kept].T @ z0[kept])
+
+
+def refitted(J: np.ndarray, z0: np.ndarray, rows: tuple[int, ...]) -> np.ndarray:
+    """Residuals of every part under the fit to the others, by fitting again."""
+    z = np.empty_like(z0)
+    for a, b in pairwise(np.cumsum([0, *rows])):
+        out = np.zeros(len(z0), bool)
+        out[a:b] = True
+        z[out] = (z0 + J @ solved(J, z0, ~out))[out]
+    return z
 
 
 def test_it_is_what_refits_without_each_trial_give() -> None:
-    """To first order nothing is lost where the model is linear: equal to rounding (1e-8, from the ridge)."""
-    objective, fit, J, z0 = linear(np.random.default_rng(3))
-    ends, total = np.cumsum([0, *TRIALS]), 0.0
-    for k in range(len(TRIALS)):
-        out = np.zeros(len(z0), bool)
-        out[ends[k] : ends[k + 1]] = True
-        x = np.linalg.solve(J[~out].T @ J[~out] + np.diag([STD**-2, 0.0]), -J[~out].T @ z0[~out])
-        total += float(((z0 + J @ x)[out] ** 2).sum())
-    assert left_out(objective, fit) == pytest.approx(total / len(z0), rel=1e-8)
-    assert left_out(objective, fit) > float(np.mean(fit.z**2)), "what is left out is predicted worse than what is fitted"
+    """To first order nothing is lost where the model is linear: equal to rounding (1e-7, from the ridge of 1e-9)."""
+    study, fit, J, z0 = linear(np.random.default_rng(3))
+    found = left_out(study, fit)
+    np.testing.assert_allclose(found.z.ravel(), refitted(J, z0, TRIALS), rtol=0, atol=1e-7)
+    assert found.square == pytest.approx(float(np.mean(refitted(J, z0, TRIALS) ** 2)), rel=1e-7)
+    assert found.square > float(np.mean(fit.z**2)), "what is left out is predicted worse than what is fitted"
 
 
-def test_what_one_trial_alone_shows_does_not_end_it() -> None:
-    """J'J of 1e12 beside a ridge of 1e-9: the difference of two such sums would be singular."""
-    objective, fit, J, _ = linear(np.random.default_rng(3))
+def test_a_fit_that_has_not_converged_is_not_taken_further() -> None:
+    """The step all trials together would take is no consequence of leaving one out: it stays in the residual."""
+    study, fit, J, z0 = linear(np.random.default_rng(3), off=0.1)
+    expected = refitted(J, z0, TRIALS) + J @ np.full(2, 0.1)
+    np.testing.assert_allclose(left_out(study, fit).z.ravel(), expected, rtol=0, atol=1e-7)
+
+
+def test_what_one_trial_alone_shows_stays() -> None:
+    """The second parameter is seen in the first trial only, by J'J of 1e12 beside a ridge of 1e-9."""
+    study, fit, J, _ = linear(np.random.default_rng(3))
     J[:, 1] = 0.0
     J[: TRIALS[0], 1] = 1e6
-    assert np.isfinite(left_out(objective, fit))
+    assert np.isfinite(left_out(study, fit).z).all()
 
 
-def weighed(*effects: str, score: float, size: float, unseen: float) -> Any:
-    twin = SimpleNamespace(effects=effects, unseen=unseen)
-    fit = SimpleNamespace(model=SimpleNamespace(twin=twin))
-    return SimpleNamespace(effects=effects, score=score, discrepancy=SimpleNamespace(size=size), fit=fit)
+def test_a_single_trial_is_left_out_by_quarters() -> None:
+    study, fit, J, z0 = linear(np.random.default_rng(4), rows=(20,))
+    np.testing.assert_allclose(left_out(study, fit).z.ravel(), refitted(J, z0, (5, 5, 5, 5)), rtol=0, atol=1e-7)
 
 
-@pytest.fixture
-def chosen(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """(base, sets) -> the effects chosen; every set is as bad on trials left out as on unseen ones."""
-    monkeypatch.setattr(verdict, "left_out", lambda objective, fit: fit.model.twin.unseen**2)
-    held_out = cast(Any, SimpleNamespace(error=lambda twin: twin.unseen))
+def test_worse_is_all_channels_or_the_headline() -> None:
+    """Two channels, of which the marker is the headline: 1,000 samples each."""
 
-    def choose(base: Any, *sets: Any) -> tuple[str, ...] | None:
-        ranked = tuple(sorted((base, *sets), key=lambda w: -w.score))
-        found = cast(Any, SimpleNamespace(base=base, best=ranked[0], all=ranked))
-        core = verdict._most_predictive(found, cast(Any, None), held_out)
-        return core.effects if core else None
+    def of(marker: float, displacement: float) -> LeftOut:
+        outputs = [SimpleNamespace(group="displacement"), SimpleNamespace(group="marker")]
+        study: Any = SimpleNamespace(
+            bench=SimpleNamespace(outputs=outputs),
+            objective=SimpleNamespace(n=2000),
+            evidence=SimpleNamespace(present=np.ones((1000, 2), bool)),
+        )
+        return LeftOut(study, np.tile([displacement, marker], (1000, 1)))
 
-    return choose
-
-
-def test_a_set_is_chosen_by_what_it_predicts_only_if_each_of_its_effects_halves_the_squared_error(chosen: Any) -> None:
-    base = weighed(score=0.0, size=6.0, unseen=4.0)
-    imitation = weighed("routing", score=40.0, size=5.5, unseen=3.8)
-    cause = weighed("drive", score=20.0, size=3.5, unseen=2.0)
-    assert chosen(base, imitation, cause) == ("drive",)
-    assert chosen(base, imitation) is None, "nothing predicts: the evidence has the word"
-    weak = weighed("drive", score=20.0, size=5.0, unseen=3.0)  # 9/16 of the square
-    assert chosen(base, imitation, weak) is None
-    both = weighed("drive", "routing", score=25.0, size=3.4, unseen=1.9)
-    assert chosen(base, imitation, cause, both) == ("drive",), "the second effect does not pay"
-
-
-def test_a_set_that_leaves_a_trial_without_equilibrium_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    base = weighed(score=0.0, size=6.0, unseen=4.0)
-    falls, stands = weighed("ageing", score=90.0, size=0.1, unseen=0.1), weighed("drift", score=50.0, size=1.0, unseen=1.0)
-    monkeypatch.setattr(verdict, "_solves", lambda twin, bench: "ageing" not in twin.effects)
-    found = cast(Any, SimpleNamespace(base=base, best=falls, all=(falls, stands, base)))
-    assert verdict._predicting(found, cast(Any, None), 10.0).effects == ("drift",)
-
-
-@pytest.mark.parametrize(("left", "unseen", "kept"), [(0.1, 0.2, True), (0.1, 0.6, False), (0.9, 0.2, False)])
-def test_a_small_effect_beside_a_large_one_must_take_half_of_what_is_left_on_unseen_trials_too(
-    left: float, unseen: float, kept: bool
-) -> None:
-    held_out = cast(Any, SimpleNamespace(structure=lambda twin: (twin.unseen, {})))
-    both = weighed("large", "small", score=0.0, size=left, unseen=unseen)
-    alone = weighed("large", score=0.0, size=1.0, unseen=1.0)
-    assert verdict._takes_most(held_out, both, alone) is kept
-
-
-@pytest.mark.parametrize("stands", [True, False])
-def test_what_is_found_beside_the_core_is_taken_if_every_trial_can_be_predicted_with_it(
-    monkeypatch: pytest.MonkeyPatch, stands: bool
-) -> None:
-    base, core = weighed(score=9.0, size=6.0, unseen=4.0), weighed("drive", score=5.0, size=3.0, unseen=2.0)
-    both = weighed("drive", "play", score=7.0, size=2.0, unseen=1.0)
-    core.fit.evaluation = None
-    monkeypatch.setattr(verdict, "fit", lambda *_, **__: core.fit)
-    monkeypatch.setattr(verdict, "weigh", lambda *_: core)
-    monkeypatch.setattr(verdict, "dictionary", lambda *_: None)
-    monkeypatch.setattr(verdict, "search", lambda *_: SimpleNamespace(best=both, all=(both, core)))
-    monkeypatch.setattr(verdict, "_solves", lambda twin, bench: stands or "play" not in twin.effects)
-    found, nothing = cast(Any, SimpleNamespace(base=base, best=base, all=(base, core))), cast(Any, None)
-    widened = verdict._beside(core, found, nothing, nothing, nothing, nothing, nothing)
-    assert widened.best is (both if stands else core)
-    assert widened.base is base
-    assert [w.effects for w in widened.all] == [(), ("drive", "play"), ("drive",)]
-
-
-def test_of_two_fits_of_one_law_the_lower_cost_wins_and_of_two_laws_the_evidence() -> None:
-    def fitted(cost: float, score: float, *free: str) -> Any:
-        return SimpleNamespace(fit=SimpleNamespace(cost=cost, model=SimpleNamespace(free=free)), score=score)
-
-    trapped, better = fitted(9.0, 40.0, "turn", "sine"), fitted(5.0, 30.0, "turn", "sine")
-    assert _better(better, trapped)
-    assert not _better(trapped, better)
-    assert _better(trapped, fitted(1.0, 30.0, "turn", "sine", "cosine"))
+    plain = of(marker=1.0, displacement=2.0)
+    assert plain.square == pytest.approx(2.5)
+    assert plain.headline == pytest.approx(1.0)
+    assert not of(1.001, 1.0).worse(plain), "what only displacements show leaves the markers' last digits"
+    assert of(1.02, 1.0).worse(plain), "the markers' error is worse, though the displacements' falls more"
+    assert of(0.9, 2.1).worse(plain), "all channels together are worse"
+    assert not plain.worse(plain)

@@ -12,8 +12,9 @@ from tools.bench.bench import run
 from tools.bench.design import bench_day
 from tools.bench.rod import Rod
 from twin.bench import prepare
-from twin.effects import Loads, Route
-from twin.equilibrium import TOLERANCE, Equilibrium, Path
+from twin.body import TOLERANCE, Path, Problem
+from twin.effects import Drive, Loads, Route
+from twin.equilibrium import Equilibrium
 from twin.equilibrium.lengths import CLOSED, COMPRESSION, STIFFEST
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
@@ -54,11 +55,19 @@ def displacement(path: Path, stretch: float = STIFFEST, which: np.ndarray = ALL)
 
 
 def by_tension(T: np.ndarray, loads: Loads, route: Route | None = None) -> Path:
-    return solver().solve(np.arange(len(T), dtype=float), T, loads, route)
+    return solver().solve(Problem(np.arange(len(T), dtype=float), T, loads, route or Route()))
 
 
 def by_length(u: np.ndarray, loads: Loads, route: Route | None = None, which: np.ndarray = ALL) -> Path:
-    path = solver().solve(np.arange(len(u), dtype=float), u, loads, route, by_length=which)
+    path = solver().solve(
+        Problem(
+            np.arange(len(u), dtype=float),
+            u,
+            loads,
+            route or Route(),
+            tuple(Drive.DISPLACEMENT if w else Drive.TENSION for w in which),
+        )
+    )
     assert path.status.all()
     return path
 
@@ -187,8 +196,11 @@ def test_a_mixed_set_is_predicted_and_repeats_the_one_by_tension() -> None:
 @pytest.mark.parametrize(
     ("drives", "said"),
     [
-        (("tendon_1_tension", "tendon_2_displacement"), "tendon 3 is not driven"),
-        (("tendon_1_tension", "tendon_2_displacement", "tendon_2_tension", "tendon_3_tension"), "tendon 2 is driven twice"),
+        (("tendon_1_tension", "tendon_2_displacement"), "give tendon_3_tension or tendon_3_displacement"),
+        (
+            ("tendon_1_tension", "tendon_2_displacement", "tendon_2_tension", "tendon_3_tension"),
+            "tendon_2_tension and tendon_2_displacement drive the same tendon",
+        ),
     ],
 )
 def test_a_tendon_driven_twice_or_not_at_all_is_refused(drives: tuple[str, ...], said: str) -> None:

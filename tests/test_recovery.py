@@ -18,10 +18,12 @@ from twin.bench import prepare
 from twin.calibrate import Fit, fit
 from twin.diagnose import Settings
 from twin.diagnose.evidence import Evidence
-from twin.diagnose.null import ACCEPT
 from twin.diagnose.objective import objective_of
-from twin.diagnose.screen import dictionary, screen
-from twin.diagnose.search import _fuller, weigh
+from twin.diagnose.patterns import dictionary
+from twin.diagnose.ranking import rank
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import ACCEPT
+from twin.diagnose.weigh import fuller, weigh
 from twin.effects import catalogue
 from twin.robots import load
 from twin.twin import Twin
@@ -41,13 +43,13 @@ def fitted_alone(bench: Day, effect: str, seed: int = 5) -> tuple[Fit, Fit, Trut
     trials = list(range(len(prepared.inputs)))
     start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
     base = fit(objective, start, refresh=True)
-    evidence = Evidence(prepared, trials)
-    every = screen(objective, evidence, base, weigh(objective, evidence, base).discrepancy, dictionary(objective, base), top=99)
+    study = Study(objective, Evidence(prepared, trials))
+    every = rank(objective, study.evidence, base, weigh(study, base).discrepancy, dictionary(objective, base), top=99)
     found = [c for c in every if c.effect == effect]
     assert found, "the screening must see an effect of this size"
     fits = [fit(objective, base.model.with_effect(effect, c.start.values, c.start.free, 3), J=base.J) for c in found]
-    best = weigh(objective, evidence, min(fits, key=lambda f: f.cost))
-    return base, _fuller(objective, evidence, best, (effect,), ACCEPT, lambda words: None).fit, truth
+    best = weigh(study, min(fits, key=lambda f: f.cost))
+    return base, fuller(study, best, (effect,), ACCEPT).fit, truth
 
 
 @pytest.mark.parametrize("effect", sorted(catalogue()))

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.conftest import Day
 from twin.bench import Bench, prepare
-from twin.calibrate import Fit, fit
+from twin.calibrate import Evaluation, Fit, Free, Model, fit
 from twin.diagnose import Settings, diagnose
 from twin.diagnose.objective import objective_of
 from twin.diagnose.rigs import Rigs, rigs
 from twin.measurements import Recording
+from twin.quantities import Parameter
 from twin.robots import load
 from twin.twin import Twin
 
@@ -53,3 +58,70 @@ def test_the_diagnosis_says_so_and_claims_nothing(bench: Day) -> None:
     assert not d.claims
     assert "two different robots" in d.description
     assert any("Diagnose the two groups apart" in n for n in d.notices)
+
+
+def apart(size: float, trials: int = 8, samples: int = 50) -> tuple[float, float, Rigs | None]:
+    """A robot of two numbers that half the trials want `size` higher and half as much lower, without noise but for a row that no
+    robot explains: the fall of |z|^2 by two robots against one, by least squares; that bought by chance; and what `rigs` says."""
+    rng = np.random.default_rng(0)
+    J = rng.normal(size=(trials, samples, 2))
+    J[:, 10] = 0.0
+    side = np.where(np.arange(trials) % 2, 1.0, -1.0)
+    z = np.einsum("knp,k->kn", J, size * side)
+    z[:, 10] = 1.0
+    free = tuple(Free(None, Parameter(n, 0.0, "m", -10.0, 10.0, "by hand", std=2.0, scale=1.0)) for n in ("one", "two"))
+    fitted = Fit(Evaluation(Model(Twin.of(load("continuum")), free), [], [], z.ravel()), J.reshape(-1, 2), 0.0)
+    made: Any = SimpleNamespace(inputs=[SimpleNamespace(time=np.zeros(samples))] * trials, outputs=[None])
+
+    def left(group: np.ndarray) -> float:
+        """Least sum of squares of a group of trials, the priors' rows below."""
+        A, y = np.vstack([J[group].reshape(-1, 2), 0.5 * np.eye(2)]), np.append(z[group].ravel(), [0.0, 0.0])
+        return float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2))
+
+    fall = left(side > -2) - left(side > 0) - left(side < 0)
+    # By BIC: two more numbers known from n data; and 2^8 ways to share out the trials, twice their logarithm.
+    n = np.count_nonzero(z)
+    return fall, 2 * float(np.log(n)) + 2 * trials * float(np.log(2.0)), rigs(made, list(range(trials)), fitted)
+
+
+def test_the_second_robot_pays_for_its_numbers_and_for_the_choice_of_sides() -> None:
+    fall, price, found_ = apart(1.0)
+    assert found_ is not None
+    assert {found_.one, found_.other} == {(0, 2, 4, 6), (1, 3, 5, 7)}
+    assert found_.fall == pytest.approx(fall - price, rel=1e-6)  # 1e-9 is added to the information
+
+
+def test_two_robots_are_said_only_where_the_fall_beats_its_price_by_a_fifth_of_a_sigma() -> None:
+    """The fall goes with the square of what parts them: just above price + 0.2^2 n there are two, just below one."""
+    fall, price, _ = apart(1.0)
+    bar = price + 0.04 * 8 * 50
+    edge = float(np.sqrt(bar / fall))
+    assert apart(1.01 * edge)[2] is not None
+    assert apart(0.99 * edge)[2] is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_groups_are_those_of_all_possible_ones_that_leave_least(seed: int) -> None:
+    """Three trials that want one robot and five another, each a little its own, none twice as far on one side as on the other, all
+    with noise: of the 119 ways to share out eight trials, two at least on a side, the best by least squares."""
+    rng = np.random.default_rng(seed)
+    J = rng.normal(size=(8, 50, 2))
+    wanted = np.where(np.isin(np.arange(8), (1, 4, 5))[:, None], [1.5, 0.5], [-0.5, 0.0]) + 0.2 * rng.normal(size=(8, 2))
+    z = np.einsum("knp,kp->kn", J, wanted) + rng.normal(size=(8, 50))
+    free = tuple(Free(None, Parameter(n, 0.0, "m", -10.0, 10.0, "by hand", scale=1.0)) for n in ("one", "two"))
+    fitted = Fit(Evaluation(Model(Twin.of(load("continuum")), free), [], [], z.ravel()), J.reshape(-1, 2), 0.0)
+    made: Any = SimpleNamespace(inputs=[SimpleNamespace(time=np.zeros(50))] * 8, outputs=[None])
+    found_ = rigs(made, list(range(8)), fitted)
+    assert found_ is not None
+
+    def left(group: tuple[int, ...]) -> float:
+        A, y = J[list(group)].reshape(-1, 2), z[list(group)].ravel()
+        return float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2))
+
+    def rest(group: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(k for k in range(8) if k not in group)
+
+    least, other = min((left(g) + left(rest(g)), g) for n in (2, 3, 4) for g in combinations(range(8), n))
+    assert (found_.one, found_.other) == (rest(other), other)
+    price = 2 * np.log(400) + 16 * np.log(2)
+    assert found_.fall == pytest.approx(left(tuple(range(8))) - least - price, rel=1e-6)

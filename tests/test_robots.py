@@ -9,16 +9,17 @@ import mujoco
 import numpy as np
 import pytest
 
+from twin.body import Problem
 from twin.effects import Loads, Route, catalogue
 from twin.equilibrium import Equilibrium
 from twin.errors import DataError, UnknownNameError
-from twin.quantities import SI_UNITS
-from twin.robots import available, hinge_pairs, load
+from twin.hinges import hinge_pairs
+from twin.robots import available, load
 from twin.robots.robot import models_folder
 from twin.twin import Twin
 
 robots = pytest.mark.parametrize("name", available())
-backbones = pytest.mark.parametrize("name", [n for n in available() if load(n).build().joints])
+backbones = pytest.mark.parametrize("name", [n for n in available() if "backbone" in load(n).build().parts])
 TOML = (models_folder() / "continuum/robot.toml").read_text("utf-8")
 
 
@@ -27,15 +28,15 @@ def written(name: str) -> dict:
     return tomllib.loads((models_folder() / name / "robot.toml").read_text("utf-8"))
 
 
-@robots
+@backbones
 def test_it_compiles_and_all_its_names_exist(name: str) -> None:
     body = load(name).build()
     model = body.spec.compile()
-    sites = [*(hole for tendon in body.tendons for hole in tendon), *body.markers.values(), *body.disks, body.tip]
+    sites = [*(hole for tendon in body.tendons for hole in tendon), *body.markers, *body.disks, body.tip]
     assert all(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site) >= 0 for site in sites)
     hinges = [hinge for at in body.joints for hinge in (at.bend_x, at.bend_y, at.twist)]
     slides = [at.slide for at in body.joints if at.slide is not None]
-    joints = [*hinges, *slides, *body.pivots]
+    joints = [*hinges, *slides]
     assert sorted(model.joint(joint).id for joint in joints) == list(range(model.njnt))  # each once, and none besides
     assert len(slides) in (0, len(body.joints))
     assert len(body.tendons) == load(name).structure["tendons"]
@@ -58,7 +59,6 @@ def test_every_parameter_has_a_unit_a_source_and_bounds_around_it(name: str) -> 
     robot = load(name)
     assert robot.parameters
     for p in robot.parameters:
-        assert p.unit in (*SI_UNITS, "rad"), p.name
         assert p.source.strip(), p.name
         assert p.low <= p.value <= p.high
         if p.std is not None:  # a fit needs walls, and room between them
@@ -126,8 +126,8 @@ def test_turned_tensions_turn_the_shape(name: str) -> None:
     tension = np.random.default_rng(3).uniform(0, 3, (5, n))
     time, loads = np.arange(5.0), Loads(np.array([0, 0, 9.81]), payload=0.01)
     for route in (Route(), Route(0.2, 4e-4)):
-        one = solver.solve(time, tension, loads, route, tolerance=1e-11).markers
-        other = solver.solve(time, np.roll(tension, 1, axis=1), loads, route, tolerance=1e-11).markers
+        one = solver.solve(Problem(time, tension, loads, route, tolerance=1e-11)).markers
+        other = solver.solve(Problem(time, np.roll(tension, 1, axis=1), loads, route, tolerance=1e-11)).markers
         # m: 48 hinges each within 1e-11 rad, over 0.12 m. The order of the hinges within a joint differs from plane to
         # plane and must not be seen: the elastic energy is written in the true bending.
         np.testing.assert_allclose(other, one @ R.T, rtol=0, atol=1e-9)
@@ -145,8 +145,8 @@ def test_mirrored_tensions_mirror_the_shape(name: str) -> None:
         pytest.skip("its tendons are not mirror images of each other")
     tension = np.random.default_rng(4).uniform(0, 3, (5, len(holes)))
     time, loads = np.arange(5.0), Loads(np.array([3.0, 0, 9.0]), payload=0.01)
-    one = solver.solve(time, tension, loads, tolerance=1e-11).markers
-    other = solver.solve(time, tension[:, partner], loads, tolerance=1e-11).markers
+    one = solver.solve(Problem(time, tension, loads, tolerance=1e-11)).markers
+    other = solver.solve(Problem(time, tension[:, partner], loads, tolerance=1e-11)).markers
     np.testing.assert_allclose(other, one @ mirror, rtol=0, atol=1e-9)  # m: as above
 
 
@@ -218,3 +218,17 @@ def test_a_folder_is_a_robot(tmp_path: Path) -> None:
     folder = broken(tmp_path, "value = 120.0", "value = 120.0")
     assert load(str(folder)).parameters == load("continuum").parameters
     assert load("mine", relative_to=tmp_path).name == "mine"
+
+
+def test_a_markers_offset_points_from_base_to_tip() -> None:
+    """The straight robot's disk k stands at the sum of the first k pitches; its marker the offset further from the base."""
+    robot = load("continuum")
+    values = {p.name: p.value for p in robot.parameters}
+    offset = {f"markers.axial_offset_{k}": 1e-4 * (k - 3) for k in range(1, 9)}
+    body = robot.build(offset)
+    model = body.spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    heights = np.cumsum([values[f"disks.pitch_{k}"] for k in range(1, 9)]) + list(offset.values())
+    for k, height in enumerate(heights, 1):
+        np.testing.assert_allclose(data.site(f"disk_{k}").xpos, [0.0, 0.0, height], rtol=0, atol=1e-12)

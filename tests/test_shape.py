@@ -14,6 +14,7 @@ from twin.diagnose import Settings
 from twin.diagnose.objective import objective_of
 from twin.effects import Loads, named
 from twin.errors import TwinError
+from twin.kinematics import LoadedRobot
 from twin.robots import load
 from twin.shape import TensionShape
 from twin.twin import Twin
@@ -80,3 +81,23 @@ def test_the_error_bar_grows_with_doubt_and_with_load() -> None:
 def test_a_doubt_about_nothing_is_refused() -> None:
     with pytest.raises(TwinError, match=r"no number 'tendon_friction.mu' in this twin; doubts may be about payload, backbone"):
         TensionShape(Twin(load("continuum")), Loads(np.zeros(3)), {"tendon_friction.mu": 0.1})
+
+
+def test_the_error_bar_is_made_of_doubts_and_load_cells() -> None:
+    """Of load cells alone: noise times the markers' change per newton of each tendon, by central differences of the robot itself.
+    Of a doubtful payload alone: how far off the markers of a robot with so much more are. Of both: the root of the squares' sum."""
+    twin, tension = Twin(load("continuum")), np.array([1.6, 0.5, 0.1])  # N, all taut: no tendon pushes, a slack one has one side
+    loads = Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
+
+    def bar(noise: float, doubt: float) -> np.ndarray:
+        return TensionShape(twin, loads, {"payload": doubt}, tension_noise=noise).update(tension).std
+
+    def markers(more: np.ndarray | float = 0.0, payload: float = 0.0) -> np.ndarray:
+        return LoadedRobot(twin, replace(loads, payload=0.01 + payload)).pull(tension + more).markers
+
+    slopes = np.array([(markers(0.01 * e) - markers(-0.01 * e)) / 0.02 for e in np.eye(3)])
+    cells = 0.05 * np.sqrt((slopes**2).sum(axis=0))
+    doubts = np.abs(markers(payload=0.005) - markers())
+    np.testing.assert_allclose(bar(0.05, 1e-9), cells, rtol=1e-3, atol=2e-7)  # m: curvature of 0.01 N; solves within 1e-7 rad
+    np.testing.assert_allclose(bar(1e-9, 0.005), doubts, atol=5e-7)
+    np.testing.assert_allclose(bar(0.05, 0.005), np.hypot(cells, doubts), rtol=1e-3, atol=5e-7)

@@ -20,8 +20,9 @@ from tools.bench.sensors import Noise
 from tools.bench.springs import GF, Springs
 from tools.bench.write import write_set
 from twin.bench import prepare
-from twin.effects import Loads, Route, named
-from twin.equilibrium import Equilibrium, Heating
+from twin.body import Heating, Problem
+from twin.effects import Drive, Loads, Route, named
+from twin.equilibrium import Equilibrium
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial, read
 from twin.robots import load
@@ -31,7 +32,7 @@ from twin.twin import Twin, readings, report, simulate
 
 ROOM = 296.15  # K
 HANGING, SIDEWAYS = Loads(np.array([0.0, 0.0, 9.81]), 0.01), Loads(np.array([9.81, 0.0, 0.0]), 0.02)
-ALL = np.ones(3, bool)
+HEATED = (Drive.CURRENT,) * 3
 
 
 @cache
@@ -44,7 +45,9 @@ def springs(n: int = 3) -> Spring:
 
 
 def drive(time: np.ndarray, current: np.ndarray, loads: Loads, route: Route | None = None, spring: Spring | None = None):
-    path = robot().solve(time, current, loads, route, heating=Heating(ALL, np.full(len(time), ROOM), spring or springs()))
+    path = robot().solve(
+        Problem(time, current, loads, route or Route(), HEATED, heating=Heating(np.full(len(time), ROOM), spring or springs()))
+    )
     assert path.status.all()
     assert path.started == 1
     return path
@@ -60,9 +63,9 @@ def turns(time: np.ndarray, hot: float = 1.25) -> np.ndarray:
 
 def test_the_heat_step_is_exact_where_the_loss_is_constant() -> None:
     spring = springs(1)._replace(loss_warm=np.zeros(1), loss_warm_2=np.zeros(1), loss_warm_open=np.zeros(1))
-    h, c, R = loss(spring, 0, 0.0, 9e-3, ROOM), 0.1155, 0.45
+    h, c, R = loss(spring.records, 0, 0.0, 9e-3, ROOM), 0.1155, 0.45
     for dt in (0.02, 1.0, 300.0):
-        found = heated(spring, 0, ROOM + 12.0, 9e-3, 0.9, ROOM, dt)
+        found = heated(spring.records, 0, ROOM + 12.0, 9e-3, 0.9, ROOM, dt)
         end = R * 0.9**2 / h
         assert found - ROOM == pytest.approx(end + (12.0 - end) * np.exp(-h * dt / c), rel=1e-12)
 
@@ -74,7 +77,7 @@ def test_first_law() -> None:
     current = np.where(time < 60.0, 1.0, 0.0)
     elongation = 9e-3 - 3e-3 * np.sin(time / 20.0) ** 2
     T, _ = pull(spring, time, current[None], elongation[None], ROOM)
-    lost = [loss(spring, 0, x - ROOM, e, ROOM) * (x - ROOM) for x, e in zip(T[0], elongation, strict=True)]
+    lost = [loss(spring.records, 0, x - ROOM, e, ROOM) * (x - ROOM) for x, e in zip(T[0], elongation, strict=True)]
     inflow = 0.45 * (current[:-1] ** 2).sum() * dt
     outflow = float(np.sum(0.5 * (np.array(lost)[1:] + np.array(lost)[:-1])) * dt)
     # The step holds h: of first order, 3e-4 of 27 J at 20 ms.
@@ -85,7 +88,7 @@ def test_halving_the_step_halves_the_error_against_the_differential_equation() -
     spring = springs(1)
 
     def rate(t: float, x: np.ndarray) -> np.ndarray:
-        return (0.45 * 1.1**2 - loss(spring, 0, x[0] - ROOM, 9e-3, ROOM) * (x[0] - ROOM)) / np.array([0.1155])
+        return (0.45 * 1.1**2 - loss(spring.records, 0, x[0] - ROOM, 9e-3, ROOM) * (x[0] - ROOM)) / np.array([0.1155])
 
     exact = solve_ivp(rate, (0.0, 30.0), [ROOM], rtol=1e-10, atol=1e-10).y[0, -1]
     error = []
@@ -100,7 +103,7 @@ def test_halving_the_step_halves_the_error_against_the_differential_equation() -
 def test_it_heats_on_finitely_where_the_fitted_loss_is_negative() -> None:
     time = np.arange(0.0, 400.0, 0.5)
     T, s = pull(springs(1), time, np.full((1, len(time)), 3.0), np.full((1, len(time)), 9e-3), ROOM)
-    assert loss(springs(1), 0, 500.0, 9e-3, ROOM) == LEAST_LOSS
+    assert loss(springs(1).records, 0, 500.0, 9e-3, ROOM) == LEAST_LOSS
     assert np.isfinite(T).all()
     assert np.isfinite(s).all()
 
@@ -196,7 +199,7 @@ def test_body_and_springs_meet_where_another_solver_finds_them(loads: Loads) -> 
             now = now.stepped(turns(time)[i - 1], ROOM - 273.15, 4.0)
 
         def elongation(T: np.ndarray, part: Loads = part) -> np.ndarray:
-            return 9.0 + 1e3 * (robot().solve(np.zeros(1), np.maximum(T, 0.0)[None], part).path[0] - straight)
+            return 9.0 + 1e3 * (robot().solve(Problem(np.zeros(1), np.maximum(T, 0.0)[None], part)).path[0] - straight)
 
         def lacks(T: np.ndarray, now: Springs = now, elongation=elongation) -> np.ndarray:
             return np.maximum(0.0, GF * now.pull(elongation(T))) - T
@@ -208,7 +211,7 @@ def test_body_and_springs_meet_where_another_solver_finds_them(loads: Loads) -> 
         if i >= 0:
             # 1e-4 N: lengths are closed to 2e-8 m in either solver, 16 uN at the springs' 785 N/m, and add up over the samples
             np.testing.assert_allclose(found.tension[i], T, rtol=0, atol=1e-4)
-            np.testing.assert_allclose(found.temperature[i] - 273.15, now.temperature, rtol=0, atol=1e-3)
+            np.testing.assert_allclose(found.others["temperature"][i] - 273.15, now.temperature, rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1])
@@ -227,7 +230,7 @@ def test_it_is_the_rod_with_springs(mu: float) -> None:
     error = np.linalg.norm(found.markers[:, :8] - truth.markers, axis=2)
     # 0.01 mm is what the description is good for; pre-sliding is another law there, for which 0.05 mm
     assert np.sqrt(np.mean(error**2)) < (1e-5 if mu == 0.0 else 5e-5)
-    np.testing.assert_allclose(found.temperature - 273.15, truth.temperature, rtol=0, atol=2e-3 if mu == 0.0 else 0.05)
+    np.testing.assert_allclose(found.others["temperature"] - 273.15, truth.temperature, rtol=0, atol=2e-3 if mu == 0.0 else 0.05)
 
 
 def test_steps_of_20_ms_are_stable_and_converge() -> None:
@@ -236,7 +239,7 @@ def test_steps_of_20_ms_are_stable_and_converge() -> None:
         time = np.arange(0.0, 60.0 + dt / 2, dt)
         path = drive(time, turns(time), HANGING)
         assert np.abs(np.diff(path.markers[:, -1], axis=0)).max() < 3e-3 * max(dt, 0.05) / 0.25  # m: it does not jump
-        end.append(path.temperature[-1])
+        end.append(path.others["temperature"][-1])
     error = [float(np.abs(T - end[0]).max()) for T in end[1:]]
     assert error[0] < 0.6 * error[1] < 0.36 * error[2]
     assert error[0] < 0.5  # K at 0.25 s

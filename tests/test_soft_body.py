@@ -19,9 +19,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
+from twin.body import Problem
 from twin.effects import Loads
 from twin.equilibrium import Equilibrium
-from twin.equilibrium.chain import Law, Load, balance
+from twin.equilibrium.chain import State, balance
 from twin.equilibrium.newton import place
 from twin.quantities import overrides
 from twin.robots import load
@@ -127,7 +128,7 @@ def finer(times: int) -> Equilibrium:
 
 
 def markers(solver: Equilibrium, tension: np.ndarray) -> np.ndarray:
-    path = solver.solve(np.zeros(1), tension[None].copy(), Loads(GRAVITY))
+    path = solver.solve(Problem(np.zeros(1), tension[None].copy(), Loads(GRAVITY)))
     assert path.status.all()
     return path.markers[0, :4]
 
@@ -172,13 +173,14 @@ def test_residual_and_tangent_belong_to_one_energy() -> None:
     e = finer(1)
     nv = e.model.nv
     rng = np.random.default_rng(0)
-    force = Load(np.array([1.0, -2.0, 9.0]), 0.01, np.array([0.1, 0.2, 0.3]))
-    law, z = Law(0.0, 4e-4, np.array([-1.0, 0.0, 0.0, -0.01, 50.0])), np.zeros((2, e.chain.hole.shape[1] - 1))
+    loads = Loads(np.array([1.0, -2.0, 9.0]), 0.01, np.array([0.1, 0.2, 0.3]), np.array([-1.0, 0.0, 0.0, -0.01, 50.0]))
+    under, T = e.statics(Problem(np.zeros(1), np.zeros((1, 2)), loads)), np.array([3.0, 1.0])
+    z = np.zeros((2, e.chain.hole.shape[1] - 1))
 
     def at(q: np.ndarray, J: np.ndarray) -> np.ndarray:
         r = np.full(nv, np.nan)
-        place(e.model._address, e.data._address, e.chain, q)
-        balance(q, np.zeros(nv), e.chain, np.array([3.0, 1.0]), law, force, z, z, z.copy(), z.copy(), r, J)
+        place(under, q)
+        balance(under, State(T, q, z, z), z.copy(), z.copy(), r, J)
         return r
 
     q, J = 0.1 * rng.normal(size=nv) * e.chain.unit, np.full((nv, nv), np.nan)

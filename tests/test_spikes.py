@@ -9,7 +9,8 @@ import pytest
 
 from tests.conftest import Day
 from twin.bench import Bench, prepare
-from twin.diagnose.spikes import FAR, RARE, without_spikes
+from twin.diagnose.spikes import without_spikes
+from twin.diagnose.thresholds import RARE, SPIKE
 from twin.robots import load
 from twin.twin import Twin, readings, report, simulate
 
@@ -82,7 +83,7 @@ def test_a_delay_of_fast_motion_leaves_no_spikes(bench: Day) -> None:
     prepared, twin = prepare(recording, load("continuum")), Twin.of(load("continuum"))
     predicted = [readings(prepared, report(twin.effects, t.true)) for t in simulate(twin, prepared)]
     off = np.concatenate([y - p for y, p in zip(prepared.measured, predicted, strict=True)])[:, of_marker(prepared, 7)]
-    assert np.nanmax(np.abs(np.diff(off, axis=0))) > FAR * 2.5e-4, "the delay must jump further than a spike has to"
+    assert np.nanmax(np.abs(np.diff(off, axis=0))) > SPIKE * 2.5e-4, "the delay must jump further than a spike has to"
     assert not without_spikes(prepared, predicted)[1]
 
 

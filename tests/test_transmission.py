@@ -14,7 +14,8 @@ from twin.effects import Effect, Signals, named
 from twin.equilibrium.lengths import STIFFEST
 from twin.errors import DataError, SolveError
 from twin.measurements import Channel, Recording, Trial
-from twin.robots import Jaw, load
+from twin.robots import load
+from twin.robots.transmission import Jaw
 from twin.twin import Twin, simulate
 
 ROBOT = load("cable_tool")
@@ -76,7 +77,7 @@ def test_where_it_stands_mujoco_finds_it_in_balance() -> None:
     model = ROBOT.build().spec.compile()
     data = mujoco.MjData(model)
     for k in (0, 50, 133):
-        data.qpos[0], data.ctrl[:], data.qfrc_applied[0] = true.angle[k, 1], true.tension[k], torque
+        data.qpos[0], data.ctrl[:], data.qfrc_applied[0] = true.others["angle"][k, 1], true.tension[k], torque
         mujoco.mj_forward(model, data)
         # N m: two pulls of 10 N on 5 mm and the load sum to nothing, to 1e-10 of each, the solve's last step of 1e-13 m x 1e4 N/m
         assert data.qfrc_smooth[0] == pytest.approx(0.0, abs=1e-10)
@@ -85,20 +86,20 @@ def test_where_it_stands_mujoco_finds_it_in_balance() -> None:
 def test_rigid_tendons_pass_the_drums_turn_on() -> None:
     q = sine()
     true = solved(RIGID, (), run(q, 0.0))
-    np.testing.assert_allclose(true.angle[:, 1], REST + DRUM / PULLEY * q, rtol=0, atol=1e-12)  # rad: no load, no stretch
+    np.testing.assert_allclose(true.others["angle"][:, 1], REST + DRUM / PULLEY * q, rtol=0, atol=1e-12)  # rad: no load, no stretch
     loaded = solved(RIGID, (), run(q, 0.03))
     # rad: the least stretch a tendon has, 1e-6 m/N, in two tendons side by side
     gives = STIFFEST * 0.03 / (2 * PULLEY**2)
-    np.testing.assert_allclose(loaded.angle[:, 1] - true.angle[:, 1], gives, rtol=1e-6)
+    np.testing.assert_allclose(loaded.others["angle"][:, 1] - true.others["angle"][:, 1], gives, rtol=1e-6)
     # what goes in comes out: torque_1 dq_1 + torque_2 dq_2 = 0
     # N m: the solve's last step of 1e-13 m, over 1e-6 m/N, on 5 mm
-    np.testing.assert_allclose(loaded.torque[:, 0], -0.03 * DRUM / PULLEY, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(loaded.others["torque"][:, 0], -0.03 * DRUM / PULLEY, rtol=0, atol=1e-8)
 
 
 def test_taut_tendons_give_way_side_by_side_and_a_slack_one_leaves_the_other_alone() -> None:
     taut = 2 * PRETENSION * abs(PULLEY)  # N m, at which one of them falls slack
     torque = np.array([-0.5, 0.2, 0.9, 1.5, 2.0]) * taut
-    a = solved(ELASTIC, (), run(np.zeros(5), torque)).angle[:, 1] - REST
+    a = solved(ELASTIC, (), run(np.zeros(5), torque)).others["angle"][:, 1] - REST
     F = np.abs(torque / PULLEY)
     # both taut: F shared by two springs; else one holds F alone, STRETCH (F - PRETENSION) beyond rest
     y = np.where(F < 2 * PRETENSION, STRETCH * F / 2, STRETCH * (F - PRETENSION))
@@ -108,7 +109,7 @@ def test_taut_tendons_give_way_side_by_side_and_a_slack_one_leaves_the_other_alo
 def test_stiffening_antagonists_follow_a_hyperbolic_tangent() -> None:
     """From exp(-k d_1) + exp(-k d_2) = 2, d_i the tensions above pretension, and d_2 - d_1 = F: y = stretch / k tanh(k F / 2)."""
     k, torque = 0.3, np.linspace(-0.08, 0.08, 9)
-    a = solved(ELASTIC, (law("tendon_elasticity", stiffening=k),), run(np.zeros(9), torque)).angle[:, 1] - REST
+    a = solved(ELASTIC, (law("tendon_elasticity", stiffening=k),), run(np.zeros(9), torque)).others["angle"][:, 1] - REST
     y = (STRETCH - STIFFEST) / k * np.tanh(k * torque / PULLEY / 2) / PULLEY
     # rad: the least stretch comes on top, at most 1e-6 m/N x 16 N on 5 mm
     np.testing.assert_allclose(a, y, rtol=0, atol=1.01 * STIFFEST * 16 / abs(PULLEY))
@@ -118,7 +119,7 @@ def test_stiffening_antagonists_follow_a_hyperbolic_tangent() -> None:
 def test_the_loop_of_capstan_friction_is_that_of_the_pretension_whatever_the_load(torque: float) -> None:
     """T_1 exp(-f) - T_2 exp(f) + F = 0 and T_1 + T_2 = 2 T_0 while both are taut: T_1 differs by 2 T_0 tanh f between the ways."""
     mu, q = 0.02, sine()
-    a = solved(ELASTIC, (law("tendon_friction", mu=mu, presliding=2e-5),), run(q, torque)).angle[:, 1]
+    a = solved(ELASTIC, (law("tendon_friction", mu=mu, presliding=2e-5),), run(q, torque)).others["angle"][:, 1]
     off = a - DRUM / PULLEY * q
     rate = np.gradient(q)
     second = np.arange(len(q)) > 150  # after the first turn
@@ -135,7 +136,7 @@ def test_what_friction_takes_over_a_turn_is_the_drums_loop_and_never_negative() 
     for mu in (0.0, 0.02):
         true = solved(ELASTIC, (law("tendon_friction", mu=mu),), run(q, 0.02))
         once = slice(n // turns, 2 * n // turns + 1)
-        T, turn = true.torque[once], true.angle[once]
+        T, turn = true.others["torque"][once], true.others["angle"][once]
         work = float((0.5 * (T[1:] + T[:-1]) * np.diff(turn, axis=0)).sum())
         # J, of the 0.01 that go in: the trapezoid's error at 1,000 rows a turn
         assert work > 1e-4 if mu else abs(work) < 1e-9
@@ -144,11 +145,11 @@ def test_what_friction_takes_over_a_turn_is_the_drums_loop_and_never_negative() 
 def test_slack_in_both_tendons_is_a_dead_band_less_what_pretension_takes_up() -> None:
     gap = 6e-3  # m
     torque = 1e-3 * np.array([1.0, -1.0, 1.0])
-    a = solved(ELASTIC, (law("tendon_backlash", gap=gap),), run(np.zeros(3), torque)).angle[:, 1]
+    a = solved(ELASTIC, (law("tendon_backlash", gap=gap),), run(np.zeros(3), torque)).others["angle"][:, 1]
     F = abs(torque[0] / PULLEY)
     band = gap - 2 * STRETCH * PRETENSION + 2 * STRETCH * F
     np.testing.assert_allclose(np.abs(np.diff(a)), band / abs(PULLEY), rtol=1e-9)  # closed form
-    still = solved(ELASTIC, (law("tendon_backlash", gap=gap),), run(sine(), 0.02)).angle[:, 1]
+    still = solved(ELASTIC, (law("tendon_backlash", gap=gap),), run(sine(), 0.02)).others["angle"][:, 1]
     ratio = DRUM / PULLEY * sine()
     # rad: under a load of one sign, and without friction, slack shifts the jaw and makes no loop
     np.testing.assert_allclose(still - ratio, (still - ratio)[0], rtol=0, atol=1e-9)

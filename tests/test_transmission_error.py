@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.effects import Effect, Signals, named
+from twin.effects import Drive, Effect, Signals, named
 
 TRUE = {"turn": 1.2e-2, "sine_2": -4e-4, "cosine_2": 1e-4, "sine_3": 1e-4, "cosine_3": 2e-4}  # m
 MOST = 1e-2  # m of cable
@@ -23,7 +23,9 @@ def test_a_drive_that_never_moves_is_not_fitted() -> None:
 
 def signals(displacement: np.ndarray, by_length: bool) -> Signals:
     n, z = len(displacement), np.zeros
-    return Signals(z(n), z(n), z((n, 3)), displacement, z((n, 0, 3)), z(n), np.full(3, by_length))
+    return Signals(
+        z(n), z(n), z((n, 3)), displacement, z((n, 0, 3)), z(n), (Drive.DISPLACEMENT if by_length else Drive.TENSION,) * 3
+    )
 
 
 def test_reporting_inverts_driving() -> None:

@@ -34,7 +34,7 @@ def some_of(parameters: tuple[Parameter, ...]) -> st.SearchStrategy[dict[str, fl
     return st.fixed_dictionaries({}, optional={p.name: inside(p) for p in parameters})
 
 
-robot_values = some_of(load("continuum").parameters)
+robot_values = some_of(load("continuum").nuisance)
 effect_sets = st.lists(st.sampled_from(sorted(catalogue())), unique=True, max_size=4).flatmap(
     lambda names: st.tuples(*(some_of(catalogue()[n].declared(3)).map(lambda v, n=n: catalogue()[n](v, 3)) for n in names))
 )
@@ -42,7 +42,7 @@ effect_sets = st.lists(st.sampled_from(sorted(catalogue())), unique=True, max_si
 
 def stored(folder: Path, twin: Twin, **found: dict) -> Path:
     path = folder / "twin.toml"
-    write_twin(path, twin_table(twin, found.get("parameters", {}), found.get("effects", {})), {"seed": 0})
+    write_twin(path, twin_table(twin, folder, found.get("parameters", {}), found.get("effects", {})), {"seed": 0})
     return path
 
 
@@ -132,7 +132,7 @@ REFUSED = {
     "an unknown robot": ('format = "twin/1"\nrobot = "contineum"', "contineum.*available.*continuum"),
     "an unknown parameter": (HEAD + '[parameters]\n"backbone.radios" = 1.0', "backbone.radios.*available.*backbone.radius"),
     "an unknown effect": (HEAD + '[[effect]]\nid = "tendon_frictoin"', "tendon_frictoin.*available.*tendon_friction"),
-    "an effect without an id": (HEAD + "[[effect]]\nparameters = { mu = 0.1 }", "available"),
+    "an effect without an id": (HEAD + "[[effect]]\nparameters = { mu = 0.1 }", "id is missing"),
     "an unknown parameter of an effect": (HEAD + FRICTION + "{ mo = 0.1 }", "mo.*available.*mu"),
     "an unknown unit": (HEAD + '[parameters]\n"disks.mass" = { value = 5.0, unit = "grm" }', "disks.mass.*grm"),
     "a word": (HEAD + '[parameters]\n"disks.mass" = "five"', "disks.mass.*five"),

@@ -14,6 +14,7 @@ import argparse
 import numpy as np
 
 from tools.bench.rod import Rod, solve
+from twin.body import Problem
 from twin.effects import Loads
 from twin.equilibrium import Equilibrium
 from twin.robots import load
@@ -45,7 +46,7 @@ def compare(count: int, seed: int = 0) -> dict[str, np.ndarray]:
             tension, payload = poses(rng, count, 0.01 if name == "upright" else 0.03, planar)
             errors = []
             for T, m in zip(tension, payload, strict=True):
-                path = solver.solve(np.zeros(1), T[None], Loads(np.array(gravity, float), payload=m))
+                path = solver.solve(Problem(np.zeros(1), T[None], Loads(np.array(gravity, float), payload=m)))
                 if path.unstable_start or not path.status.all():
                     continue
                 errors.append(path.markers[0, :8] - solve(Rod(), T, gravity=gravity, payload=m).disks)

@@ -67,13 +67,13 @@ def table(every: list[dict]) -> str:
         f"false 'unexplained', one or two effects     {share([r['verdict'] == 'unexplained' for r in known])}",
         f"false 'partly explained'                    {share([r['verdict'] == 'partly_explained' for r in known])}",
         f"claims at probability >= {SURE}, right         {share(sure)}",
-        f"worse than calibrated on held-out trials    {share([r['after'] > 1.001 * r['calibrated'] for r in answered])}",
+        f"worse than calibrated on sealed trials      {share([r['after'] > 1.001 * r['calibrated'] for r in answered])}",
     ]
     apart = [x <= CLOSE for r in rows for x in r.get("apart", {}).values()]
     lines.append(f"parameters within {100 * CLOSE:.0f} %, same law            {share(apart)}")
     if ratio:
         lines.append(
-            f"held-out after / floor                      median {np.median(ratio):.3f}, 90 % {np.quantile(ratio, 0.9):.3f}"
+            f"sealed after / floor                        median {np.median(ratio):.3f}, 90 % {np.quantile(ratio, 0.9):.3f}"
         )
     lines.append(
         f"seconds a diagnosis, one core               median {np.median(seconds):.1f}, 90 % {np.quantile(seconds, 0.9):.1f}"

@@ -28,7 +28,7 @@ def main() -> None:
     d = diagnose(recording, Twin.of(load("continuum")), Settings())
     bench = d.bench
     tip = [next(j for j, o in enumerate(bench.outputs) if o.channel.name == f"disk_8_{a}") for a in "xyz"]
-    pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].command, axis=0))) for k in d.held_trials}
+    pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].command, axis=0))) for k in d.sealed_trials}
     trial = max(pulls, key=lambda k: float(np.ptp(bench.inputs[k].command)))
     tension = bench.inputs[trial].command[:, pulls[trial]]
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"})
@@ -37,7 +37,7 @@ def main() -> None:
         error = 1e3 * np.linalg.norm(bench.measured[trial][:, tip] - d.predictions[stage][trial][:, tip], axis=1)
         loop.plot(tension, error, ".-", color=colour, lw=0.7, ms=3, label=label)
     loop.set(xlabel=f"tension of tendon {pulls[trial] + 1}, N", ylabel="tip error, mm", ylim=(0, None))
-    loop.set_title(f"a held-out trial ({bench.inputs[trial].name.removesuffix('.csv')})", fontsize=9, loc="left")
+    loop.set_title(f"a sealed trial ({bench.inputs[trial].name.removesuffix('.csv')})", fontsize=9, loc="left")
     loop.legend(frameon=False)
     values = [1e3 * e["marker"] for e in (d.errors.nominal, d.errors.calibrated, d.errors.after)]
     bars.barh(["as described", "calibrated", "with friction"], values, color=["#999999", "#b0413e", "#1f6f8b"])
@@ -45,7 +45,7 @@ def main() -> None:
     bars.invert_yaxis()
     for y, v in enumerate(values):
         bars.text(v, y, f" {v:.2f}", va="center")
-    bars.set(xlabel="RMS error on held-out trials, mm", xlim=(0, 1.2 * max(values)))
+    bars.set(xlabel="RMS error on sealed trials, mm", xlim=(0, 1.2 * max(values)))
     bars.set_title("dashed: noise floor", fontsize=9, loc="left")
     OUT.parent.mkdir(exist_ok=True)
     figure.savefig(OUT, metadata={"Date": None})

@@ -5,7 +5,7 @@ diagnosed again.
 
 A day lacks one thing (payloads, rates, tendons, ...) and has one effect of 1 sigma, drawn among the six that the table of what
 these data can tell calls hardest to tell apart. The bench, not the twin, runs the proposed trial, as often as proposed and twice at
-least (no repeated trial is ever held out), at most five times. Printed: what was claimed and what else was possible, before and
+least (repeats are sealed last), at most five times. Printed: what was claimed and what else was possible, before and
 after.
 """
 

@@ -18,9 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
+from twin.body import DIRECT, FOLLOWED, NOT_FOUND, Problem
 from twin.dynamics import Dynamics
-from twin.effects import Creep, Loads, Route
-from twin.equilibrium import DIRECT, FOLLOWED, NOT_FOUND, Equilibrium
+from twin.effects import Loads, Route
+from twin.equilibrium import Equilibrium
 from twin.robots import load
 
 FRICTION = Route(0.2, 5e-4)
@@ -76,7 +77,7 @@ def convergence(solver: Equilibrium, rng: np.random.Generator, solves: int) -> N
         kind = rng.integers(3)
         n = 1 if kind == 2 else 50
         t, T = smooth(rng, n) if kind == 0 else (np.arange(n) * 0.5, rng.uniform(0, 4, (n, 3)))
-        path = solver.solve(t, T, loads, route)
+        path = solver.solve(Problem(t, T, loads, route))
         if path.unstable_start:
             unstable += n
             continue
@@ -112,8 +113,8 @@ def agreement(solver: Equilibrium, rng: np.random.Generator) -> None:
             errors = []
             for _ in range(4):
                 t, T, rest = eased(rng)
-                a = moving.solve(t, T, loads, route, Creep(), np.zeros((0, solver.model.nv)))
-                b = solver.solve(t, T, loads, route)
+                a = moving.solve(Problem(t, T, loads, route))
+                b = solver.solve(Problem(t, T, loads, route))
                 errors += list(1e3 * np.linalg.norm(a.markers[rest, 7] - b.markers[rest, 7], axis=1))
             e = np.array(errors)
             friction = "yes" if route.mu else "no"
@@ -155,7 +156,7 @@ def main() -> None:
     args = parser.parse_args()
     rng = np.random.default_rng(0)
     solver = Equilibrium(load("continuum").build())
-    solver.solve(np.zeros(1), np.zeros((1, 3)), CASES["hanging"])
+    solver.solve(Problem(np.zeros(1), np.zeros((1, 3)), CASES["hanging"]))
     if args.soromox:
         against_soromox(args.soromox, solver, rng)
     speed(solver, rng)

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.bench import ROOM
 from twin.control import Guard, PlainLoop, TensionLoop, TipController
 from twin.control.paths import Path, paths
 from twin.control.tip import AHEAD, springs
 from twin.effects import Loads, named
 from twin.kinematics import HeatedRobot
-from twin.kinematics.robot import ROOM
 from twin.robots import load
 from twin.twin import Twin
 
@@ -124,7 +124,7 @@ def track(
             voltage = drive.step(wanted, *bench.read(), DT, ahead=at(t + AHEAD) if foresee else None)
         bench.heat(voltage, DT)
         shape = bench.robot.shape()
-        rows.append((t, wanted, shape.tip, bench.robot.tension / bench.robot.softness, bench.robot.warm.copy(), voltage))
+        rows.append((t, wanted, shape.tip, bench.robot.tension, bench.robot.warm.copy(), voltage))
     return Run(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

@@ -16,13 +16,13 @@ from joblib import Parallel, delayed
 from scipy.optimize import lsq_linear
 
 from twin.bench import Bench
+from twin.body import TOLERANCE
 from twin.effects import Effect, named
-from twin.equilibrium import TOLERANCE
 from twin.errors import SolveError
 from twin.quantities import Fitted, Parameter
 from twin.residual import Whitener
 from twin.robots import Robot
-from twin.twin import Trace, Twin, readings, report, simulate
+from twin.twin import Trace, Twin, Way, readings, report, simulate
 
 ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
@@ -106,9 +106,8 @@ class Objective:
     def predict(
         self, twin: Twin, near: list[Trace] | None = None, keep: bool = False, once: bool = False
     ) -> tuple[list[Trace], list[np.ndarray]]:
-        traces = simulate(
-            twin, self.bench, trials=self.trials, near=near, keep=keep, tolerance=TOLERANCE if keep else ROUGH, once=once
-        )
+        way = Way(near, keep, once, TOLERANCE if keep else ROUGH)
+        traces = simulate(twin, self.bench, trials=self.trials, way=way)
         own = traces[-len(self.trials) :] if len(traces) == len(self.trials) else [traces[k] for k in self.trials]
         return traces, [readings(self.bench, report(twin.effects, t.true)) for t in own]
 
@@ -216,6 +215,12 @@ class Fit:
 def prior_weight(model: Model) -> np.ndarray:
     """1 / std in steps, zero where nothing is believed beforehand."""
     return np.array([0.0 if f.parameter.std is None else f.parameter.step / f.parameter.std for f in model.free])
+
+
+def prior_pull(model: Model) -> np.ndarray:
+    """Half the gradient (n_free,) of the priors' terms, per step."""
+    prior = np.array([f.parameter.value / f.parameter.step for f in model.free])
+    return prior_weight(model) ** 2 * (model.vector() - prior)
 
 
 def fit(

@@ -1,4 +1,4 @@
-"""The command line: `twin diagnose`, `evaluate`, `simulate`, `calibrate`, `robots`, `effects`.
+"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `calibrate`, `effects`.
 
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, said in one line.
 """
@@ -10,18 +10,25 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 from tyro.conf import Positional, arg
 
 from twin.errors import DataError, TwinError
 
-SAMPLE = "continuum/samples/friday"
+if TYPE_CHECKING:
+    from twin.calibrate import Fit
+    from twin.robots import Robot
+
+FAR = 2.0  # prior standard deviations: one in twenty fitted parameters of a robot as described lies further away
+SAMPLE = "*/samples/friday"
 
 out = Console()
 err = Console(stderr=True)
@@ -35,14 +42,17 @@ def _cores() -> int:
 class Diagnose:
     """Find what a twin lacks: predict the data, take the residual, name the effect behind it, add it.
 
-    Reports the error before and after on trials that no fit has seen. Writes report.html, report.json and twin.toml.
+    Reports the error before and after on sealed trials, which neither fit nor choice has seen.
+    Writes report.html, report.json and twin.toml.
     """
 
     set: Positional[Annotated[Path | None, arg(help="folder of a measurement set; without it the bundled sample")]] = None
     out: Annotated[Path, arg(help="folder for the report")] = Path("twin-report")
-    twin: Annotated[str | None, arg(help="a twin.toml, or a robot's name; default: the robot the set names")] = None
+    twin: Annotated[
+        str | None, arg(help="a twin.toml, a robot's name or the path to its folder; default: the robot the set names")
+    ] = None
     jobs: Annotated[int, arg(help="worker threads")] = _cores()
-    seed: Annotated[int, arg(help="draws the held-out trials")] = 0
+    seed: Annotated[int, arg(help="draws the sealed trials and the no-effect sets")] = 0
 
     def run(self) -> None:
         from twin import report
@@ -53,18 +63,18 @@ class Diagnose:
             raise DataError(f"{self.out} is a file; give a folder for the report with --out")
         settings = Settings(seed=self.seed, jobs=self.jobs)
         with _working(f"diagnosing {recording.title}") as progress:
-            diagnosis = diagnose(recording, twin, settings, progress)
+            diagnosis = diagnose(recording, twin, settings, progress, lambda s: out.print(report.suspected(s)) if s else None)
             progress("writing the report")
             report.write(diagnosis, self.out, report.provenance(recording, settings, _command()))
         out.print(report.console(diagnosis))
-        out.print(f"report: {self.out / 'report.html'}", highlight=False)
+        out.print(f"report: {self.out / 'report.html'}", highlight=False, markup=False)
 
 
 @dataclass(frozen=True)
 class Evaluate:
     """Error of a given twin on given data; fits nothing."""
 
-    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, or a robot's name")]]
+    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, a robot's name or the path to its folder")]]
     set: Positional[Annotated[Path, arg(help="folder of a measurement set")]]
     json: Annotated[bool, arg(help="print the error block as JSON")] = False
 
@@ -90,20 +100,21 @@ class Evaluate:
 class Simulate:
     """Write what a twin predicts for a set's trials as a measurement set of its own."""
 
-    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, or a robot's name")]]
+    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, a robot's name or the path to its folder")]]
     set: Positional[Annotated[Path, arg(help="folder of the measurement set whose inputs drive the twin")]]
     out: Annotated[Path, arg(help="new folder for the simulated set")]
     dynamic: Annotated[bool | None, arg(help="MuJoCo steps instead of static equilibria; default: by the set's rates")] = None
 
     def run(self) -> None:
         from twin.measurements import read, write
-        from twin.storage import read_twin
+        from twin.storage import read_twin, robot_reference
 
         twin = read_twin(self.twin)
         recording = read(self.set, least_trials=1)
         with _working(f"simulating {recording.title}"):
-            write(twin.predict(recording, dynamic=self.dynamic), self.out)
-        out.print(f"simulated set: {self.out}", highlight=False)
+            predicted = twin.predict(recording, dynamic=self.dynamic)
+            write(replace(predicted, robot=robot_reference(twin.robot, self.out)), self.out)
+        out.print(f"simulated set: {self.out}", highlight=False, markup=False)
 
 
 @dataclass(frozen=True)
@@ -112,46 +123,94 @@ class Calibrate:
 
     set: Positional[Annotated[Path, arg(help="folder of a measurement set")]]
     out: Annotated[Path, arg(help="the twin.toml to write")] = Path("twin.toml")
-    twin: Annotated[str | None, arg(help="where to start: a twin.toml or a robot's name; default: the robot the set names")] = None
+    twin: Annotated[
+        str | None,
+        arg(help="where to start: a twin.toml, a robot's name or the path to its folder; default: the robot the set names"),
+    ] = None
+    force: Annotated[bool, arg(help="write over a file that is there")] = False
     jobs: Annotated[int, arg(help="worker threads")] = _cores()
-    seed: Annotated[int, arg(help="draws the held-out trials")] = 0
+    seed: Annotated[int, arg(help="draws the sealed trials and the no-effect sets")] = 0
 
     def run(self) -> None:
         from twin import report
         from twin.diagnose import Settings, calibration
         from twin.storage import twin_table, write_twin
 
+        if self.out.exists() and not self.force:
+            raise DataError(f"{self.out} is there already; give another file with --out, or write over it with --force")
+        if not self.out.absolute().parent.is_dir():
+            raise DataError(f"{self.out.absolute().parent} is no folder; make it, or give another file with --out")
         recording, twin = _load(self.set, self.twin)
         settings = Settings(seed=self.seed, jobs=self.jobs)
         with _working(f"calibrating on {recording.title}"):
-            fitted, held_out, notices = calibration(recording, twin, settings)
+            fitted, sealed, notices = calibration(recording, twin, settings)
         for notice in notices:
-            out.print(f"note: {notice}", highlight=False)
+            out.print(f"note: {_line(notice)}", highlight=False, markup=False)
         found = fitted.fitted(None)
-        table = Table("parameter", "value", "standard error", "unit")
-        for name, f in found.items():
-            table.add_row(name, f"{f.value:.6g}", f"{f.std:.2g}", f.unit)
-        out.print(table)
+        out.print(_fitted_table(fitted))
         if fitted.unfixed():
             out.print(f"not fixed by these data (as uncertain as before): {', '.join(fitted.unfixed())}")
-        out.print(f"RMS error on held-out trials: {held_out}")
-        table = twin_table(fitted.model.twin, found, {e.id: fitted.fitted(e.id) for e in fitted.model.twin.effects})
+        out.print(f"RMS error on sealed trials: {sealed}")
+        table = twin_table(
+            fitted.model.twin, self.out.parent, found, {e.id: fitted.fitted(e.id) for e in fitted.model.twin.effects}
+        )
         write_twin(self.out, table, report.provenance(recording, settings, _command()))
-        out.print(f"twin: {self.out}", highlight=False)
+        out.print(f"twin: {self.out}", highlight=False, markup=False)
+
+
+@dataclass(frozen=True)
+class New:
+    """Begin a robot of your own: a commented robot.toml that loads, and a measurement set to fill."""
+
+    name: Positional[Annotated[str, arg(help="what it is called, and its folder")]]
+    family: Annotated[str, arg(help="what kind of body it is; a wrong name lists those there are")]
+    out: Annotated[Path, arg(help="where to put the folder")] = Path()
+
+    def run(self) -> None:
+        from twin.robots.starter import SET, write_starter
+
+        folder = write_starter(self.name, self.family, self.out)
+        words = [
+            f"1. describe it: {folder / 'robot.toml'}", f"2. look at it: twin robots {folder}",
+            f"3. fill {folder / SET}", f"4. twin diagnose {folder / SET}",
+        ]  # fmt: skip
+        out.print("\n".join(words), highlight=False, markup=False)
 
 
 @dataclass(frozen=True)
 class Robots:
-    """List the robots that ship with the twin."""
+    """List the robots that ship with the twin; or draw one and print its numbers as its file has them."""
+
+    name: Positional[Annotated[str | None, arg(help="a robot's name or the path to its folder; without it the list")]] = None
+    out: Annotated[Path | None, arg(help="the picture to write; default: NAME.html")] = None
 
     def run(self) -> None:
         from twin.robots import available, load
 
+        if self.name is not None:
+            self._show(load(self.name))
+            return
         table = Table("robot", "what it is", "family", "uncertain parameters")
         for name in available():
             robot = load(name)
-            table.add_row(name, robot.title, robot.family, str(len(robot.nuisance)))
+            table.add_row(name, _line(robot.title), robot.family, str(len(robot.nuisance)))
         out.print(table)
+
+    def _show(self, robot: Robot) -> None:
+        from twin.report.robot_page import write_drawing
+        from twin.robots.numbers import lines
+
+        path = self.out or Path(f"{robot.name}.html")
+        write_drawing(robot, path)
+        out.print(_line(f"{robot.name}: {robot.title}"))
+        table = Table("parameter", "value", "± std", "unit", "what it is")
+        for line in lines(robot):
+            table.add_row(
+                line.row.name, line.words(), "" if line.spread is None else f"{line.spread:.3g}", line.unit, line.row.meaning
+            )
+        out.print(table)
+        out.print(f"structure: {dict(robot.structure)}; gravity: {robot.gravity.tolist()} m/s^2", highlight=False, markup=False)
+        out.print(f"picture: {path}", highlight=False, markup=False)
 
 
 @dataclass(frozen=True)
@@ -178,7 +237,7 @@ def _load(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
     from twin.twin import Twin
 
     if folder is None:
-        folder = models_folder() / SAMPLE
+        folder = next(models_folder().glob(SAMPLE))
         out.print("no measurement set given: diagnosing the bundled sample (a simulated bench day, see its `source`)")
     recording = read(folder)
     return recording, read_twin(twin) if twin else Twin.of(load(recording.robot, recording.folder))
@@ -187,21 +246,54 @@ def _load(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
 @contextmanager
 def _working(title: str) -> Iterator[Callable[[str], None]]:
     """A spinner with the present step; says so while the solver is compiled, which happens once."""
-    from twin.equilibrium import compile_solver, is_compiled
+    from twin.equilibrium import is_compiled
+    from twin.robots import compile_solver
 
+    title = escape(str(_line(title)))
     with err.status(title) as status:
         if not is_compiled():
-            status.update("compiling the solver, once on this machine (about 20 s)")
+            status.update("compiling the solver, once on this machine (a minute or more)")
             compile_solver()
         status.update(title)
         yield lambda words: status.update(f"{title}: {words}")
+
+
+def _line(words: str) -> Text:
+    """Words of a file as they stand, without what would steer the terminal."""
+    return Text("".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in words))
+
+
+def _fitted_table(fitted: Fit) -> Table:
+    """The robot's fitted parameters in the units of its file; first those at a bound or far from what was believed."""
+    from twin.robots.numbers import as_written, spread_as_written
+
+    table = Table("parameter", "value", "standard error", "described", "unit", "")
+    rows = []
+    free = zip(fitted.model.free, fitted.std(), fitted.at_bound(), strict=True)
+    for p, f, error, bound in ((f.parameter, fitted.model.value(f), s, b) for f, s, b in free if f.effect is None):
+        away = abs(f - p.value) / p.std if p.std else 0.0
+        doubt = "at a bound" if bound else f"{away:.1f} std away" if away > FAR else ""
+        cells = (as_written(p, f), spread_as_written(p, error), as_written(p, p.value))
+        rows.append(
+            (
+                not bound,
+                -away if doubt else 0.0,
+                p.name,
+                *(f"{x:.{n}g}" for x, n in zip(cells, (6, 2, 6), strict=True)),
+                p.written,
+                doubt,
+            )
+        )
+    for _, _, *cells in sorted(rows, key=lambda row: row[:2]):
+        table.add_row(*cells)
+    return table
 
 
 def _command() -> str:
     return " ".join(["twin", *sys.argv[1:]])
 
 
-Command = Diagnose | Evaluate | Simulate | Calibrate | Robots | Effects
+Command = New | Robots | Diagnose | Evaluate | Simulate | Calibrate | Effects
 
 
 def main() -> None:
@@ -211,11 +303,18 @@ def main() -> None:
         command.run()
     except TwinError as error:
         err.print(f"twin: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
-        sys.exit(2)
+        _leave(2)
     except KeyboardInterrupt:
         err.print("twin: stopped; nothing half-written is left")
-        sys.stdout.flush()
-        os._exit(1)  # worker threads are still inside compiled code: taking the interpreter down beneath them would crash it
+        _leave(1)
+
+
+def _leave(code: int) -> NoReturn:
+    """Ends the program at once: worker threads may be inside compiled code, and taking the interpreter down beneath them would
+    crash it."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -9,20 +9,22 @@ hinges and wall, implicitly, so that none of them bounds the step; it damps: 2 %
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.compiled import assign, dot, jit
-from twin.effects import Creep, Loads, Route
-from twin.equilibrium import DIRECT, Equilibrium, Path
-from twin.equilibrium.chain import Law, lay, lever, pass_on
+from twin.effects import Loads
+from twin.equilibrium import ChainPath, Equilibrium
+from twin.equilibrium.chain import State, laid, lay, lever, pass_on
 from twin.equilibrium.elastic import COUPLING, bendings, springs
 from twin.equilibrium.engine import mj_step
 from twin.equilibrium.newton import place
+from twin.equilibrium.trial import Slow, rested
 from twin.equilibrium.trial import creep as advance_creep
-from twin.equilibrium.trial import rested
-from twin.robots import Body, hinge_pairs
+from twin.hinges import HingeChain, hinge_pairs
 
 STEP_PER_PRESLIDING = 2.0  # s/m
 # m, from a wall to a post before it, to which slack springs of that length tie the disks: the sphere they cannot leave is flat to
@@ -31,112 +33,149 @@ FAR = 1e5
 REFRESH = 2  # steps between evaluations of the applied forces, which change by per cents a step
 
 
+class Motion(NamedTuple):
+    """MuJoCo's own arrays that the loop reads and writes between steps, and what drives it."""
+
+    step: float  # s
+    velocity: np.ndarray  # (nv,)
+    ctrl: np.ndarray
+    applied: np.ndarray  # (nv,)
+    motor: np.ndarray  # (n_tendon, n_disk) actuators
+    fixed: np.ndarray  # (nv,) rest shape without creep
+    time: np.ndarray  # (n,) s
+    tension: np.ndarray  # (n, n_tendon) N
+
+
+class Seen(NamedTuple):
+    """The motion at the samples."""
+
+    markers: np.ndarray  # (n, n_marker, 3) m
+    path: np.ndarray  # (n, n_tendon) m
+    q: np.ndarray  # (n, nv)
+
+
 @jit
-def route_tension(chain, tension, law, z, s, ctrl, motor):
-    """Segment tensions to ctrl for base tensions (n_tendon,) at the present geometry; slip states z, s advance."""
-    nt, nd = motor.shape
-    u, length, theta, T, now = np.empty((nd, 3)), np.empty(nd), np.empty(nd), np.empty(nd), np.empty(nd)
+def route_tension(at, state, motion):
+    """Segment tensions to ctrl for the state's base tensions at the present geometry; its slip advances."""
+    nt, nd = motion.motor.shape
+    tendon, now = laid(nd), np.empty(nd)
     for t in range(nt):
-        lay(chain, t, u, length, theta, now)
-        pass_on(tension[t], law, theta, z[t], s[t], now, z[t], T)
-        assign(s[t], now)
+        lay(at.chain, t, tendon, now)
+        pass_on(state.T[t], at.law, tendon, state.z[t], state.s[t], now, state.z[t])
+        assign(state.s[t], now)
         for d in range(nd):
-            ctrl[motor[t, d]] = T[d]
+            motion.ctrl[motion.motor[t, d]] = tendon.T[d]
 
 
 @jit
-def step_through(
-    model, data, chain, step, law, force, amplitude, retardation, delayed, fixed, spring, velocity, ctrl, applied, motor, z, s,
-    time, tension, marker, path, q_out,
-):  # fmt: skip
-    """Step from time[0], tensions linear between samples; markers (n, n_marker, 3) and path (n, n_tendon) at the samples."""
-    n, nv = time.size, velocity.size
-    now, T, r, q = time[0], np.empty(tension.shape[1]), np.zeros(nv), np.empty(nv)
-    tip, taken = chain.disk[-1], 0
-    none, K, D = np.empty((0, 0)), chain.stiffness, np.empty((chain.hand.size, 3, 3))
-    nd = motor.shape[1]
-    u, length, theta, distal = np.empty((nd, 3)), np.empty(nd), np.empty(nd), np.empty(nd)
-    for i in range(n):
+def apply(at, state, motion, r):
+    """To qfrc_applied: the tip's force, and what the hinges' springs lack of the true elastic moment."""
+    chain, fixed, tip = at.chain, motion.fixed, at.chain.disk[-1]
+    springs(chain.qpos, at.rest, chain, state.T.sum(), r, np.empty((0, 0)))
+    for k in range(r.size):
+        p = chain.partner[k]
+        native = chain.stiffness[k] * (chain.qpos[k] - at.rest[k]) + chain.coupling[k] * (
+            chain.qpos[k] - chain.qpos[p] - fixed[k] + fixed[p]
+        )
+        motion.applied[k] = native - r[k] + dot(at.load.force, lever(chain, k, chain.site[tip]))
+
+
+@jit
+def look(at, state, motion, i, seen):
+    """What is seen at sample i, the motion carried on straight for the rest of a step."""
+    chain, nd = at.chain, motion.motor.shape[1]
+    tendon, distal, r = laid(nd), np.empty(nd), np.empty(state.q.size)
+    for k in range(chain.marker.size):
+        for a in range(3):
+            seen.markers[i, k, a] = chain.site[chain.marker[k], a]
+    bowing = springs(chain.qpos, at.rest, chain, motion.tension[i].sum(), r, np.empty((0, 0)))
+    for t in range(state.T.size):
+        lay(chain, t, tendon, distal)
+        seen.path[i, t] = distal[0] + bowing
+    assign(seen.q[i], chain.qpos)
+
+
+@jit
+def step_through(at, motion, slow, state, seen):
+    """Step from the first sample's time, tensions linear between samples. `at.rest` are MuJoCo's rest angles, which creep moves."""
+    chain, time, tension, step = at.chain, motion.time, motion.tension, motion.step
+    now, r, taken = time[0], np.zeros(state.q.size), 0
+    D = np.empty((chain.hand.size, 3, 3))
+    for i in range(time.size):
         while i > 0 and now + step <= time[i]:
             w = (now + step - time[i - 1]) / (time[i] - time[i - 1])
-            for t in range(T.size):
-                T[t] = (1.0 - w) * tension[i - 1, t] + w * tension[i, t]
-            route_tension(chain, T, law, z, s, ctrl, motor)
+            for t in range(state.T.size):
+                state.T[t] = (1.0 - w) * tension[i - 1, t] + w * tension[i, t]
+            route_tension(at, state, motion)
             if taken % REFRESH == 0:
-                pressure = T.sum()
-                springs(chain.qpos, spring, chain, pressure, r, none)
-                for k in range(nv):
-                    p = chain.partner[k]
-                    native = K[k] * (chain.qpos[k] - spring[k]) + chain.coupling[k] * (
-                        chain.qpos[k] - chain.qpos[p] - fixed[k] + fixed[p]
-                    )
-                    applied[k] = native - r[k] + dot(force, lever(chain, k, chain.site[tip]))
+                apply(at, state, motion, r)
             taken += 1
-            mj_step(model, data)
+            mj_step(at.model, at.data)
             now += step
-        q[:] = chain.qpos
-        place(model, data, chain, q + (time[i] - now) * velocity)
-        for k in range(chain.marker.size):
-            marker[i, k] = chain.site[chain.marker[k]]
-        bowing = springs(chain.qpos, spring, chain, tension[i].sum(), r, none)
-        for t in range(T.size):
-            lay(chain, t, u, length, theta, distal)
-            path[i, t] = distal[0] + bowing
-        q_out[i] = chain.qpos
-        place(model, data, chain, q)
-        if amplitude.size and i > 0:
-            bendings(q, chain, r, D)
-            for k in range(nv):
-                r[k] -= spring[k]
-            advance_creep(delayed, r, amplitude, retardation, time[i] - time[i - 1])
-            rested(fixed, delayed, spring)
+        assign(state.q, chain.qpos)
+        place(at, state.q + (time[i] - now) * motion.velocity)
+        look(at, state, motion, i, seen)
+        place(at, state.q)
+        if slow.amplitude.size and i > 0:
+            bendings(state.q, chain, r, D)
+            for k in range(r.size):
+                r[k] -= at.rest[k]
+            advance_creep(slow, r, time[i] - time[i - 1])
+            rested(motion.fixed, slow.delayed, at.rest)
 
 
 class Dynamics:
-    """A compiled robot ready to be stepped, with the calling convention of `Equilibrium`."""
+    """A compiled chain ready to be stepped."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: HingeChain) -> None:
         self.statics = Equilibrium(body)
         self.model, self.straight_path, self._body = self.statics.model, self.statics.straight_path, body
 
-    def solve(
-        self, time: np.ndarray, tension: np.ndarray, loads: Loads, route: Route, creep: Creep, delayed: np.ndarray,
-        near: Path | None = None, keep: bool = False, tolerance: float = 0.0, by_length: np.ndarray | None = None,
-        stiffness: np.ndarray | None = None, once: bool = False,
-    ) -> Path:  # fmt: skip
-        """The motion under base tensions (n, n_tendon) N at times (n,) s, from rest in equilibrium under the first ones.
+    @property
+    def n_slow(self) -> int:
+        return self.statics.n_slow
 
-        `near`, `keep`, `tolerance`, `by_length` and `once` are of the static solve only: a motion has no neighbour to start from.
-        The body's `stiffness` (n,) counts with its mean: temperature changes little in a fast trial.
+    def solve(self, problem: Problem) -> ChainPath:
+        """The motion under base tensions, from rest in equilibrium under the first ones.
+
+        A motion has no neighbour to start from: `near`, `keep`, `once` and `tolerance` are of statics only. The body's stiffness
+        counts with its mean: temperature changes little in a fast trial.
         """
-        scale = 1.0 if stiffness is None else float(np.mean(stiffness))
-        start = self.statics.solve(time[:1], tension[:1], loads, route, creep, delayed, stiffness=np.array([scale]))
+        loads, route, (n, nt) = problem.loads, problem.route, problem.command.shape
+        scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
+        amplitude = np.array(problem.creep.amplitude, float)
+        delayed = np.zeros((amplitude.size, self.n_slow)) if problem.delayed is None else problem.delayed
+        first = replace(
+            problem, time=problem.time[:1], command=problem.command[:1], stiffness=np.array([scale]), delayed=delayed, near=None
+        )
+        start = self.statics.solve(first)
         moving = Equilibrium(_loaded(self._body, loads, scale))
         model, data = moving.model, moving.data
         step = min(model.opt.timestep, STEP_PER_PRESLIDING * route.presliding) if route.mu > 0.0 else model.opt.timestep
         model.opt.timestep = step
         model.opt.gravity[:] = loads.gravity
-        amplitude, retardation = np.array(creep.amplitude, float), np.array(creep.time, float)
         fixed = model.qpos_spring.copy()
         model.qpos_spring[:] = fixed + delayed.sum(axis=0)
         data.qpos[:] = start.q[0]
         mujoco.mj_forward(model, data)
-        n, (nt, nd) = len(time), start.slip.shape
+        nd = start.slip.shape[1]
         motor = np.array([[model.actuator(f"tendon_{t}_segment_{d}").id for d in range(1, nd + 1)] for t in range(1, nt + 1)])
-        marker, path, q = np.empty((n, moving.chain.marker.size, 3)), np.empty((n, nt)), np.empty((n, model.nv))
-        slip, distal = start.slip.copy(), start.distal.copy()
-        law = Law(float(route.mu), float(route.presliding), np.array(loads.wall, float))
-        step_through(
-            model._address, data._address, moving.chain, float(step), law, np.array(loads.force, float), amplitude, retardation,
-            delayed, fixed, model.qpos_spring, data.qvel, data.ctrl, data.qfrc_applied, motor, slip, distal,
-            np.array(time, float), np.maximum(tension, 0.0, order="C"), marker, path, q,
+        tension = np.maximum(problem.command, 0.0, order="C")
+        motion = Motion(
+            float(step), data.qvel, data.ctrl, data.qfrc_applied, motor, fixed, np.array(problem.time, float), tension
         )  # fmt: skip
-        finite = np.isfinite(marker).all(axis=(1, 2))
-        no_springs, status = np.full((n, nt), np.nan), np.where(finite, DIRECT, 0)
-        return Path(np.array(tension), marker, path, q, no_springs, status, start.started, slip, distal, start.LU)
+        state = State(np.empty(nt), start.q[0].copy(), start.slip.copy(), start.distal.copy())
+        seen = Seen(np.empty((n, moving.chain.marker.size, 3)), np.empty((n, nt)), np.empty((n, model.nv)))
+        slow = Slow(amplitude, np.array(problem.creep.time, float), delayed)
+        step_through(moving.statics(problem)._replace(rest=model.qpos_spring), motion, slow, state, seen)
+        finite = np.isfinite(seen.markers).all(axis=(1, 2))
+        return ChainPath(
+            tension=np.array(problem.command), path=seen.path, markers=seen.markers, status=np.where(finite, DIRECT, NOT_FOUND),
+            q=seen.q, started=start.started, slip=state.z, distal=state.s,
+        )  # fmt: skip
 
 
-def _loaded(body: Body, loads: Loads, scale: float) -> Body:
+def _loaded(body: HingeChain, loads: Loads, scale: float) -> HingeChain:
     """A copy of the body, `scale` times as stiff, with a point mass at its tip and, as tendons, the coupling springs of elastic.py
     and the wall."""
     spec = body.spec.copy()

@@ -1,90 +1,18 @@
 """A parameter: value, unit, bounds, prior, source.
 
-Values are SI everywhere inside the program. Units as people write them are converted here, at the border, by pint.
+Values are SI everywhere inside the program; units as people write them are converted at the border (twin/units.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from twin.errors import DataError, TwinError
-
-if TYPE_CHECKING:
-    import pint
+from twin.errors import DataError, TwinError, did_you_mean
 
 Values = Mapping[str, float]
-
-
-@cache
-def unit_registry() -> pint.UnitRegistry:
-    """The one pint registry of the program, loaded at first use."""
-    import pint
-
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
-
-
-@cache
-def si_factor(unit: str, where: str) -> float:
-    """Factor from `unit` to its SI base unit, for quantities without an offset.
-
-    Raises DataError, naming `where`, for a unit pint does not know.
-    """
-    import pint
-
-    try:
-        return float(unit_registry().Quantity(1.0, unit).to_base_units().magnitude)
-    except (pint.errors.PintError, AttributeError, TypeError, ValueError) as error:
-        raise DataError(f"{where}: unknown unit {unit!r} ({error}); write one that pint knows, e.g. 'mm', 'GPa', '1'") from None
-
-
-SI_UNITS = (
-    "1",
-    "m",
-    "kg",
-    "s",
-    "N",
-    "Pa",
-    "K",
-    "A",
-    "V",
-    "ohm",
-    "N*m",
-    "m/s^2",
-    "1/m",
-    "N/m",
-    "N/s",
-    "J/K",
-    "W/K",
-    "W/K^2",
-    "W/K^3",
-    "W/(K*m)",
-    "W/(K*m^2)",
-    "W/(K^2*m)",
-    "N/K",
-    "kg/m^3",
-    "1/K",
-    "1/N",
-    "1/s",
-    "m/N",
-)
-
-
-@cache
-def si_unit(unit: str, where: str) -> str:
-    """The SI unit a value in `unit` is kept in: "GPa" -> "Pa", "deg" -> "rad". Raises DataError for one the twin does not use."""
-    si_factor(unit, where)
-    if unit.startswith(("deg", "rad")):
-        return "rad"
-    registry = unit_registry()
-    for si in SI_UNITS:
-        if registry.Unit(si).dimensionality == registry.Unit(unit).dimensionality:
-            return si
-    raise DataError(f"{where}: unit {unit!r} is none the twin uses; it must be convertible to one of {', '.join(SI_UNITS)}, rad")
 
 
 @dataclass(frozen=True)
@@ -93,7 +21,8 @@ class Parameter:
 
     `value` is nominal for a robot and OFF for an effect; `low` and `high` are hard bounds; `std` is one standard
     deviation of what is believed beforehand (None: known exactly for a robot, unknown within bounds for an effect);
-    `scale` is the size of a change worth looking at, used for derivatives and to start a fit.
+    `scale` is the size of a change worth looking at, used for derivatives and to start a fit; `written` the unit a robot's file
+    gives it in.
     """
 
     name: str
@@ -104,6 +33,7 @@ class Parameter:
     source: str
     std: float | None = None
     scale: float | None = None
+    written: str = ""
 
     def __post_init__(self) -> None:
         if not self.low <= self.value <= self.high:
@@ -133,15 +63,20 @@ def overrides(parameters: Iterable[Parameter], values: Values) -> dict[str, floa
     table = {p.name: p for p in parameters}
     for name, value in values.items():
         if name not in table:
-            raise TwinError(f"no parameter named {name!r}; available: {', '.join(sorted(table))}")
+            raise TwinError(f"no parameter named {name!r}; available: {', '.join(sorted(table))}{did_you_mean(name, table)}")
         check_bounds(table[name], value)
     return {name: float(values.get(name, p.value)) for name, p in table.items()}
 
 
 def check_bounds(parameter: Parameter, value: float) -> None:
     """Raises TwinError where `value` is not a finite number inside the parameter's bounds (to rounding)."""
-    slack = 1e-9 * max(1.0, abs(parameter.low), abs(parameter.high))
+    slack = 1e-9 * max((abs(b) for b in (parameter.low, parameter.high) if np.isfinite(b)), default=1.0)
     if not (np.isfinite(value) and parameter.low - slack <= value <= parameter.high + slack):
         raise TwinError(
             f"parameter {parameter.name} = {value:g} {parameter.unit}: allowed is [{parameter.low:g}, {parameter.high:g}]"
         )
+
+
+def each(values: Values, name: str, n: int) -> np.ndarray:
+    """The n numbers (n,) of a parameter that is described one by one, as name_1, name_2, ..., or by one number for all, as name."""
+    return np.array([values[f"{name}_{k}"] if f"{name}_{k}" in values else values[name] for k in range(1, n + 1)])

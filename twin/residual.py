@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from twin.bench import Bench, Inputs, drives, lead
+from twin.bench import Bench, Inputs
+from twin.effects import Drive
 
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
 SAME = (
@@ -118,7 +119,7 @@ def estimate_noise(
     place = {k: i for i, k in enumerate(trials)}
     pairs = [(place[a], place[b]) for a, b in repeats(bench) if a in place and b in place]
     declared = np.array([o.channel.noise or np.nan for o in bench.outputs])
-    cells = np.array([c.noise or np.nan for c in drives(bench)]) * np.abs(lead(bench.robot.build(), bench.n_tendon))
+    cells = np.array([c.noise or np.nan for c in bench.drivers]) * np.abs(bench.pull)
     drive = cells if np.isfinite(cells).all() else None
     notes = []
     if pairs:
@@ -144,7 +145,7 @@ def estimate_noise(
     if pairs:
         noise = replace(noise, rho=_correlation(noise, d, G, member))
     if not np.isfinite(cells).all():
-        units = np.where(bench.by_length, "mm", np.where(bench.by_current, "mA", "mN"))
+        units = ["mm" if d is Drive.DISPLACEMENT else f"m{d.shown[0]}" for d in bench.drives]
         said = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
         notes.append(f"no noise declared for the inputs: estimated as {said} from the data")
     return noise, notes

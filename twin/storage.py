@@ -8,16 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
+from pydantic import Field
 
-from twin.effects import named
-from twin.errors import DataError
-from twin.quantities import Fitted, Parameter, overrides, si_factor, si_unit
-from twin.robots import available, load
+from twin.errors import DataError, listed, shown
+from twin.forms import Form, Line, fill
+from twin.measurements.files import is_file
+from twin.quantities import Fitted
+from twin.robots import Robot, available, load
+from twin.robots.effect_tables import read_effects, read_values
+from twin.robots.robot import models_folder
 from twin.robots.toml_file import opened
 from twin.twin import Twin
 
 FORMAT = "twin/1"
-SECTIONS = {"format", "robot", "parameters", "effect", "provenance"}
 
 
 def read_twin(source: str | Path) -> Twin:
@@ -26,62 +29,49 @@ def read_twin(source: str | Path) -> Twin:
     Raises DataError where the file breaks its contract, UnknownNameError for a robot's name that does not exist.
     """
     path = Path(source)
-    if path.is_dir() and (path / "twin.toml").is_file():
+    if is_file(path / "twin.toml"):
         path = path / "twin.toml"
-    if path.suffix != ".toml" or not path.is_file():
-        if path.suffix == ".toml" or (os.sep in str(source) and not (path / "robot.toml").is_file()):
-            raise DataError(f"{path}: no such twin; give a twin.toml, a folder with one, or a robot: {', '.join(available())}")
+    if path.suffix != ".toml" or not is_file(path):
+        if path.suffix == ".toml" or (os.sep in str(source) and not is_file(path / "robot.toml")):
+            robots = f"the folder of a robot, or one of {', '.join(available())}"
+            raise DataError(f"{shown(str(path), 300)}: no such twin; give a twin.toml, a folder with one, {robots}")
         return Twin.of(load(str(source)))
     with opened(path, FORMAT) as table:
         return _twin(table, path.parent)
 
 
+class TwinFile(Form):
+    """The top of a `twin.toml`."""
+
+    format: str = Field(description=f'"{FORMAT}"')
+    robot: Line = Field(description="a robot's name, or the path to its folder from this file")
+    parameters: dict[str, Any] = Field({}, description="calibrated values; what is absent keeps the robot's nominal value")
+    effect: list[Any] = Field([], description="[[effect]] tables: the laws in force")
+    provenance: dict[str, Any] = Field({}, description="versions, seed, data hash, command, date; free")
+
+
 def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
-    if not isinstance(table.get("robot"), str):
-        raise DataError(f"`robot` is missing; name one of {', '.join(available())}, or a path to a robot's folder")
-    if unread := sorted(set(table) - SECTIONS):
-        raise DataError(f"no section {unread[0]!r} is known; allowed are {', '.join(sorted(SECTIONS))}")
-    robot = load(table["robot"], folder)
-    values = _values(table.get("parameters", {}), robot.parameters)
-    overrides(robot.parameters, values)
-    entries = table.get("effect", [])
-    if not (isinstance(entries, list) and all(isinstance(e, dict) for e in entries)):
-        raise DataError(f"`effect` is {entries!r}; write each effect as its own [[effect]]")
-    effects = []
-    for entry in entries:
-        law = named(str(entry.get("id")))
-        effects.append(law(_values(entry.get("parameters", {}), law.declared(robot.n_tendon)), robot.n_tendon))
-    if twice := {e.id for e in effects if sum(o.id == e.id for o in effects) > 1}:
-        raise DataError(f"effect {', '.join(sorted(twice))} stands there twice; merge the two")
+    """The twin of a file's content. Raises DataError with all that is wrong with it."""
+    problems: list[str] = []
+    file = fill(TwinFile, table, "", problems)
+    if file is None:
+        raise DataError(listed(problems))
+    robot = load(file.robot, folder)
+    values = read_values(file.parameters, robot.parameters, "parameters", problems)
+    effects = read_effects(file.effect, robot.n_tendon, problems)
+    if not problems:
+        problems += robot.objections(values)
+    if problems:
+        raise DataError(listed(problems))
     return Twin(robot, values, tuple(effects))
 
 
-def _values(table: Any, declared: tuple[Parameter, ...]) -> dict[str, float]:
-    """Values of a parameter table: plain SI numbers, or {value, unit, std}."""
-    units = {p.name: p.unit for p in declared}
-    out = {}
-    if not isinstance(table, Mapping):
-        raise DataError(f"parameters are {table!r}; write a table of name = {{ value = ..., unit = ... }}")
-    for name, entry in table.items():
-        if name not in units:
-            raise DataError(f"no parameter named {name!r}; available: {', '.join(sorted(units))}")
-        try:
-            if isinstance(entry, Mapping):
-                unit = str(entry.get("unit", units[name]))
-                if si_unit(unit, name) != units[name]:
-                    raise DataError(f"parameter {name!r} is in {unit!r}; a unit like {units[name]!r} is needed")
-                out[name] = float(entry["value"]) * si_factor(unit, name)
-            else:
-                out[name] = float(entry)
-        except (KeyError, TypeError, ValueError):
-            raise DataError(f"parameter {name!r} is {entry!r}; write a number, or {{ value = ..., unit = ... }}") from None
-    return out
-
-
-def twin_table(twin: Twin, parameters: Mapping[str, Fitted], effects: Mapping[str, Mapping[str, Fitted]]) -> dict[str, Any]:
-    """A twin as its file's content; standard errors where a fit found them."""
+def twin_table(
+    twin: Twin, folder: Path, parameters: Mapping[str, Fitted], effects: Mapping[str, Mapping[str, Fitted]]
+) -> dict[str, Any]:
+    """A twin as the content of its file in `folder`; standard errors where a fit found them."""
     units = {p.name: p.unit for p in twin.robot.parameters}
-    table: dict[str, Any] = {"format": FORMAT, "robot": robot_reference(twin)}
+    table: dict[str, Any] = {"format": FORMAT, "robot": robot_reference(twin.robot, folder)}
     table["parameters"] = {n: entry(parameters.get(n) or Fitted(v, None, units[n])) for n, v in sorted(twin.values.items())}
     table["effect"] = []
     for effect in twin.effects:
@@ -92,9 +82,12 @@ def twin_table(twin: Twin, parameters: Mapping[str, Fitted], effects: Mapping[st
     return table
 
 
-def robot_reference(twin: Twin) -> str:
-    """The robot's name where it ships with the program, else the path to its folder."""
-    return twin.robot.name if twin.robot.name in available() else str(twin.robot.folder)
+def robot_reference(robot: Robot, folder: Path) -> str:
+    """The robot's name where it ships with the program, else the path from `folder` to its own, which is no such name."""
+    if robot.folder == (models_folder() / robot.name).resolve():
+        return robot.name
+    path = Path(os.path.relpath(robot.folder, folder.resolve())).as_posix()
+    return path if path.startswith("..") else f"./{path}"
 
 
 def entry(fitted: Fitted) -> dict[str, Any]:

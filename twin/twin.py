@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from twin.bench import Bench, Inputs, prepare
-from twin.dynamics import Dynamics
-from twin.effects import Creep, Effect, Loads, Route, Signals, named
-from twin.equilibrium import TOLERANCE, Antagonists, Equilibrium, Heating, Path
-from twin.errors import DataError, SolveError
+from twin.body import TOLERANCE, Body, Heating, Path, Problem, Solver
+from twin.effects import Drive, Effect, Signals, named
+from twin.errors import SolveError
+from twin.laws import Laws
 from twin.measurements import Recording
 from twin.quantities import Values
-from twin.robots import Body, Frame, Jaw, Robot, load
+from twin.robots import Robot, load
 
 
 @dataclass(frozen=True)
@@ -33,8 +32,22 @@ class Twin:
     def of(robot: Robot | str) -> Twin:
         """The robot as described: nominal parameters, and the effects its `robot.toml` declares."""
         robot = load(robot) if isinstance(robot, str) else robot
-        n_tendon = int(robot.structure["tendons"])  # type: ignore[call-overload]
-        return Twin(robot, {}, tuple(named(name)(values, n_tendon) for name, values in robot.effects))
+        return Twin(robot, {}, tuple(named(name)(values, robot.n_tendon) for name, values in robot.effects))
+
+    @property
+    def laws(self) -> Laws:
+        return Laws(self.effects)
+
+    def body(self) -> Body:
+        """The robot with all that its effects change of it, not compiled yet. Raises DataError for an effect that finds nothing to
+        act on."""
+        body = self.robot.build(self.values)
+        self.laws.edit(body, self.robot.name)
+        return body
+
+    def heating(self, ambient: np.ndarray) -> Heating:
+        """Its SMA springs in surroundings at `ambient` (n,) K. Raises DataError where the robot describes none."""
+        return Heating(ambient, self.laws.spring(self.robot.springs(self.robot.n_tendon, self.values)))
 
     def predict(self, recording: Recording, *, dynamic: bool | None = None) -> Recording:
         """The recording's outputs as the twin sees them, on its trials' samples and inputs, with `source` saying so.
@@ -71,7 +84,7 @@ def is_dynamic(bench: Bench) -> bool:
     """
     if _is_held(bench):
         return False
-    period = 1.0 / first_mode(bench.robot)
+    period = 1.0 / bench.robot.build().first_mode()
     for trial in bench.inputs:
         dt = np.diff(trial.time)
         width = int(np.ceil(0.3 * period / np.median(dt)))
@@ -87,149 +100,86 @@ def is_dynamic(bench: Bench) -> bool:
 
 def _is_held(bench: Bench) -> bool:
     """Whether motors or springs hold some tendon's length, which static solves alone do."""
-    return bool(bench.by_length.any() or bench.by_current.any())
+    return any(d is not Drive.TENSION for d in bench.drives)
+
+
+@dataclass(frozen=True)
+class Way:
+    """How trials are solved: traces (with kept tangents, of a neighbouring twin, same trials) speed the solves up, with `once` to
+    first order in the difference; `keep` keeps tangents for that."""
+
+    near: Sequence[Trace] | None = None
+    keep: bool = False
+    once: bool = False
+    tolerance: float = TOLERANCE
 
 
 def simulate(
-    twin: Twin, bench: Bench, *, trials: Sequence[int] | None = None, near: Sequence[Trace] | None = None, keep: bool = False,
-    dynamic: bool = False, tolerance: float = TOLERANCE, once: bool = False,
-) -> list[Trace]:  # fmt: skip
+    twin: Twin, bench: Bench, *, trials: Sequence[int] | None = None, way: Way | None = None, dynamic: bool = False
+) -> list[Trace]:
     """The true signals of the bench's trials (all, or those listed) in order of their clock.
 
-    With creep every trial before is simulated too, since the body remembers. `near` (traces with kept tangents of a
-    neighbouring twin, same trials) speeds the solves up, with `once` to first order in the difference; `keep` keeps tangents for
-    that. Raises SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
+    With creep every trial before is simulated too, since the body remembers; with `way.keep` all of them are returned. Raises
+    SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
     """
-    body = twin.robot.build(twin.values)
-    for effect in twin.effects:
-        if lacking := effect.needs - body.parts:
-            what = " and ".join(sorted(lacking))
-            raise DataError(f"effect {effect.id} acts on {what}, which robot {twin.robot.name!r} has not: remove the effect")
-        effect.edit(body)
-    solver = _solver(body, dynamic and not _is_held(bench))
-    creep, route = _merged_creep(twin.effects), merged_route(twin.effects)
+    way, laws, body = way or Way(), twin.laws, twin.body()
+    solver, creep = twin.robot.solver(body, dynamic=dynamic and not _is_held(bench)), laws.creep
     wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
-    delayed = np.zeros((len(creep.amplitude), solver.model.nv))
+    delayed = np.zeros((len(creep.amplitude), solver.n_slow))
     traces, rested = {}, 0.0
     for position, k in enumerate(run):
         inputs = bench.inputs[k]
         pause = max(0.0, float(inputs.clock[0]) - rested)
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
-        close = near[position].path if near is not None and len(near) == len(run) else None
-        traces[k] = _trial(twin, solver, inputs, route, creep, delayed, close, keep, tolerance, once, body.frame)
-    return [traces[k] for k in (run if keep else wanted)]
-
-
-def _solver(body: Body, dynamic: bool) -> Equilibrium | Dynamics | Antagonists:
-    if isinstance(body, Jaw):
-        return Antagonists(body)
-    return Dynamics(body) if dynamic else Equilibrium(body)
+        close = way.near[position].path if way.near is not None and len(way.near) == len(run) else None
+        traces[k] = _trial(twin, body, solver, inputs, delayed, close, way)
+    return [traces[k] for k in (run if way.keep else wanted)]
 
 
 def _trial(
-    twin: Twin, solver: Equilibrium | Dynamics | Antagonists, inputs: Inputs, route: Route, creep: Creep, delayed: np.ndarray,
-    near: Path | None, keep: bool, tolerance: float, once: bool, frame: Frame,
+    twin: Twin, body: Body, solver: Solver, inputs: Inputs, delayed: np.ndarray, near: Path | None, way: Way
 ) -> Trace:  # fmt: skip
-    n, by_length, by_current = len(inputs.time), inputs.by_length, np.broadcast_to(inputs.by_current, inputs.by_length.shape)
-    driving = Signals(
-        inputs.time, inputs.clock, np.where(by_length | by_current, 0.0, inputs.command), np.where(by_length, inputs.command, 0.0),
-        np.zeros((n, 0, 3)), inputs.temperature, by_length, by_current, np.where(by_current, inputs.command, 0.0),
+    laws = twin.laws
+    driven = laws.drive(laws.command(inputs.signals.with_(antagonists=body.antagonists)))
+    heating = twin.heating(inputs.temperature) if Drive.CURRENT in inputs.drives else None
+    problem = Problem(
+        inputs.time, driven.command, laws.surround(inputs.loads), laws.route, inputs.drives, laws.creep, delayed,
+        laws.stiffness(inputs.temperature, inputs.clock), heating, near, way.keep, way.once, way.tolerance,
     )  # fmt: skip
-    if isinstance(solver, Antagonists):
-        driving = driving.with_(angle=solver.drum(inputs.command))
-    for effect in reversed(twin.effects):
-        driving = effect.command(driving)
-    for effect in twin.effects:
-        driving = effect.drive(driving)
-    loads: Loads = inputs.loads
-    for effect in twin.effects:
-        loads = effect.surround(loads)
-    command = np.where(by_length, driving.displacement, np.where(by_current, driving.current, driving.tension))
-    stiffness = np.ones(n)
-    for effect in twin.effects:
-        stiffness = stiffness * effect.soften(inputs.temperature, inputs.clock)
-    if isinstance(solver, Equilibrium):
-        heating = heating_of(twin, inputs.temperature, by_current) if by_current.any() else None
-        path = solver.solve(
-            inputs.time, command, loads, route, creep, delayed, near, keep, tolerance, by_length, stiffness, once, heating
-        )  # fmt: skip
-    else:
-        path = solver.solve(inputs.time, command, loads, route, creep, delayed, stiffness=stiffness)
+    path = solver.solve(problem)
     if not path.status.all():
-        bad = int(np.flatnonzero(path.status == 0)[0])
-        pull = ", ".join(
-            f"{1e3 * c:.2f} mm" if b else f"{c:.2f} {'A' if a else 'N'}"
-            for c, b, a in zip(command[bad], by_length, by_current, strict=True)
-        )  # fmt: skip
-        hint = "; displacements may pull against each other" if by_length.any() else ""
-        raise SolveError(
-            f"{inputs.name}: no static equilibrium at sample {bad + 1} (t = {inputs.time[bad]:.3g} s, tendons {pull}, payload "
-            f"{loads.payload * 1e3:.3g} g); check the loads' units and directions{hint}"
-        )
-    shortening = solver.straight_path - path.path + route.elongation(path.tension)
-    travel = np.where(by_length, driving.displacement, shortening)
-    true = Signals(
-        inputs.time, inputs.clock, path.tension, travel, frame.reported(path.markers), inputs.temperature,
-        by_length, by_current, driving.current, path.temperature,
-    )  # fmt: skip
-    if isinstance(solver, Antagonists):
-        angle, torque = solver.joints(driving.displacement, path, loads)
-        true = true.with_(angle=angle, torque=torque)
-    return Trace(true, path)
+        raise SolveError(_unsolved(inputs.name, problem, int(np.flatnonzero(path.status == 0)[0])))
+    shortening = solver.straight_path - path.path + problem.route.elongation(path.tension)
+    travel = np.where(driven.by_length, driven.displacement, shortening)
+    markers = body.frame.reported(path.markers)
+    return Trace(driven.with_(tension=path.tension, displacement=travel, markers=markers, others=path.others), path)
 
 
-def heating_of(twin: Twin, ambient: np.ndarray, by_current: np.ndarray) -> Heating:
-    spring = twin.robot.springs(len(by_current), twin.values)
-    for effect in twin.effects:
-        spring = effect.spring(spring)
-    return Heating(by_current, ambient, spring)
-
-
-def _merged_creep(effects: tuple[Effect, ...]) -> Creep:
-    creeps = [e.deform() for e in effects]
-    return Creep(tuple(a for c in creeps for a in c.amplitude), tuple(t for c in creeps for t in c.time))
-
-
-def merged_route(effects: tuple[Effect, ...]) -> Route:
-    routes = [e.route() for e in effects]
-    rubbing = next((r for r in routes if r.mu > 0.0), Route())
-    return replace(rubbing, stretch=sum(r.stretch for r in routes), stiffening=sum(r.stiffening for r in routes))
+def _unsolved(name: str, problem: Problem, bad: int) -> str:
+    shown = [d.shown for d in problem.drives]
+    pull = ", ".join(f"{factor * c:.2f} {unit}" for c, (unit, factor) in zip(problem.command[bad], shown, strict=True))
+    hint = "; displacements may pull against each other" if Drive.DISPLACEMENT in problem.drives else ""
+    return (
+        f"{name}: no static equilibrium at sample {bad + 1} (t = {problem.time[bad]:.3g} s, tendons {pull}, payload "
+        f"{problem.loads.payload * 1e3:.3g} g); check the loads' units and directions{hint}"
+    )
 
 
 def report(effects: tuple[Effect, ...], true: Signals) -> Signals:
     """What the sensors say of the true signals."""
-    for effect in effects:
-        true = effect.sense(true)
-    return true
+    return Laws(effects).sense(true)
 
 
 def readings(bench: Bench, seen: Signals) -> np.ndarray:
     """The bench's output channels of one trial's signals, (n, n_output)."""
-    of = {
-        "marker": seen.markers, "displacement": seen.displacement[..., None], "tension": seen.tension[..., None],
-        "angle": seen.angle[..., None], "torque": seen.torque[..., None],
-    }  # fmt: skip
-    if bench.by_current.any():
-        resistance = np.broadcast_to(bench.robot.springs(bench.n_tendon).resistance, seen.warmth.shape)
-        of |= {"temperature": seen.warmth[..., None], "resistance": resistance[..., None]}
-    return np.stack([of[o.group][:, o.index, o.axis] for o in bench.outputs], axis=1)
+    if any(o.group == "resistance" for o in bench.outputs):
+        of_springs = np.broadcast_to(bench.robot.springs(bench.n_tendon).resistance, seen.tension.shape)
+        seen = seen.with_(others={**seen.others, "resistance": of_springs})
+    return np.stack([seen.group(o.group)[:, o.index, o.axis] for o in bench.outputs], axis=1)
 
 
 def unstable_starts(bench: Bench, traces: Sequence[Trace]) -> list[str]:
     """Names of the trials whose loaded, untensioned robot has no stable shape near straight: their branch is a guess."""
     return [inputs.name for inputs, t in zip(bench.inputs, traces, strict=True) if t.path is not None and t.path.unstable_start]
-
-
-def first_mode(robot: Robot) -> float:
-    """Frequency (Hz) of the robot's first bending mode, as a cantilever with all its mass spread: a scale for rates.
-
-    f = 1.875^2 / (2 pi L^2) sqrt(EI / (m/L)) (Euler-Bernoulli).
-    """
-    body = robot.build()
-    model = body.spec.compile()
-    first = body.joints[0]
-    stiffness = float(model.jnt_stiffness.reshape(model.nv, -1)[model.joint(first.bend_x).id, 0]) * first.length
-    per_length = float(model.body_mass.sum()) / body.length
-    return 1.875**2 / (2 * math.pi * body.length**2) * math.sqrt(stiffness / per_length)

@@ -11,8 +11,10 @@ from twin.bench import ROOM, Inputs, prepare
 from twin.diagnose import Claim, Diagnosis, Errors, Settings
 from twin.diagnose.experiment import Experiment
 from twin.diagnose.identifiability import Visibility
+from twin.diagnose.loops import Loop, Loops
 from twin.diagnose.null import Thresholds
-from twin.effects import Loads, named
+from twin.diagnose.suspicions import Suspicion
+from twin.effects import Drive, Loads, named
 from twin.measurements import Channel, Recording, Trial
 from twin.quantities import Fitted
 from twin.residual import Noise
@@ -24,7 +26,7 @@ SETTINGS = Settings(seed=3, jobs=1)
 
 
 PULL = Inputs(
-    "pull", np.zeros(1), np.zeros(1), np.zeros((1, 3)), np.zeros(3, bool), np.full(1, ROOM), Loads(np.array([0, 0, 9.81]))
+    "pull", np.zeros(1), np.zeros(1), np.zeros((1, 3)), (Drive.TENSION,) * 3, np.full(1, ROOM), Loads(np.array([0, 0, 9.81]))
 )
 EXPERIMENT = Experiment("pull tendon 3 to 2.0 N and release it", PULL, 10.0, 3, (("tendon_friction",), ("backbone_creep",)))
 
@@ -114,7 +116,10 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         experiment=EXPERIMENT if verdict != "noise" else None,
         bench=bench,
         fitted_trials=(0, 1, 3),
-        held_trials=(2, 4),
+        sealed_trials=(2, 4),
+        folds=(),
+        loops=Loops("marker", "disk_8", (Loop(0, LOOP, 2e-5, 40, 0.0), Loop(1, LOOP, 2e-5, 40, 0.0))),
+        suspicions=(Suspicion("sign", "tendon_1_displacement falls", "the other sign"),),
         predictions={"nominal": nominal, "calibrated": calibrated, "after": after if found else calibrated},
         notices=("a notice", "a notice"),
         settings=SETTINGS,

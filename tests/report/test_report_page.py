@@ -22,6 +22,7 @@ from twin.report.plots import MOST_POINTS
 SECTIONS = (
     "before-after",
     "effects",
+    "loops",
     "residual",
     "shapes",
     "tip",

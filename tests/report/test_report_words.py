@@ -6,19 +6,49 @@ import pytest
 from rich.console import Console
 from small_diagnosis import diagnosis, recording
 
+from twin.diagnose import Fold
+from twin.diagnose.loops import Loop, Loops
 from twin.quantities import Fitted
 from twin.report import console, sentence
+from twin.report.loops import advice, loop_words
 from twin.report.numbers import column, number, percent, plus_minus, rough
-from twin.report.sentence import blind
+from twin.report.sentence import blind, verdict_words
 
 
 def test_explained_says_what_how_much_and_where_it_was_measured():
     words = sentence(diagnosis())
     assert words.startswith(
-        "Missing effect: tendon friction, mu = 0.1030 ± 0.0013. It explains 95 % of the structured error; on 2 trials "
+        "Missing effect: tendon friction, mu = 0.1030 ± 0.0013. It explains 95 % of the structured error. These "
     )
-    assert "falls from 0.78 to 0.49 mm (noise floor 0.44 mm)" in words
-    assert words.endswith("These data cannot tell it from tendon routing with time delay.")
+    assert "data cannot tell it from tendon routing with time delay. On 2 sealed trials the error " in words
+    assert words.endswith("falls from 0.78 to 0.49 mm (noise floor 0.44 mm).")
+
+
+def test_a_twin_that_does_worse_on_sealed_trials_says_so():
+    d = diagnosis()
+    worse = replace(d.errors, after={"marker": 8.6e-4}, ci_after={"marker": (8e-4, 9e-4)})
+    words = sentence(replace(d, errors=worse))
+    assert "the error goes from 0.78 to 0.86 mm" in words
+    assert words.endswith("worse than the calibrated one in position, by 10 %.")
+    assert "worse" not in sentence(d)
+
+
+def test_a_sealed_trial_without_equilibrium_is_named():
+    d = diagnosis()
+    words = sentence(replace(d, errors=replace(d.errors, lost=(4,))))
+    assert "On 1 sealed trial the error" in words
+    assert words.endswith("It has no equilibrium for sealed circle_4, which counts for nothing here.")
+
+
+def test_few_trials_say_how_stable_the_claims_were_and_what_that_took():
+    folds = (Fold(0, "explained", ("tendon_friction",)), Fold(1, "noise", ()), Fold(2, "explained", ("tendon_friction",)))
+    words = sentence(diagnosis(folds=folds))
+    assert words.endswith("the diagnosis was made 4 times; 2 of the 3 with one trial sealed come to the same effects.")
+
+
+def test_what_cannot_be_told_apart_is_said_where_nothing_is_claimed():
+    words = sentence(diagnosis("unexplained", ambiguous=(("tendon_friction",), ("backbone_creep",))))
+    assert "It could be tendon friction or backbone creep: these data cannot tell which, so neither is claimed." in words
 
 
 def test_other_explanations_that_contain_the_claim_are_no_rivals():
@@ -29,7 +59,11 @@ def test_other_explanations_that_contain_the_claim_are_no_rivals():
     ("verdict", "start", "end"),
     [
         ("noise", "No missing effect: after calibration only noise is left", "(noise floor 0.44 mm)."),
-        ("partly_explained", "Partly explained: tendon friction", "What is left moves mostly with the direction of pull."),
+        (
+            "partly_explained",
+            "Partly explained: tendon friction",
+            "direction of pull. On 2 sealed trials the error falls from 0.78 to 0.49 mm (noise floor 0.44 mm).",
+        ),
         (
             "unexplained",
             "Unexplained: after calibration a structured error of 0.42 sigma is left that no known effect may claim",
@@ -45,7 +79,7 @@ def test_the_other_verdicts(verdict, start, end):
 
 def test_a_name_in_doubt_that_leaves_little_is_not_said_to_leave_much():
     d = diagnosis("partly_explained", structure_after=0.05)
-    assert sentence(d).endswith("Little is left, but something speaks against it: see what is left, and the notices.")
+    assert verdict_words(d).endswith("Little is left, but something speaks against it: see what is left, and the notices.")
 
 
 def test_a_spectral_line_alone_is_named():
@@ -60,6 +94,29 @@ def test_two_effects_share_a_sentence():
     assert words.startswith(
         "Missing effects: tendon friction, mu = 0.1030 ± 0.0013 and base tilt, about y = 2.865 ± 0.057°. Together they"
     )
+
+
+def test_a_loop_is_told_in_millimetres_with_its_sign_and_noise():
+    words = loop_words(diagnosis())
+    assert "release and pull differ by 2.00 mm (disk_8, 2 trials, noise 0.01 mm); the robot lags" in words
+    assert "look alike" not in words
+    assert advice(diagnosis()) is None
+
+
+def test_a_loop_that_time_could_make_asks_for_another_order():
+    once = Loops("marker", "disk_8", (Loop(0, -2e-3, 2e-5, 40, None), Loop(1, -1e-3, 2e-5, 40, None)))
+    d = diagnosis("noise", loops=once)
+    assert "differ by \N{MINUS SIGN}1.50 mm" in loop_words(d)
+    assert "the robot leads" in loop_words(d)
+    assert "friction, creep and drift look alike here" in loop_words(d)
+    assert (advice(d) or "").startswith("run circle_0 again with its pull interrupted")
+
+
+def test_a_loop_of_noise_is_none():
+    still = Loops("marker", "disk_8", (Loop(0, 3e-5, 2e-5, 40, None),))
+    assert "differ by no more than noise (0.03 mm" in loop_words(diagnosis(loops=still))
+    assert advice(diagnosis(loops=still)) is None
+    assert "cannot be compared" in loop_words(diagnosis(loops=Loops("marker", "disk_8", ())))
 
 
 def test_numbers_follow_their_error():

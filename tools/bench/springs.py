@@ -1,4 +1,6 @@
-"""SMA springs that pull the tendons, in the units of their source: mm, gram-force, degC (Kolyvas; the law of shared/nominal.md).
+"""SMA springs that pull the tendons, in the units of their source: mm, gram-force, degC.
+
+The laws are those of Kolyvas and Tzes, JIMSS 2018, doi 10.1177/1045389X18770880.
 
 Heat: over a step of t seconds under the current I, with x (K) above ambient and h (W/K) as they are at its start,
 

@@ -11,8 +11,8 @@ import math
 
 from tools.second_opinion.start import Calibrated, Opinion
 from twin.calibrate import Fit, fit
-from twin.diagnose.screen import Candidate
-from twin.diagnose.search import DEEPEST
+from twin.diagnose.ranking import Candidate
+from twin.diagnose.thresholds import DEEPEST
 from twin.errors import SolveError
 
 REFITS = 3  # a level, at most

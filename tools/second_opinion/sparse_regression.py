@@ -15,8 +15,8 @@ import pysindy
 
 from tools.second_opinion.start import Calibrated, Opinion, amplitudes
 from twin.calibrate import Model, fit, prior_weight
-from twin.diagnose.null import MATERIAL
-from twin.diagnose.screen import Candidate
+from twin.diagnose.ranking import Candidate
+from twin.diagnose.thresholds import MATERIAL
 from twin.effects import catalogue
 from twin.errors import SolveError
 

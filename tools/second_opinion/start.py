@@ -11,7 +11,8 @@ from twin.calibrate import Fit, Objective, fit
 from twin.diagnose import Settings
 from twin.diagnose.evidence import COMPONENTS, Discrepancy, Evidence
 from twin.diagnose.objective import objective_of
-from twin.diagnose.screen import Candidate, dictionary, screen
+from twin.diagnose.patterns import dictionary
+from twin.diagnose.ranking import Candidate, rank
 from twin.diagnose.split import split
 from twin.effects import catalogue
 from twin.evaluate import rms
@@ -50,7 +51,7 @@ class Calibrated:
         n_group = len(self.evidence.groups)
         none = Discrepancy(0.0, np.zeros(0), np.full((n_group, len(COMPONENTS)), 1e-8), np.zeros((0, 0)))
         best: dict[str, Candidate] = {}
-        for candidate in screen(self.objective, self.evidence, at, none, dictionary(self.objective, at), top=len(catalogue())):
+        for candidate in rank(self.objective, self.evidence, at, none, dictionary(self.objective, at), top=len(catalogue())):
             best.setdefault(candidate.effect, candidate)
         return list(best.values())
 

@@ -57,15 +57,15 @@ class Guard:
         hottest, ceiling = self.warmest, self.ceiling
         if measured is not None:
             hottest, ceiling = np.asarray(measured, float), self.ceiling - THERMOMETER
-        given = np.clip(voltage, 0.0, self.supply)
+        given, own, careful = np.clip(voltage, 0.0, self.supply), self.spring.records, self.careful.records
         for t in range(self.n):
-            h = loss(self.careful, t, hottest[t] - self.ambient, elongation[t], self.ambient)
+            h = loss(careful, t, hottest[t] - self.ambient, elongation[t], self.ambient)
             keep = np.exp(-h * dt / self.spring.capacity[t])
             power = h * (ceiling - self.ambient - keep * (hottest[t] - self.ambient)) / (1.0 - keep)
             given[t] = min(given[t], float(np.sqrt(max(power, 0.0) * self.spring.resistance[t])))
             current = given[t] / self.spring.resistance[t]
-            self.warmest[t] = heated(self.careful, t, self.warmest[t], elongation[t], current, self.ambient, dt)
-            self.temperature[t] = heated(self.spring, t, self.temperature[t], elongation[t], current, self.ambient, dt)
+            self.warmest[t] = heated(careful, t, self.warmest[t], elongation[t], current, self.ambient, dt)
+            self.temperature[t] = heated(own, t, self.temperature[t], elongation[t], current, self.ambient, dt)
         if measured is not None:
             self.temperature = np.asarray(measured, float).copy()
         return given
@@ -74,13 +74,13 @@ class Guard:
 def loop_temperatures(spring: Spring, tension: np.ndarray, elongation: np.ndarray, ambient: float) -> tuple[np.ndarray, np.ndarray]:
     """(T_low, T_up), (n,) K each, between `ambient` and WARMEST: below T_low a spring at its elongation (n,) m does not pull up to
     `tension` (n,) N, above T_up it does not let go down to it."""
-    low, up = np.empty(len(tension)), np.empty(len(tension))
+    low, up, records = np.empty(len(tension)), np.empty(len(tension)), spring.records
     for t, (s, e) in enumerate(zip(tension, elongation, strict=True)):
         for out, branch in ((low, 1), (up, 0)):
             cold, hot = ambient, WARMEST
             for _ in range(12):  # 0.03 K
                 middle = 0.5 * (cold + hot)
-                at = branches(spring, t, middle)
+                at = branches(records, t, middle)
                 cold, hot = (middle, hot) if at[2 * branch] + at[2 * branch + 1] * e < s else (cold, middle)
             out[t] = hot
     return low, up

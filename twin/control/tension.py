@@ -57,7 +57,8 @@ class TensionLoop:
         X = np.stack([target - 2.0, share, (elongation - s.initial_elongation) / 3e-3], axis=1)
         goal = 0.5 * (low + up) + 0.5 * (low - up) * share + self.law.step(error, dt, self.stuck)
         goal += self.network.step(X, np.where(self.stuck, 0.0, error), dt)
-        h = np.array([loss(s, t, max(goal[t] - g.ambient, 0.0), elongation[t], g.ambient) for t in range(g.n)])
+        records = s.records
+        h = np.array([loss(records, t, max(goal[t] - g.ambient, 0.0), elongation[t], g.ambient) for t in range(g.n)])
         power = h * (goal - g.ambient) + s.capacity * (goal - now) / SETTLE
         given = g.allowed(np.sqrt(np.maximum(power, 0.0) * s.resistance), elongation, dt, temperature)
         self.stuck = np.where(error > 0.0, power * s.resistance > given**2 * 1.001, power < 0.0)
@@ -69,8 +70,8 @@ def passive(spring: Spring, elongation: np.ndarray, ambient: float) -> np.ndarra
 
     Less is held only by a spring that was stretched further since and let go again.
     """
-    out = np.empty(len(elongation))
+    out, records = np.empty(len(elongation)), spring.records
     for t, e in enumerate(elongation):
-        upper, slope, _, _ = branches(spring, t, ambient)
+        upper, slope, _, _ = branches(records, t, ambient)
         out[t] = max(0.0, min(upper + slope * e, spring.austenite_stiffness[t] * e))
     return out

@@ -28,7 +28,7 @@ from twin.kinematics import LoadedRobot, inverse
 from twin.kinematics.robot import ROOM
 from twin.shape import TensionShape
 from twin.springs import Spring
-from twin.twin import Twin, heating_of
+from twin.twin import Twin
 
 PERIOD = 0.2  # s, between two inverse solves
 AHEAD = 3.0  # s: of 2 to 5 s tried on four unloaded paths, where the worst of them is best
@@ -52,7 +52,7 @@ class Loop(Protocol):
 
 def springs(twin: Twin, ambient: float = ROOM) -> Spring:
     """The twin's springs, its effects on them included. Raises DataError for a robot without springs."""
-    return heating_of(twin, np.full(1, ambient), np.ones(twin.robot.n_tendon, bool)).spring
+    return twin.heating(np.full(1, ambient)).spring
 
 
 class TipController:
@@ -73,7 +73,7 @@ class TipController:
         self.shape = TensionShape(twin, loads, doubts or {}, displacement_noise=DISPLACEMENT) if reset is not None else None
         self.robot = self.shape.robot if self.shape is not None else LoadedRobot(twin, loads)
         self.tip_marker = int(np.argmin(np.linalg.norm(self.robot.shape().markers - self.robot.shape().tip, axis=1)))
-        self.length = float(twin.robot.build(twin.values).length)
+        self.length = self.robot.length
         self.target = np.zeros(self.robot.n_tendon)
         self.sum, self.tip, self.age = np.zeros(3), self.robot.shape().tip, np.inf
 

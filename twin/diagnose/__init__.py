@@ -1,22 +1,23 @@
-"""Which effect, or none, explains what calibration leaves.
+"""Which effect, or none, explains what calibration leaves: fitted; chosen by trials left out in turn; reported on sealed ones.
 
-diagnosis.py   the types that travel to the report
-spikes.py      marker samples that stand alone
-split.py       trials no fit may see
-objective.py   what every fit minimises: residuals made white
-null.py        what noise alone would show on this design
-evidence.py    named effects against "some smooth error"
-identifiability.py  what these data cannot tell
-screen.py      which effects are worth a refit
+pipeline.py    the stages in order
+
+look.py        the robot as described, and suspicions about what the files mean
+calibrate.py   the noise, and the robot's own parameters
+screen.py      what each effect would do, what noise alone would show, what the design can tell
 search.py      beam search over sets of effects
-rigs.py        whether the trials come from one robot
+choose.py      the set that predicts trials left out
+gate.py        what is too small, or cannot be told apart
+judge.py       the verdict, the claims, how sure they are
 describe.py    what is left, in words
-held_out.py    the error on unseen trials
-verdict.py     gates, the verdict, and its numbers
-experiment.py  the trial that would settle a doubt
+seal.py        the error on trials that neither fit nor choice has seen
+
+thresholds.py  every threshold, its reason and its evidence
 """
 
-from twin.diagnose.diagnosis import Claim, Diagnosis, Errors, Settings
-from twin.diagnose.verdict import calibration, diagnose
+from twin.diagnose.diagnosis import Claim, Diagnosis, Errors, Fold, Settings
+from twin.diagnose.look import Looked, looked_at
+from twin.diagnose.pipeline import calibration, diagnose
+from twin.diagnose.suspicions import Suspicion
 
-__all__ = ["Claim", "Diagnosis", "Errors", "Settings", "calibration", "diagnose"]
+__all__ = ["Claim", "Diagnosis", "Errors", "Fold", "Looked", "Settings", "Suspicion", "calibration", "diagnose", "looked_at"]

@@ -7,45 +7,37 @@ from itertools import pairwise
 
 import numpy as np
 
-from twin.bench import Bench
-
-RESOLVED = 8  # samples of a pull that show its rate: a jump from one level to the next is none
-STEADY = 20.0  # s without motion that count as a hold
-FAST = 10.0  # ratio of the fastest to the slowest pull that counts as two rates
-WARM = 2.0  # K of spread in the room's temperature
+from twin.bench import Bench, Inputs
+from twin.diagnose.thresholds import FAST, ONE_WAY, PULLED, RESOLVED, STEADY, STILL, WARM
+from twin.effects import Drive
+from twin.evaluate import POINTS
 
 
 def shortcomings(bench: Bench) -> list[tuple[str, set[str]]]:
     """What the design lacks, in words, and the effects it then hides or confuses."""
     inputs = bench.inputs
     out: list[tuple[str, set[str]]] = []
-    rising, falling, held, pulled = 0.0, 0.0, 0.0, set()
     top = max(float(np.abs(i.command).max()) for i in inputs)
-    for i in inputs:
-        change = np.diff(i.command, axis=0)
-        rising += float(np.maximum(change, 0.0).sum())
-        falling += float(np.maximum(-change, 0.0).sum())
-        still = np.abs(change).max(axis=1) < 0.02 * top
-        held = max(held, _longest(still, i.time))
-        pulled |= {int(t) for t in np.flatnonzero(np.ptp(i.command, axis=0) > 0.2 * top)}
-    if min(rising, falling) < 0.2 * max(rising, falling):
+    changes = np.concatenate([np.diff(i.command, axis=0) for i in inputs])
+    rising, falling = (float(np.maximum(c, 0.0).sum()) for c in (changes, -changes))
+    if min(rising, falling) < ONE_WAY * max(rising, falling):
         out.append(("loading and unloading", {"tendon_friction", "tendon_backlash", "backbone_creep", "actuator_saturation"}))
-    rates = _rates(bench, top)
-    if rates.size == 0 or np.quantile(rates, 0.9) < FAST**0.5 * np.quantile(rates, 0.1):  # one pull alone may be held out
+    every = np.array([r for i in inputs for r in rates(i, top)])
+    if every.size == 0 or np.quantile(every, 0.9) < FAST**0.5 * np.quantile(every, 0.1):  # one pull alone may be sealed
         out.append(("two rates of pull, ten times apart", {"backbone_creep", "time_delay", "actuator_lag"}))
-    if held < STEADY:
+    if max(longest_rest(i, top) for i in inputs) < STEADY:
         out.append(("holds of a minute", {"backbone_creep"}))
     loads = {(round(i.loads.payload, 6), *np.round(i.loads.gravity, 3)) for i in inputs}
     if len(loads) < 2:
         hidden = {"base_tilt", "camera_misalignment", "tip_payload", "backbone_precurvature", "load_cell_bias"}
         out.append(("two payloads, or two mounts", hidden))
-    if len(pulled) < bench.n_tendon:
+    if len(set().union(*(pulled(i, top) for i in inputs))) < bench.n_tendon:
         hidden = {"stiffness_asymmetry", "load_cell_crosstalk", "load_cell_gain", "tendon_routing", "contact"}
         out.append(("pulls of every tendon, alone and together", hidden))
-    if len({o.index for o in bench.outputs if o.group == "marker"}) < 3:
+    if len({o.index for o in bench.outputs if o.group in POINTS}) < 3:
         hidden = {"stiffness_gradient", "camera_misalignment", "backbone_precurvature", "tendon_routing", "base_tilt"}
         out.append(("three markers along the body", hidden))
-    if not bench.by_length.any() and not any(o.group == "displacement" for o in bench.outputs):
+    if Drive.DISPLACEMENT not in bench.drives and not any(o.group == "displacement" for o in bench.outputs):
         out.append(("tendon displacements", {"tendon_backlash", "tendon_elasticity"}))
     if np.ptp(np.concatenate([i.temperature for i in inputs])) < WARM:
         out.append((f"a logged room temperature that varies by {WARM:.0f} K or more", {"temperature_softening"}))
@@ -56,25 +48,30 @@ def shortcomings(bench: Bench) -> list[tuple[str, set[str]]]:
     return out
 
 
-def _rates(bench: Bench, top: float) -> np.ndarray:
-    """How fast each tendon is pulled in each trial: the median slope of its moving samples, if it moves over `top` / 5."""
+def pulled(inputs: Inputs, top: float) -> list[int]:
+    """The tendons that move in a trial, by more than `PULLED` of the largest command `top`."""
+    return [int(t) for t in np.flatnonzero(np.ptp(inputs.command, axis=0) > PULLED * top)]
+
+
+def rates(inputs: Inputs, top: float) -> list[float]:
+    """How fast each tendon is pulled that moves: the median slope of its moving samples."""
+    slope = np.abs(np.diff(inputs.command, axis=0)) / np.diff(inputs.time)[:, None]
     found = []
-    for i in bench.inputs:
-        slope = np.abs(np.diff(i.command, axis=0)) / np.diff(i.time)[:, None]
-        for t in np.flatnonzero(np.ptp(i.command, axis=0) > 0.2 * top):
-            moving = slope[:, t] > 0.1 * slope[:, t].max()
-            if moving.sum() >= RESOLVED:
-                found.append(float(np.median(slope[moving, t])))
-    return np.array(found)
+    for t in pulled(inputs, top):
+        moving = slope[:, t] > 0.1 * slope[:, t].max()
+        if moving.sum() >= RESOLVED:
+            found.append(float(np.median(slope[moving, t])))
+    return found
 
 
-def _longest(still: np.ndarray, time: np.ndarray) -> float:
-    """The longest stretch (s) of still samples."""
+def longest_rest(inputs: Inputs, top: float) -> float:
+    """The longest stretch (s) of a trial in which nothing moves."""
+    still = np.abs(np.diff(inputs.command, axis=0)).max(axis=1) < STILL * top
     best, since = 0.0, None
     for k, s in enumerate(still):
         if s:
-            since = time[k] if since is None else since
-            best = max(best, float(time[k + 1] - since))
+            since = inputs.time[k] if since is None else since
+            best = max(best, float(inputs.time[k + 1] - since))
         else:
             since = None
     return best

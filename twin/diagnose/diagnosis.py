@@ -9,7 +9,9 @@ import numpy as np
 from twin.bench import Bench
 from twin.diagnose.experiment import Experiment
 from twin.diagnose.identifiability import Visibility
+from twin.diagnose.loops import Loops
 from twin.diagnose.null import Thresholds
+from twin.diagnose.suspicions.case import Suspicion
 from twin.quantities import Fitted
 from twin.residual import Noise
 from twin.twin import Twin
@@ -17,7 +19,7 @@ from twin.twin import Twin
 
 @dataclass(frozen=True)
 class Settings:
-    """How a diagnosis is run: seed of the split, worker threads."""
+    """How a diagnosis is run: seed of the split and of the no-effect sets, worker threads."""
 
     seed: int = 0
     jobs: int = 2
@@ -25,7 +27,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Claim:
-    """An effect in force (or a runner-up): parameters, the held-out error without it (or with it alone), its probability."""
+    """An effect in force (or a runner-up): parameters, the sealed trials' error without it (or with it), its probability."""
 
     effect: str
     parameters: dict[str, Fitted]
@@ -37,7 +39,11 @@ class Claim:
 
 @dataclass(frozen=True)
 class Errors:
-    """RMS on the held-out trials, SI, by group of outputs ("marker": Euclidean per marker); confidence intervals over trials."""
+    """RMS on the sealed trials, SI, by group of outputs (points: Euclidean per point); confidence intervals over trials.
+
+    `lost`: sealed trials that one of the three has no equilibrium for; they count for none. `spikes`: what was left out of the
+    others, in words.
+    """
 
     nominal: dict[str, float]
     calibrated: dict[str, float]
@@ -45,6 +51,17 @@ class Errors:
     floor: dict[str, float]
     ci_calibrated: dict[str, tuple[float, float]]
     ci_after: dict[str, tuple[float, float]]
+    lost: tuple[int, ...] = ()
+    spikes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One trial sealed, the others diagnosed: what was concluded without it."""
+
+    trial: int
+    verdict: str
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -63,7 +80,7 @@ class Diagnosis:
     noise: Noise
     structure_before: float  # sigma
     structure_after: float
-    structure_unseen: float  # after, on the held-out trials
+    structure_unseen: float  # after, on trials left out of the fit in turn
     bars: Thresholds
     structure: dict[str, float]  # component -> RMS in sigmas, after
     strongest: tuple[tuple[str, float], ...]
@@ -75,7 +92,10 @@ class Diagnosis:
     experiment: Experiment | None
     bench: Bench
     fitted_trials: tuple[int, ...]
-    held_trials: tuple[int, ...]
+    sealed_trials: tuple[int, ...]  # all, where each was sealed in turn
+    folds: tuple[Fold, ...]  # () where one part of the trials was sealed once
+    loops: Loops
+    suspicions: tuple[Suspicion, ...]  # said before anything was fitted; no number depends on them
     predictions: dict[str, list[np.ndarray]]
     notices: tuple[str, ...]
     settings: Settings

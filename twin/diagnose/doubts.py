@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from twin.calibrate import Fit
-
-FAR = 3.0  # standard deviations of its description: a robot's parameter found further away is doubtful
+from twin.diagnose.thresholds import DOUBTFUL
 
 
 def unlikely(found: Fit) -> list[str]:
@@ -13,7 +12,7 @@ def unlikely(found: Fit) -> list[str]:
     for free in found.model.free:
         p = free.parameter
         value = found.model.twin.values.get(p.name, p.value)
-        if free.effect is None and p.std and abs(value - p.value) > FAR * p.std:
+        if free.effect is None and p.std and abs(value - p.value) > DOUBTFUL * p.std:
             how = abs(value - p.value) / p.std
             said.append(
                 f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.bench import Bench, Inputs
+from twin.diagnose.thresholds import HIGHEST, LOWEST, MEMORY, NOTHING, ROUNDS, SETTLED
+from twin.effects import Drive
 
 COMPONENTS = ("static", "direction", "rate", "memory", "slow", "trial")
 IN_WORDS = {
@@ -23,9 +25,6 @@ IN_WORDS = {
     "slow": "time or temperature over the session",
     "trial": "the trial as a whole",
 }
-MEMORY = (2.0, 8.0, 30.0)  # s
-ROUNDS = 60
-NOTHING = 1e-5  # variance of a component that no longer matters: 0.003 sigma
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,11 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     """What an unnamed error could move with, on the listed trials' samples (n, p)."""
     inputs = [bench.inputs[k] for k in trials]
     span = np.max([np.abs(i.command).max(axis=0) for i in inputs], axis=0)
-    for kind in (bench.by_length, ~bench.by_length):  # tendons driven alike have one scale
+    held = bench.driven_by(Drive.DISPLACEMENT)
+    for kind in (held, ~held):  # tendons driven alike have one scale
         span[kind] = max(span[kind].max(initial=0.0), 1e-9)
     u = [i.command / span for i in inputs]
-    slopes = [_slope(i, w) for i, w in zip(inputs, u, strict=True)]
+    slopes = [slope(i, w) for i, w in zip(inputs, u, strict=True)]
     typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
     U, dU = np.concatenate(u), np.concatenate(slopes)
     loads = {
@@ -57,8 +57,8 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     warm = (warm - warm.mean()) / max(float(warm.std()), 0.5)
     n_tendon = U.shape[1]
     blocks: dict[str, list[tuple[str, np.ndarray]]] = {c: [] for c in COMPONENTS}
-    kinds = zip(bench.by_length, bench.by_current, strict=True)
-    T = [f"{'d' if length else 'I' if current else 'T'}{i + 1}" for i, (length, current) in enumerate(kinds)]
+    letter = {Drive.TENSION: "T", Drive.DISPLACEMENT: "d", Drive.CURRENT: "I"}
+    T = [f"{letter[d]}{i}" for i, d in enumerate(bench.drives, 1)]
     static = blocks["static"]
     static.append(("1", np.ones(len(U))))
     for a in range(n_tendon):
@@ -93,7 +93,7 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     return Regressors(np.stack(columns, axis=1), np.array(component), tuple(names))
 
 
-def _slope(inputs: Inputs, u: np.ndarray) -> np.ndarray:
+def slope(inputs: Inputs, u: np.ndarray) -> np.ndarray:
     """du/dt (n, n_tendon) of commands smoothed over three samples, so that noise alone makes no direction."""
     padded = np.pad(u, ((1, 1), (0, 0)), mode="edge")
     smooth = (padded[:-2] + padded[1:-1] + padded[2:]) / 3.0
@@ -162,9 +162,9 @@ class Evidence:
                 rows = self.member == g
                 for c in range(n_component):
                     block = np.ix_(rows, component == c)
-                    new[g, c] = explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else 1e-8
-            new = np.clip(new, 1e-8, 1e4)
-            settled = np.all((np.abs(np.log(new / variance)) < 0.05) | (new < NOTHING))
+                    new[g, c] = explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else LOWEST
+            new = np.clip(new, LOWEST, HIGHEST)
+            settled = np.all((np.abs(np.log(new / variance)) < SETTLED) | (new < NOTHING))
             variance = new
             if settled:
                 break

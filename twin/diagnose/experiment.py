@@ -12,12 +12,10 @@ import numpy as np
 
 from twin.bench import Bench, Inputs
 from twin.calibrate import Evaluation, Fit, Objective
+from twin.diagnose.thresholds import CLEAR, HEAVIEST, HELD, LEAST_LOAD, MOST_RUNS
+from twin.effects import Drive
 from twin.errors import SolveError
 from twin.residual import Noise, Whitener
-from twin.robots import Jaw
-
-ENOUGH = 25.0
-RATE = 2.0  # samples a second
 
 
 @dataclass(frozen=True)
@@ -41,40 +39,41 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
     """
     n = bench.n_tendon
     top = np.max([i.command.max(axis=0) for i in bench.inputs], axis=0)
-    top = np.where(bench.by_length, np.max(top[bench.by_length], initial=0.0), np.max(top[~bench.by_length], initial=0.0))
-    words = [
-        f"{1e3 * x:.1f} mm" if length else f"{x:.1f} {'A' if current else 'N'}"
-        for x, length, current in zip(top, bench.by_length, bench.by_current, strict=True)
-    ]
+    held = bench.driven_by(Drive.DISPLACEMENT)
+    top = np.where(held, np.max(top[held], initial=0.0), np.max(top[~held], initial=0.0))
+    words = [f"{_shown(d.shown[1] * x)} {d.shown[0]}" for x, d in zip(top, bench.drives, strict=True)]
     like = bench.inputs[0]
     bare = replace(like.loads, force=np.zeros(3))
-    if isinstance(bench.robot.build(), Jaw):
+    if "torque" in bench.robot.build().loads.values():
         torques = [float(np.mean(i.loads.torque)) for i in bench.inputs]
         least, most = min(torques), max(torques)
         loaded = [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]
     else:
         heaviest = max(i.loads.payload for i in bench.inputs)
-        payloads = sorted({0.0, min(0.03, max(0.01, 3.0 * heaviest))})
+        payloads = sorted({0.0, min(HEAVIEST, max(LEAST_LOAD, 3.0 * heaviest))})
         loaded = [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
     def add(label: str, duration: float, *shares: np.ndarray) -> None:
         pull = np.stack(shares, axis=1)
-        command = top * np.where(bench.by_length & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
+        command = top * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
         shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
-    hold = np.concatenate([[0.0], np.full(60, 0.75)])
-    for i in range(n):
+    up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
+    hold = np.concatenate([[0.0], np.full(60, HELD)])
+    for i in np.flatnonzero(top > 0.0):  # what was never commanded has no range to stay within
         alone = np.eye(n)[i]
-        what, fast = (f"spring {i + 1}", 40.0) if bench.by_current[i] else (f"tendon {i + 1}", 4.0)
-        pull = f"heat {what} with up" if bench.by_current[i] else f"pull {what}"
+        what, fast = (f"spring {i + 1}", 40.0) if bench.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", 4.0)
+        pull = f"heat {what} with up" if bench.drives[i] is Drive.CURRENT else f"pull {what}"
         add(f"{pull} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
         add(f"{pull} to {words[i]} and release it, fast ({fast:.0f} s)", fast, *np.outer(alone, up_down))
+        again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly (240 s)"
+        add(again, 240.0, *np.outer(alone, up_half_up_down))
         add(f"step {what} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
     turns = np.linspace(0, 4 * np.pi, 80)
     circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
-    if not bench.by_length.any():
+    if not held.any() and top.all():
         add(f"two circles with all tendons up to 0.6 of {words[0]} (160 s)", 160.0, *circle)
     add("rest unloaded for 60 s", 60.0, *np.zeros((n, 30)))
     last = max(float(i.clock[-1]) for i in bench.inputs)
@@ -83,8 +82,12 @@ def menu(bench: Bench) -> list[tuple[str, Inputs]]:
         for motion, time, command in shapes:
             label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
-            out.append((label, Inputs(label, time, last + 60.0 + time, command, bench.by_length, warm, loads, bench.by_current)))
+            out.append((label, Inputs(label, time, last + 60.0 + time, command, bench.drives, warm, loads)))
     return out
+
+
+def _shown(x: float) -> str:
+    return f"{x:.1f}" if x >= 1.0 else f"{x:.2g}"
 
 
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
@@ -112,8 +115,8 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         except SolveError:  # a neighbour of b has no equilibrium there: no trial to send anyone to
             continue
         if best is None or best.separation < T:
-            best = Experiment(words, inputs, T, max(1, int(np.ceil(ENOUGH / max(T, 1e-9)))), rivals)
-    return best if best is not None and best.repeats <= 50 else None
+            best = Experiment(words, inputs, T, max(1, int(np.ceil(CLEAR / max(T, 1e-9)))), rivals)
+    return best if best is not None and best.repeats <= MOST_RUNS else None
 
 
 def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> float:

@@ -17,11 +17,10 @@ import numpy as np
 
 from twin.calibrate import Fit, Objective
 from twin.diagnose.design import shortcomings
-from twin.diagnose.screen import Dictionary, Pattern, projected
+from twin.diagnose.patterns import Dictionary, Pattern
+from twin.diagnose.ranking import projected
+from twin.diagnose.thresholds import CLEAR, INVISIBLE
 from twin.effects import named
-
-CLEAR = 25.0  # five standard errors, squared
-INVISIBLE = 1e-6  # of a pattern: what is left of it when the robot's own parameters have imitated the rest
 
 
 @dataclass(frozen=True)

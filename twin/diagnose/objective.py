@@ -10,20 +10,18 @@ import numpy as np
 from twin.bench import Bench
 from twin.calibrate import Model, Objective, fit
 from twin.diagnose.diagnosis import Settings
+from twin.effects import Drive
+from twin.evaluate import TYPICAL
 from twin.residual import Noise, Whitener, estimate_noise
 from twin.springs.heat import memory
-from twin.twin import Trace, Twin, readings, report, simulate
-
-ROUGHLY = {  # noise, SI, by group
-    "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "angle": 2e-3, "torque": 1e-3,
-}  # fmt: skip
+from twin.twin import Trace, Twin, Way, readings, report, simulate
 
 
 def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:
     """A first calibration under a guessed noise, and the objective every later fit uses."""
     measured = [bench.measured[k] for k in fitted]
     command = [bench.inputs[k].command for k in fitted]
-    rough = np.array([o.channel.noise or ROUGHLY[o.group] for o in bench.outputs])
+    rough = np.array([o.channel.noise or TYPICAL[o.group] for o in bench.outputs])
     first = Noise(rough, np.zeros(bench.n_tendon), np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, bench.n_tendon)) for y in measured]
     rough_fit = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)
@@ -44,15 +42,15 @@ def sensitivity(
     """
     out = [np.zeros((*y.shape, bench.n_tendon)) for y in predicted]
     felt = np.ones((len(out), bench.n_tendon))
-    if bench.by_current.any():
+    if Drive.CURRENT in bench.drives:
         rows = np.array([[np.median(np.diff(bench.inputs[k].time))] for k in trials])
         averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * memory(bench.robot.springs(bench.n_tendon)))))
-        felt = np.where(bench.by_current, averaged, felt)
+        felt = np.where(bench.driven_by(Drive.CURRENT), averaged, felt)
     for t in range(bench.n_tendon):
         step = 2.0 * bench.reading[t]
         push = step * np.eye(bench.n_tendon)[t]
         moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
-        traces = simulate(twin, moved, trials=trials, near=near)
+        traces = simulate(twin, moved, trials=trials, way=Way(near))
         for G, y, trace, share in zip(out, predicted, traces, felt[:, t], strict=True):
             G[:, :, t] = share * (readings(bench, report(twin.effects, trace.true)) - y) / step
     return out

@@ -14,10 +14,7 @@ import numpy as np
 
 from twin.bench import Bench
 from twin.calibrate import Fit, prior_weight
-
-ROUNDS = 20
-FEWEST = 2  # trials a group must have
-WORTH = 0.2  # sigma (RMS over all samples) that a second robot must take off what one leaves
+from twin.diagnose.thresholds import GROUP, TURNS, WORTH
 
 
 @dataclass(frozen=True)
@@ -53,14 +50,14 @@ def rigs(bench: Bench, trials: Sequence[int], fitted: Fit) -> Rigs | None:
         # From each trial in turn: with the half of the others that its own robot suits best.
         start = costs(np.linalg.solve(H[seed] + P, g[seed]))
         side = start <= np.median(start)
-        for _ in range(ROUNDS):
-            if not FEWEST <= side.sum() <= len(trials) - FEWEST:
+        for _ in range(TURNS):
+            if not GROUP <= side.sum() <= len(trials) - GROUP:
                 break
             again = costs(shift(side)) < costs(shift(~side))
             if (again == side).all():
                 break
             side = again
-        if FEWEST <= side.sum() <= len(trials) - FEWEST and (gain := fall(side) + fall(~side)) > best:
+        if GROUP <= side.sum() <= len(trials) - GROUP and (gain := fall(side) + fall(~side)) > best:
             best, sides = gain, side
     n = int(np.count_nonzero(z))
     # As many parameters more, and a choice of sides for every trial.

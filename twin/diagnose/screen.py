@@ -1,165 +1,39 @@
-"""Which effects are worth a refit: how much of the residual the first-order pattern of each explains that the model cannot."""
+"""Stage `screen`: what each effect would do to these data first, what noise alone would show, and what the design can tell."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.bench import Bench
-from twin.calibrate import Fit, Model, Objective, prior_weight
-from twin.diagnose.evidence import Discrepancy, Evidence
-from twin.effects import Start, catalogue
-from twin.errors import SolveError, TwinError
-from twin.twin import Twin, report
+from twin.diagnose.identifiability import Visibility, identifiability
+from twin.diagnose.null import Thresholds, thresholds
+from twin.diagnose.patterns import Dictionary, dictionary
+from twin.diagnose.study import Study
+from twin.diagnose.weigh import Weighed
+from twin.evaluate import ACCURATE
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """An effect, where to start it, and the fall of |z|^2 its pattern promises less p log n: white, and beside the discrepancy."""
+class Screening:
+    """First-order patterns of all effects that may be missing, what counts on this design, and what it tells of each effect."""
 
-    effect: str
-    start: Start
-    gain_white: float
-    gain_beside: float
-
-    @property
-    def gain(self) -> float:
-        return max(self.gain_white, self.gain_beside)
+    patterns: Dictionary
+    bars: Thresholds
+    table: tuple[Visibility, ...]
 
 
-@dataclass(frozen=True)
-class Pattern:
-    """What an effect would do first: its start, the amplitudes switched on one by one, and where their columns stand."""
-
-    effect: str
-    start: Start
-    amplitudes: tuple[str, ...]
-    where: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Dictionary:
-    """First-order patterns of all effects not yet in a fitted model: white columns (n, n_column), per unit of each amplitude."""
-
-    patterns: tuple[Pattern, ...]
-    columns: np.ndarray
-
-    def beside(self, effects: Collection[str]) -> Dictionary:
-        """Without the patterns of these effects and of those akin to them."""
-        left = [p for p in self.patterns if p.effect not in effects and not set(catalogue()[p.effect].akin) & set(effects)]
-        return Dictionary(tuple(left), self.columns)
+def screen(study: Study, base: Weighed, seed: int) -> Screening:
+    """Before any effect is sought; `seed` draws the no-effect sets."""
+    patterns = dictionary(study.objective, base.fit)
+    study.progress("no-effect sets of this design")
+    bars = thresholds(study, base.fit, patterns, seed)
+    bars = replace(bars, material=max(bars.material, _accuracy(study)))
+    return Screening(patterns, bars, tuple(identifiability(study.objective, base.fit, patterns, bars.material)))
 
 
-def dictionary(objective: Objective, fit: Fit) -> Dictionary:
-    """Patterns of every effect of the catalogue that the model lacks, that finds what it needs and is not akin to one it has."""
-    bench = objective.bench
-    present = {e.id for e in fit.model.twin.effects}
-    predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces]
-    patterns: list[Pattern] = []
-    neighbours: dict[Twin, tuple[Model, float]] = {}
-    index: dict[Twin, int] = {}  # several starts may share a pattern
-    parts = bench.robot.build().parts
-    for identifier, law in catalogue().items():
-        if identifier in present or present & set(law.akin) or not law.needs <= parts:
-            continue
-        for start in law.starts(predicted, bench.n_tendon):
-            try:
-                models, names = _patterns(fit.model, bench, identifier, start)
-            except TwinError:
-                continue
-            where = tuple(index.setdefault(m.twin, len(index)) for m, _ in models)
-            patterns.append(Pattern(identifier, start, tuple(names), where))
-            neighbours |= {m.twin: (m, size) for m, size in models}
-    return Dictionary(tuple(patterns), _solvable_columns(objective, fit, list(neighbours.values())))
-
-
-def screen(
-    objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, known: Dictionary, top: int = 4
-) -> list[Candidate]:
-    """The `top` candidates by either measure, best first, at most two starts an effect.
-
-    With c the effect's white pattern (per free parameter), J the model's derivatives with their priors P and V the residual's
-    covariance (I, or I + Phi D Phi'): A = c' V^-1 c - c' V^-1 J (J' V^-1 J + P)^-1 J' V^-1 c, u = c' V^-1 z less the same
-    projection, gain = u' A^-1 u - p log n. A one-sided effect whose best amplitude is negative gains nothing.
-    """
-    both = np.concatenate([fit.J, known.columns, fit.z[:, None]], axis=1)
-    white, beside = (gains(both, X, fit, known, objective) for X in (both, evidence.whiten(discrepancy, both)))
-    found = [Candidate(p.effect, p.start, a, b) for p, a, b in zip(known.patterns, white, beside, strict=True)]
-    chosen: list[Candidate] = []
-    for key in ("gain_white", "gain_beside"):
-        taken = 0
-        for c in sorted(found, key=lambda c: -getattr(c, key)):
-            if taken == top or getattr(c, key) <= 0.0:
-                break
-            if c in chosen:
-                taken += 1
-            elif sum(o.effect == c.effect for o in chosen) < 2:
-                chosen.append(c)
-                taken += 1
-    return sorted(chosen, key=lambda c: -c.gain)
-
-
-def _patterns(model: Model, bench: Bench, identifier: str, start: Start) -> tuple[list[tuple[Model, float]], list[str]]:
-    """For each amplitude of the effect, the model with that amplitude alone switched on, and by how much."""
-    law = catalogue()[identifier]
-    off = {p.name: p.value for p in law.declared(bench.n_tendon)}
-    shape = {k: v for k, v in start.values.items() if k in law.shape}
-    names = [n for n in start.free if n not in law.shape]
-    models = []
-    for name in names:
-        value = start.values.get(name, off[name])
-        models.append((model.with_effect(identifier, {**shape, name: value}, (), bench.n_tendon), value - off[name]))
-    return models, names
-
-
-def _solvable_columns(objective: Objective, fit: Fit, neighbours: list[tuple[Model, float]]) -> np.ndarray:
-    """Columns of all neighbours; one that has no equilibrium gets a zero column and so no gain."""
-    try:
-        return objective.columns(fit.evaluation, neighbours)
-    except SolveError:
-        out = np.zeros((fit.z.size, len(neighbours)))
-        for i, neighbour in enumerate(neighbours):
-            try:
-                out[:, i] = objective.columns(fit.evaluation, [neighbour])[:, 0]
-            except SolveError:
-                continue
-        return out
-
-
-def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
-    """X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X.
-
-    A parameter at an end of its range imitates nothing: it went as far as it may.
-    """
-    S = X.T @ VX
-    own = np.flatnonzero(~fit.at_bound())
-    JJ = S[np.ix_(own, own)] + np.diag(prior_weight(fit.model)[own] ** 2) + 1e-9 * np.eye(len(own))
-    return S - S[:, own] @ np.linalg.solve(JJ, S[own, :])
-
-
-def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective: Objective) -> list[float]:
-    """Gain of every pattern; X = [J, columns, z] and VX = V^-1 X."""
-    k = fit.J.shape[1]
-    left = projected(X, VX, fit)
-    raw = np.einsum("ni,ni->i", X, VX)
-    out = []
-    for pattern in known.patterns:
-        index = k + np.array(pattern.where)
-        A, u = left[np.ix_(index, index)], left[index, -1]
-        keep = np.diag(A) > 1e-6 * np.maximum(raw[index], 1e-12)
-        if not keep.any():
-            out.append(-np.inf)
-            continue
-        A, u = A[np.ix_(keep, keep)], u[keep]
-        # z falls by column * amplitude, columns being changes of the residual: amplitude = -A^-1 u
-        amplitude = -np.linalg.solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), u)
-        table = {p.name: p for p in catalogue()[pattern.effect].declared(objective.bench.n_tendon)}
-        used = [n for n, kept in zip(pattern.amplitudes, keep, strict=True) if kept]
-        one_sided = [table[n].low >= table[n].value for n in used]
-        if any(o and a < 0 for o, a in zip(one_sided, amplitude, strict=True)):
-            out.append(-np.inf)
-            continue
-        out.append(float(-u @ amplitude - len(used) * np.log(objective.n)))
-    return out
+def _accuracy(study: Study) -> float:
+    """The twin's own accuracy in sigmas of the outputs it is declared for: no less can be claimed."""
+    noise, outputs = study.objective.whitener.noise, study.bench.outputs
+    sigma = np.array([s for s, o in zip(noise.sigma, outputs, strict=True) if o.group in ACCURATE])
+    return study.bench.robot.accuracy / float(np.mean(sigma)) if sigma.size else 0.0

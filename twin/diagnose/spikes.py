@@ -8,12 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from twin.bench import Bench
-from twin.diagnose.objective import ROUGHLY
-
-WINDOW = 7  # rows: a spike lasts three at most
-FAR = 8.0  # typical departures from the median of the window; Student noise of 5 degrees goes so far once in 7,000 samples
-SHARED = 0.25  # of its part of a motion, and the same way within 60 deg: another marker that moves less was not moved by the body
-RARE = 0.05  # a marker of which more samples stand alone has no spikes but a fault
+from twin.diagnose.thresholds import RARE, SHARED, SPIKE, WINDOW
+from twin.evaluate import POINTS, TYPICAL
 
 
 def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench, list[str]]:
@@ -26,15 +22,16 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
     """
     markers: dict[str, list[int]] = {}
     for column, output in enumerate(bench.outputs):
-        if output.group == "marker":
+        if output.group in POINTS:
             markers.setdefault(output.channel.name.rsplit("_", 1)[0], []).append(column)
     columns = [np.array(c) for c in markers.values()]
-    if len(columns) < 2:
+    trials = [k for k, y in enumerate(bench.measured) if np.isfinite(y).any()]  # the others are sealed, or empty
+    if len(columns) < 2 or not trials:
         return bench, []
-    departed = [_departure(y - p, columns) for y, p in zip(bench.measured, predicted, strict=True)]
+    departed = [_departure(bench.measured[k] - predicted[k], columns) for k in trials]
     moved = np.concatenate([y - y.mean(axis=0) for y in predicted])
     travel = np.array([np.sqrt((moved[:, c] ** 2).sum(axis=1).mean()) for c in columns]) + 1e-9
-    declared = np.array([bench.outputs[c[0]].channel.noise or ROUGHLY["marker"] for c in columns])
+    declared = np.array([bench.outputs[c[0]].channel.noise or TYPICAL[bench.outputs[c[0]].group] for c in columns])
     alone = _alone(np.concatenate(departed), travel, declared)
     counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
     faulty = {name for name, count in counts.items() if count > RARE * len(alone)}
@@ -51,9 +48,9 @@ def without_spikes(bench: Bench, predicted: Sequence[np.ndarray]) -> tuple[Bench
             f"spikes left out, off their neighbours in time and no motion of the body (samples: {told}), up to {far:.1f} mm"
         )
     measured = [y.copy() for y in bench.measured]
-    for y, hit in zip(measured, np.split(alone, np.cumsum([len(x) for x in departed])[:-1]), strict=True):
+    for k, hit in zip(trials, np.split(alone, np.cumsum([len(x) for x in departed])[:-1]), strict=True):
         for j, column in enumerate(columns):
-            y[np.ix_(hit[:, j], column)] = np.nan
+            measured[k][np.ix_(hit[:, j], column)] = np.nan
     return replace(bench, measured=tuple(measured)), words
 
 
@@ -85,9 +82,9 @@ def _alone(departed: np.ndarray, travel: np.ndarray, noise: np.ndarray) -> np.nd
     size = _size(departed)
     seen = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in size.T])
     typical = np.maximum(seen, noise)  # markers that mostly stand still, or of a coarse camera, depart by nothing
-    rows, own = np.nonzero(size > FAR * typical)
+    rows, own = np.nonzero(size > SPIKE * typical)
     theirs = (size[rows, own] / travel[own])[:, None] * travel  # what the others' part would be
-    telling = (theirs > FAR * typical) & np.isfinite(size[rows]) & (np.arange(len(travel)) != own[:, None])
+    telling = (theirs > SPIKE * typical) & np.isfinite(size[rows]) & (np.arange(len(travel)) != own[:, None])
     along = np.einsum("kmx,kx->km", departed[rows], departed[rows, own])
     alike = along > 0.5 * size[rows] * size[rows, own][:, None]
     shared = telling & alike & (size[rows] > SHARED * theirs)

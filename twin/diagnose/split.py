@@ -1,24 +1,65 @@
-"""Which trials no fit may see: about a quarter, drawn by the seed, never one of a repeated pair while others are left."""
+"""Which trials are sealed: about a quarter, by what was done in them and the seed, never by what was measured."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from twin.bench import Bench
+from twin.diagnose.design import longest_rest, pulled, rates
+from twin.diagnose.thresholds import EDGE, PACE, SEALED, STEADY
 from twin.residual import repeats
 
-SHARE = 0.25
 
+def split(bench: Bench, seed: int) -> tuple[list[int], list[int]]:
+    """(fitted, sealed) trials, both in order of the clock.
 
-def split(bench: Bench, seed: int, shown: Collection[int] = ()) -> tuple[list[int], list[int]]:
-    """(fitted, held out) trials, both in order of the clock. Repeats stay with the fitted ones, which need them for the noise, and
-    so do the trials `shown`."""
+    What only one of the trials still open shows (a payload, a mount, a kind of motion, an end of a range) is sealed last, and so
+    are repeats, which the noise is read from.
+    """
     n = len(bench.inputs)
+    shown = list(_conditions(bench))
     repeated = {k for pair in repeats(bench) for k in pair}
-    wanted = max(1, round(SHARE * n))
-    order = np.random.default_rng(seed).permutation(n)
-    preferred = [int(k) for k in order if k not in repeated] + [int(k) for k in order if k in repeated]
-    held = sorted([k for k in preferred if k not in shown][:wanted])
-    return [k for k in range(n) if k not in held], held
+    place = np.random.default_rng(seed).permutation(n)
+    open_, wanted = set(range(n)), max(1, round(SEALED * n))
+    while n - len(open_) < wanted:
+        count = Counter(c for k in open_ for c in shown[k])
+        lost = {k: sum(count[c] == 1 for c in shown[k]) for k in open_}
+        open_.remove(min(open_, key=lambda k: (lost[k] + (k in repeated), k in repeated, place[k])))
+    return sorted(open_), [k for k in range(n) if k not in open_]
+
+
+def blind(bench: Bench, trials: Sequence[int]) -> Bench:
+    """The bench with nothing measured on these trials; their inputs stay, which a body remembers."""
+    measured = [np.full_like(y, np.nan) if k in trials else y for k, y in enumerate(bench.measured)]
+    return replace(bench, measured=tuple(measured))
+
+
+def _conditions(bench: Bench) -> Iterator[set[Hashable]]:
+    """What each trial shows, by its inputs and conditions alone."""
+    tops = np.array([np.abs(i.command).max(axis=0) for i in bench.inputs])
+    ranges = {
+        "command": tops,
+        "torque": np.array([[np.mean(i.loads.torque)] for i in bench.inputs]),
+        "temperature": np.array([[i.temperature.mean()] for i in bench.inputs]),
+    }
+    for k, i in enumerate(bench.inputs):
+        moved = pulled(i, float(tops.max()))
+        shown: set[Hashable] = {
+            ("payload", round(i.loads.payload, 6)),
+            ("mount", *np.round(i.loads.gravity, 3)),
+            ("force", *np.round(i.loads.force, 3)),
+            ("together", *moved),
+            *(("pull of", t) for t in moved),
+            *(("pace", round(float(np.log(r) / np.log(PACE)))) for r in rates(i, float(tops.max()))),
+        }
+        if longest_rest(i, float(tops.max())) >= STEADY:
+            shown.add("hold")
+        for name, values in ranges.items():
+            span = np.ptp(values, axis=0)
+            shown |= {("most", name, c) for c in np.flatnonzero(values[k] >= values.max(axis=0) - EDGE * span) if span[c] > 0}
+            shown |= {("least", name, c) for c in np.flatnonzero(values[k] <= values.min(axis=0) + EDGE * span) if span[c] > 0}
+        yield shown

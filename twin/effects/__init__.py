@@ -10,10 +10,22 @@ import importlib
 import pkgutil
 from functools import cache
 
-from twin.effects.effect import Creep, Effect, Loads, Route, Signals, Start
+from twin.effects.effect import Creep, Drive, Drives, Effect, Loads, Route, Signals, Start, driven_by
 from twin.errors import UnknownNameError
 
-__all__ = ["Creep", "Effect", "Loads", "Route", "Signals", "Start", "catalogue", "named"]
+__all__ = [
+    "Creep",
+    "Drive",
+    "Drives",
+    "Effect",
+    "Loads",
+    "Route",
+    "Signals",
+    "Start",
+    "catalogue",
+    "driven_by",
+    "named",
+]
 
 
 @cache

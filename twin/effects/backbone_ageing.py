@@ -33,7 +33,7 @@ class BackboneAgeing(Effect):
         ),
     )
     guesses = ({"rate": 1e-5},)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"elasticity"})
     moves_with = "the time of day"
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ class BaseTilt(Effect):
     id = "base_tilt"
     parameters = tuple(Parameter(a, 0.0, "rad", -0.6, 0.6, "clamped by eye: a few degrees", std=0.1, scale=0.02) for a in ABOUT)
     guesses = ({"about_x": 0.02, "about_y": 0.02, "about_z": 0.02},)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"weight"})
     moves_with = "payload"
 
     def surround(self, loads: Loads) -> Loads:

@@ -20,6 +20,8 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,6 +29,32 @@ import numpy as np
 from twin.errors import TwinError
 from twin.quantities import Parameter, Values, overrides
 from twin.springs import Spring
+
+
+class Drive(StrEnum):
+    """What holds a tendon: a given tension (N), a given displacement at its motor (m), an SMA spring under a given current (A)."""
+
+    TENSION = "tension"
+    DISPLACEMENT = "displacement"
+    CURRENT = "current"
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """The unit people read it in, and how many of these one SI unit is."""
+        return {"tension": ("N", 1.0), "displacement": ("mm", 1e3), "current": ("A", 1.0)}[self]
+
+    @property
+    def reading(self) -> float:
+        """What one reading of it is typically good for (SI): 10 mN, 20 um, 3 mA."""
+        return {"tension": 0.01, "displacement": 2e-5, "current": 3e-3}[self]
+
+
+Drives = tuple[Drive, ...]  # one a tendon
+
+
+def driven_by(drives: Drives, kind: Drive) -> np.ndarray:
+    """(n_tendon,) whether a tendon is driven in this way."""
+    return np.array([d is kind for d in drives], bool)
 
 
 @dataclass(frozen=True)
@@ -70,10 +98,9 @@ class Signals:
     """The quantities of one trial that sensors see, true or reported; batch (sample) first.
 
     time (n,) s in the trial; clock (n,) s since the first trial; tension (n, n_tendon) N at the base; displacement (n, n_tendon) m
-    at the motor; markers (n, n_marker, 3) m; temperature (n,) K of the room; by_length (n_tendon,): driven by displacement, else by
-    tension or, where by_current (n_tendon,), through an SMA spring by its current (n, n_tendon) A; warmth (n, n_tendon) K, theirs.
-    On the way in (`command`, `drive`) what does not drive a tendon is zero. Of rigid joints, the driving drum the first: angle
-    (n, n_joint) rad, torque (n, n_joint) N m that acts on each from outside.
+    at the motor; markers (n, n_marker, 3) m; temperature (n,) K of the room; `drives`, what drives each tendon, and current
+    (n, n_tendon) A of the SMA springs. On the way in (`command`, `drive`) what does not drive a tendon is zero. `antagonists`: two
+    tendons pretensioned against each other on a rigid joint. `others`: further groups a body shows, by name, (n, n_port) SI.
     """
 
     time: np.ndarray
@@ -82,15 +109,35 @@ class Signals:
     displacement: np.ndarray
     markers: np.ndarray
     temperature: np.ndarray
-    by_length: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
-    by_current: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))
+    drives: Drives = (Drive.TENSION,)
     current: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
-    warmth: np.ndarray = field(default_factory=lambda: np.full((1, 1), np.nan))
-    angle: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
-    torque: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
+    antagonists: bool = False
+    others: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
 
-    def with_(self, **changes: np.ndarray) -> Signals:
+    @property
+    def by_length(self) -> np.ndarray:
+        """(n_tendon,) whether a displacement drives the tendon."""
+        return driven_by(self.drives, Drive.DISPLACEMENT)
+
+    @property
+    def by_current(self) -> np.ndarray:
+        """(n_tendon,) whether a current drives the tendon, through its SMA spring."""
+        return driven_by(self.drives, Drive.CURRENT)
+
+    @property
+    def command(self) -> np.ndarray:
+        """(n, n_tendon), SI: of each tendon what drives it."""
+        return np.where(self.by_length, self.displacement, np.where(self.by_current, self.current, self.tension))
+
+    def with_(self, **changes: Any) -> Signals:
         return replace(self, **changes)
+
+    def group(self, name: str) -> np.ndarray:
+        """A group by its name: "marker" (n, n_marker, 3), else (n, n_port, 1)."""
+        if name == "marker":
+            return self.markers
+        own = {"tension": self.tension, "displacement": self.displacement}
+        return (own | dict(self.others))[name][..., None]
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ class TemperatureSoftening(Effect):
     id = "temperature_softening"
     parameters = (Parameter("rate", 0.0, "1/K", -0.1, 0.1, "plastics near room temperature: 0.002-0.01", scale=0.003),)
     guesses = ({"rate": 0.005},)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"elasticity"})
     moves_with = "the room's temperature"
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:

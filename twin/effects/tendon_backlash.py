@@ -36,8 +36,9 @@ class TendonBacklash(Effect):
 
     Source: play operator (Krasnosel'skii and Pokrovskii). Worn gears, a loose coupling, a slack line: tenths of a millimetre.
 
+    >>> from twin.effects import Drive
     >>> u = np.array([[0.0], [1e-3], [0.5e-3]])
-    >>> s = Signals(u[:, 0], u[:, 0], 0 * u, u, np.zeros((3, 0, 3)), u[:, 0], np.array([True]))
+    >>> s = Signals(u[:, 0], u[:, 0], 0 * u, u, np.zeros((3, 0, 3)), u[:, 0], (Drive.DISPLACEMENT,))
     >>> (1e3 * TendonBacklash(gap=2e-4, swap=1e-4).drive(s).displacement[:, 0]).round(3).tolist()
     [0.0, 0.9, 0.6]
     """
@@ -51,14 +52,14 @@ class TendonBacklash(Effect):
     per_tendon = (Parameter("gap", 0.0, "m", 0.0, 2e-2, "one drive's, beside that of all; as gap", scale=5e-5),)
     shape = ("swap",)
     richer = ("slack",)
-    richer_needs = frozenset({"backbone"})
+    richer_needs = frozenset({"elasticity"})
     moves_with = "the direction of travel"
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """Play in all drives alike; and, of several that bend a body, in one that moves."""
         yield Start({"gap": GUESS}, ("gap", "swap"))
-        if n_tendon == 1 or any(s.angle.size for s in predicted):
+        if n_tendon == 1 or any(s.antagonists for s in predicted):
             return
         travel = np.ptp(np.concatenate([s.displacement for s in predicted]), axis=0)
         for i in np.flatnonzero(travel > GUESS) + 1:
@@ -76,7 +77,7 @@ class TendonBacklash(Effect):
         return self["gap"] + self.each("gap")
 
     def _side(self, signals: Signals) -> np.ndarray:
-        if signals.angle.size:
+        if signals.antagonists:
             return np.ones_like(signals.displacement)
         z = np.empty_like(signals.displacement)
         lead(np.ascontiguousarray(signals.displacement), self["swap"], z)

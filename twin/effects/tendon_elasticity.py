@@ -36,7 +36,7 @@ class TendonElasticity(Effect):
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """More stretch; of antagonists, which turn rigid joints, also stiffening: how they give under load and without tells it."""
         yield from super().starts(predicted, n_tendon)
-        if any(s.angle.size for s in predicted):
+        if any(s.antagonists for s in predicted):
             yield Start({"stiffening": 0.1}, ("stiffening",))
 
     def route(self) -> Route:

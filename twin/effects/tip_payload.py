@@ -21,7 +21,7 @@ class TipPayload(Effect):
     id = "tip_payload"
     parameters = (Parameter("mass", 0.0, "kg", 0.0, 0.1, "undeclared mass at the tip", scale=1e-3),)
     guesses = ({"mass": 2e-3},)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"weight"})
     moves_with = "the bending of the body under its weight"
 
     def surround(self, loads: Loads) -> Loads:

@@ -23,8 +23,9 @@ class TransmissionError(Effect):
     Source: first harmonic of a transmission's position error. A drum of radius R whose axis is off its centre by e has
     turn = 2 pi R and amplitude e; a gear's runout, an encoder off-centre, a hobby servo's crooked potentiometer do the same.
 
+    >>> from twin.effects import Drive
     >>> u, z = np.array([[0.0], [2.5e-3]]), np.zeros
-    >>> s = Signals(z(2), z(2), 0 * u, u, z((2, 0, 3)), z(2), np.array([True]))
+    >>> s = Signals(z(2), z(2), 0 * u, u, z((2, 0, 3)), z(2), (Drive.DISPLACEMENT,))
     >>> law = TransmissionError({"turn": 1e-2, "sine_1": 2e-4}, 1)
     >>> (1e3 * law.drive(s).displacement[:, 0]).round(3).tolist()
     [0.0, 2.7]
@@ -37,14 +38,14 @@ class TransmissionError(Effect):
         Parameter("cosine", 0.0, "m", -5e-3, 5e-3, "as sine", std=5e-4, scale=5e-5),
     )
     shape = ("turn",)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"elasticity"})
     moves_with = "the pull of one tendon, by how far it is drawn in"
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """The drives that move, all at once: they are of one make. Only where displacements command all tendons: where tensions do,
         a drive's error is its encoder's alone and bends nothing."""
-        held = [s.displacement[:, s.by_length] for s in predicted if s.by_length.all() and not s.angle.size]
+        held = [s.displacement[:, s.by_length] for s in predicted if s.by_length.all()]
         if not held:
             return
         all_of_them = np.concatenate(held)

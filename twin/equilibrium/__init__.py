@@ -4,58 +4,44 @@ engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic e
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
 move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
-trial.py    a trial, sample by sample             antagonists.py  a jaw between two tendons
-path.py     the equilibria of a trial
+trial.py    a trial, sample by sample                  antagonists.py  a jaw between two tendons
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path as File
 
 import mujoco
 import numpy as np
 
-from twin.effects import Creep, Loads, Route
-from twin.equilibrium.antagonists import Antagonists
-from twin.equilibrium.chain import Chain, Law, Load
+from twin.body import Path, Problem
+from twin.effects import Drive
+from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.lengths import STIFFEST
-from twin.equilibrium.path import DIRECT, FOLLOWED, NOT_FOUND, Path
-from twin.equilibrium.trial import Drive, run
+from twin.equilibrium.trial import Driving, Found, How, Near, Slow, run
 from twin.errors import SolveError
-from twin.robots import Body, available, hinge_pairs, load
-from twin.springs.spring import Spring, no_springs
+from twin.hinges import HingeChain, hinge_pairs
+from twin.springs.spring import no_springs
 
-TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
-
-__all__ = [
-    "DIRECT",
-    "FOLLOWED",
-    "NOT_FOUND",
-    "TOLERANCE",
-    "Antagonists",
-    "Equilibrium",
-    "Heating",
-    "Path",
-    "compile_solver",
-    "is_compiled",
-]
+__all__ = ["ChainPath", "Equilibrium", "is_compiled"]
 
 
-@dataclass(frozen=True)
-class Heating:
-    """SMA springs that pull the tendons `which` (n_tendon,), in surroundings at `ambient` (n,) K."""
+@dataclass(frozen=True, kw_only=True)
+class ChainPath(Path):
+    """The equilibria of a chain, with slip states and distal tendon lengths (n_tendon, n_disk) at the end. `others` holds the
+    temperature (n, n_tendon) K of its springs."""
 
-    which: np.ndarray
-    ambient: np.ndarray
-    spring: Spring
+    slip: np.ndarray
+    distal: np.ndarray
 
 
 class Equilibrium:
-    """A compiled robot ready to be solved. Holds a MuJoCo model and data, so one instance serves one thread at a time."""
+    """A compiled chain ready to be solved. Holds a MuJoCo model and data, so one instance serves one thread at a time."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: HingeChain) -> None:
         self.model = model = body.spec.compile()
         self.data = data = mujoco.MjData(model)
         site = np.vectorize(lambda name: model.site(name).id, otypes=[np.int64])
@@ -99,7 +85,7 @@ class Equilibrium:
             mass=model.body_subtreemass[moved_by].copy(),
             hole=hole,
             disk=disk,
-            marker=site(np.array(list(body.markers.values()))),
+            marker=site(np.array(body.markers)),
             first=np.concatenate([[0], hinges[model.site_bodyid[disk]]]),
         )
         self.spring = model.qpos_spring.copy()
@@ -107,91 +93,80 @@ class Equilibrium:
         ends = data.site_xpos[hole]
         self.straight_path: np.ndarray = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)  # (n_tendon,) m
 
-    def solve(
-        self, time: np.ndarray, command: np.ndarray, loads: Loads, route: Route | None = None, creep: Creep | None = None,
-        delayed: np.ndarray | None = None, near: Path | None = None, keep: bool = False, tolerance: float = TOLERANCE,
-        by_length: np.ndarray | None = None, stiffness: np.ndarray | None = None, once: bool = False,
-        heating: Heating | None = None,
-    ) -> Path:  # fmt: skip
-        """Equilibria for commands (n, n_tendon) at times (n,) s, in the order of `twin.equilibrium.trial`.
+    @property
+    def n_slow(self) -> int:
+        return int(self.model.nv)
 
-        A command is a base tension in N, for the tendons of `by_length` (n_tendon,) a displacement in m, for those of `heating` a
-        current in A that holds from one time to the next. `delayed` (n_element, nv) holds the creep strains and is advanced in
-        place. `stiffness` (n,) scales the body's. `near`, a solution with LU of a neighbouring problem on the same samples, speeds
-        the solve up; with `once` one Newton step a sample is taken from it. Where no equilibrium was found the sample's status is
-        NOT_FOUND and its shape is the one before. Raises SolveError for held lengths of tendons that stiffen.
-        """
-        n, nt = command.shape
-        nv = self.model.nv
-        route, creep = route or Route(), creep or Creep()
-        amplitude, retardation = np.array(creep.amplitude, float), np.array(creep.time, float)
-        if delayed is None:
-            delayed = np.zeros((amplitude.size, nv))
-        by_length = np.zeros(nt, bool) if by_length is None else by_length
-        if route.stiffening > 0.0 and by_length.any():
-            raise SolveError(f"a length held by a tendon that stiffens ({route.stiffening:.3g} 1/N) is solved for antagonists only")
-        heating = heating or Heating(np.zeros(nt, bool), np.zeros(n), no_springs(nt))
-        drive = Drive(
-            time=np.array(time, float),
-            command=np.where(by_length, command, np.maximum(command, 0.0)),
-            by_length=np.array(by_length, bool),
+    def statics(self, problem: Problem) -> Statics:
+        """What is in balance under the problem's loads."""
+        loads, route = problem.loads, problem.route
+        law = Law(float(route.mu), float(route.presliding), np.array(loads.wall, float))
+        load = Load(np.array(loads.gravity, float), float(loads.payload), np.array(loads.force, float))
+        return Statics(self.model._address, self.data._address, self.chain, self.spring, law, load)
+
+    def driving(self, problem: Problem) -> Driving:
+        """What drives the trial. Raises SolveError for held lengths of tendons that stiffen."""
+        n, nt = problem.command.shape
+        by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
+        if problem.route.stiffening > 0.0 and by_length.any():
+            raise SolveError(
+                f"a length held by a tendon that stiffens ({problem.route.stiffening:.3g} 1/N) is solved for antagonists only"
+            )
+        heating = problem.heating
+        return Driving(
+            time=np.array(problem.time, float),
+            command=np.where(by_length, problem.command, np.maximum(problem.command, 0.0)),
+            by_length=by_length,
+            by_spring=by_spring,
             straight=self.straight_path,
-            stretch=float(route.stretch),
+            stretch=float(problem.route.stretch),
             least_stretch=STIFFEST,
-            stiffness=np.ones(n) if stiffness is None else np.array(stiffness, float),
-            by_spring=np.array(heating.which, bool),
-            ambient=np.array(heating.ambient, float),
-            spring=Spring(*(np.array(v, float) for v in heating.spring)),
+            stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),
+            ambient=np.zeros(n) if heating is None else np.array(heating.ambient, float),
+            spring=_unsprung(nt) if heating is None else heating.spring.records,
         )
-        out = Path(
+
+    def solve(self, problem: Problem) -> ChainPath:
+        """Equilibria in the order of `twin.equilibrium.trial`.
+
+        Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before. Raises SolveError for held
+        lengths of tendons that stiffen.
+        """
+        (n, nt), nv, creep, near = problem.command.shape, self.n_slow, problem.creep, problem.near
+        amplitude = np.array(creep.amplitude, float)
+        delayed = np.zeros((amplitude.size, nv)) if problem.delayed is None else problem.delayed
+        nd = self.chain.hole.shape[1] - 1
+        state = State(np.zeros(nt), np.empty(nv), np.zeros((nt, nd)), np.zeros((nt, nd)))
+        found = Found(
+            LU=np.empty((n, nv, nv) if problem.keep else (0, nv, nv)),
+            q=np.empty((n, nv)),
             tension=np.empty((n, nt)),
             markers=np.empty((n, self.chain.marker.size, 3)),
             path=np.empty((n, nt)),
-            q=np.empty((n, nv)),
             temperature=np.empty((n, nt)),
             status=np.empty(n, np.int64),
-            started=0,
-            slip=np.zeros((nt, self.chain.hole.shape[1] - 1)),
-            distal=np.zeros((nt, self.chain.hole.shape[1] - 1)),
-            LU=np.empty((n, nv, nv) if keep else (0, nv, nv)),
         )
         started = run(
-            self.model._address,
-            self.data._address,
-            self.chain,
-            self.spring,
-            Law(float(route.mu), float(route.presliding), np.array(loads.wall, float)),
-            Load(np.array(loads.gravity, float), float(loads.payload), np.array(loads.force, float)),
-            amplitude,
-            retardation,
-            delayed,
-            drive,
-            near.q if near is not None else np.empty((0, nv)),
-            near.tension if near is not None else np.empty((0, nt)),
-            near.LU if near is not None else np.empty((0, nv, nv)),
-            float(tolerance),
-            keep,
-            once,
-            out.slip,
-            out.distal,
-            out.LU,
-            out.q,
-            out.tension,
-            out.markers,
-            out.path,
-            out.temperature,
-            out.status,
+            self.statics(problem),
+            self.driving(problem),
+            Slow(amplitude, np.array(creep.time, float), delayed),
+            Near(np.empty((0, nv)), np.empty((0, nt)), found.LU[:0]) if near is None else Near(near.q, near.tension, near.LU),
+            How(float(problem.tolerance), problem.keep, problem.once),
+            state,
+            found,
         )
-        return replace(out, started=int(started))
+        return ChainPath(
+            tension=found.tension, path=found.path, markers=found.markers, status=found.status, q=found.q,
+            others={"temperature": found.temperature}, started=int(started), LU=found.LU, slip=state.z, distal=state.s,
+        )  # fmt: skip
+
+
+@cache
+def _unsprung(n: int) -> np.ndarray:
+    """Records for n tendons that no spring pulls."""
+    return no_springs(n).records
 
 
 def is_compiled() -> bool:
     """Whether the compiled solver lies in numba's disk cache, so that a first solve takes no seconds."""
     return bool(run.stats.cache_path) and any(File(run.stats.cache_path).glob("trial.run*.nbi"))
-
-
-def compile_solver() -> None:
-    """Compile the static solve (or load it from disk) by solving nothing."""
-    bodies = (load(name).build() for name in available())
-    solver = Equilibrium(next(body for body in bodies if "backbone" in body.parts))
-    solver.solve(np.zeros(1), np.zeros((1, len(solver.chain.hole))), Loads(np.zeros(3)))

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiled import cross, dot, jit, put
+from twin.compiled import assign, cross, dot, inner, jit, put
 from twin.effects.tendon_friction import slip_state, turn
 from twin.equilibrium.elastic import springs
 
@@ -64,7 +64,63 @@ class Load(NamedTuple):
     force: np.ndarray  # (3,) N at the tip
 
 
+class Statics(NamedTuple):
+    """What is in balance: MuJoCo's model and data by address, the chain, its rest shape, and what acts on it."""
+
+    model: int
+    data: int
+    chain: Chain
+    rest: np.ndarray  # (nv,) phi0 of elastic.py
+    law: Law
+    load: Load
+
+
+class State(NamedTuple):
+    """Where the chain stands; a solve moves it in place."""
+
+    T: np.ndarray  # (n_tendon,) base tensions, N
+    q: np.ndarray  # (nv,) rad; m of slides
+    z: np.ndarray  # (n_tendon, n_disk) slip states when last at rest
+    s: np.ndarray  # (n_tendon, n_disk) distal tendon lengths then, m; [:, 0], which no hole needs, is dE/dT
+
+
+class Laid(NamedTuple):
+    """A tendon as it lies, by piece: direction, length (m), the angle it turns at the piece's start (rad), tension (N)."""
+
+    u: np.ndarray  # (n_disk, 3)
+    length: np.ndarray  # (n_disk,)
+    theta: np.ndarray  # (n_disk,)
+    T: np.ndarray  # (n_disk,)
+
+
+@inner
+def laid(nd):
+    """Room for a tendon of nd pieces."""
+    return Laid(np.empty((nd, 3)), np.empty(nd), np.empty(nd), np.empty(nd))
+
+
 @jit
+def copied(state):
+    return State(state.T.copy(), state.q.copy(), state.z.copy(), state.s.copy())
+
+
+@jit
+def become(state, other):
+    """state = other, in place."""
+    assign(state.T, other.T)
+    assign(state.q, other.q)
+    settle(state, other.z, other.s)
+
+
+@inner
+def settle(state, z, s):
+    """The slip states and distal lengths the state comes to rest with."""
+    for t in range(state.T.size):
+        assign(state.z[t], z[t])
+        assign(state.s[t], s[t])
+
+
+@inner
 def lever(chain, i, point):
     """Velocity of `point`, distal of joint i, for unit speed of that joint."""
     axis, anchor, h = chain.axis[i], chain.anchor[i], chain.hinge[i]
@@ -73,7 +129,7 @@ def lever(chain, i, point):
     return h * c[0] + s * axis[0], h * c[1] + s * axis[1], h * c[2] + s * axis[2]
 
 
-@jit
+@inner
 def turned(chain, i, v):
     """Velocity of a vector v that is fixed distal of joint i, for unit speed of that joint: a slide turns nothing."""
     c = cross(chain.axis[i], v)
@@ -81,7 +137,7 @@ def turned(chain, i, v):
     return h * c[0], h * c[1], h * c[2]
 
 
-@jit
+@inner
 def _add_weight(chain, load, r, J):
     nv = r.shape[0]
     g, tip = load.gravity, chain.site[chain.disk[-1]]
@@ -114,7 +170,7 @@ def _add_weight(chain, load, r, J):
                     J[j, i] += h
 
 
-@jit
+@inner
 def wall_force(chain, wall, r, J):
     """Penalty force k max(0, -gap) along the wall's normal at each disk centre, added to r and, unless it is empty, J."""
     normal, stiffness = (wall[0], wall[1], wall[2]), wall[4]
@@ -139,10 +195,10 @@ def wall_force(chain, wall, r, J):
                         J[j, i] += h
 
 
-@jit
-def lay(chain, t, u, length, theta, distal):
-    """Tendon t as it lies: by piece its direction u (n_disk, 3), length and what lies beyond its start (n_disk,), all in m; by hole
-    the angle theta (n_disk,) it turns there, rad."""
+@inner
+def lay(chain, t, tendon, distal):
+    """Lays tendon t: all of `tendon` but its tensions, and what lies beyond the start of each piece, distal (n_disk,) m."""
+    u, length, theta = tendon.u, tendon.length, tendon.theta
     nd = length.size
     for d in range(nd):
         a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
@@ -159,9 +215,10 @@ def lay(chain, t, u, length, theta, distal):
         theta[d] = np.arctan2(np.sqrt(dot(v, v)), dot(u[d - 1], u[d]))
 
 
-@jit
-def pass_on(tension, law, theta, z0, s0, s, z, T):
-    """Tensions T (n_disk,) by piece under that at the base, and slip states z at distal lengths s, after (z0, s0)."""
+@inner
+def pass_on(tension, law, tendon, z0, s0, s, z):
+    """Tensions of the pieces under that at the base, and slip states z at distal lengths s, after (z0, s0)."""
+    T, theta = tendon.T, tendon.theta
     T[0], z[0], wrapped = tension, 0.0, 0.0
     for d in range(1, T.size):
         z[d] = slip_state(z0[d], s0[d] - s[d], law.presliding)
@@ -170,33 +227,28 @@ def pass_on(tension, law, theta, z0, s0, s, z, T):
 
 
 @jit
-def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
-    """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), at angles q already in MuJoCo's data; returns what
-    the bowing of the pressed backbone takes from each tendon's path (m, negative).
+def balance(at, state, z, s, r, J):
+    """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), of the `state` whose angles are in MuJoCo's data
+    already; returns what the bowing of the pressed backbone takes from each tendon's path (m, negative).
 
-    (z0, s0) (n_tendon, n_disk) is the slip state and distal cable length of each hole when last at rest; (z, s) is what they are
-    at q; s[:, 0], which no hole needs, is dE/dT: the whole path less that.
+    (z, s) (n_tendon, n_disk) is what slip states and distal lengths become there.
     """
+    chain, law, tension = at.chain, at.law, state.T
     nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
-    nv, tangent = q.shape[0], J.size > 0
+    nv, tangent = state.q.size, J.size > 0
     pressure = 0.0
     for t in range(nt):
         pressure += tension[t]
-    bowing = springs(q, rest, chain, pressure, r, J)
-    _add_weight(chain, load, r, J)
+    bowing = springs(state.q, at.rest, chain, pressure, r, J)
+    _add_weight(chain, at.load, r, J)
     if law.wall[4] > 0.0:
         wall_force(chain, law.wall, r, J)
-    u = np.empty((nd, 3))
-    length = np.empty(nd)
-    theta = np.empty(nd)
-    T = np.empty(nd)
-    X = np.empty((nv, 3))
-    dl = np.zeros(nv)
-    dlog = np.empty(nv)
+    tendon, X, dl = laid(nd), np.empty((nv, 3)), np.zeros(nv)
+    u, T = tendon.u, tendon.T
     for t in range(nt):
-        lay(chain, t, u, length, theta, s[t])
+        lay(chain, t, tendon, s[t])
         s[t, 0] += bowing
-        pass_on(tension[t], law, theta, z0[t], s0[t], s[t], z[t], T)
+        pass_on(tension[t], law, tendon, state.z[t], state.s[t], s[t], z[t])
         for d in range(nd):
             b = chain.site[chain.hole[t, d + 1]]
             for i in range(chain.first[d], chain.first[d + 1]):
@@ -208,32 +260,36 @@ def balance(q, rest, chain, tension, law, load, z0, s0, z, s, r, J):
                 if tangent:
                     b = turned(chain, i, u[d])
                     for k in range(i, chain.first[d + 1]):
-                        h = T[d] * ((dot(X[i], X[k]) - dl[i] * dl[k]) / length[d] - dot(b, X[k]))
+                        h = T[d] * ((dot(X[i], X[k]) - dl[i] * dl[k]) / tendon.length[d] - dot(b, X[k]))
                         J[k, i] += h
                         if k > i:
                             J[i, k] += h
-        if not (tangent and law.mu > 0.0 and tension[t] > 0.0):
-            continue
-        for i in range(nv):
-            dlog[i] = 0.0  # derivative of sum_{j<=d} z_j turn(theta_j)
-        for d in range(1, nd):
-            p, v = u[d - 1], u[d]
-            co = dot(p, v)
-            rounded, slope = turn(theta[d])
-            sine = np.sin(theta[d])
-            f = -z[t, d] * slope / sine if theta[d] > 1e-9 else -z[t, d] * 1e3
-            w = (p[0] - co * v[0], p[1] - co * v[1], p[2] - co * v[2])
-            y = (v[0] - co * p[0], v[1] - co * p[1], v[2] - co * p[2])
-            m = cross(v, p)
-            for i in range(chain.first[d - 1], chain.first[d]):
-                dlog[i] += f * (dot(y, X[i]) / length[d - 1] + chain.hinge[i] * dot(chain.axis[i], m))
-            for i in range(chain.first[d], chain.first[d + 1]):
-                dlog[i] += f * dot(w, X[i]) / length[d]
-            if abs(z[t, d]) < 1.0:
-                for i in range(chain.first[d], nv):
-                    dlog[i] -= rounded / law.presliding * dl[i]
-            for i in range(chain.first[d], chain.first[d + 1]):
-                f = -law.mu * T[d] * dl[i]
-                for j in range(nv):
-                    J[i, j] += f * dlog[j]
+        if tangent and law.mu > 0.0 and tension[t] > 0.0:
+            _add_friction(chain, law, tendon, z[t], X, dl, J)
     return bowing
+
+
+@inner
+def _add_friction(chain, law, tendon, z, X, dl, J):
+    """What J gains as the tension that friction leaves changes with the angles: a rank-one block a piece of the tendon."""
+    nv, u, length = dl.size, tendon.u, tendon.length
+    dlog = np.zeros(nv)  # derivative of sum_{j<=d} z_j turn(theta_j)
+    for d in range(1, length.size):
+        p, v, theta = u[d - 1], u[d], tendon.theta[d]
+        co = dot(p, v)
+        rounded, slope = turn(theta)
+        f = -z[d] * slope / np.sin(theta) if theta > 1e-9 else -z[d] * 1e3
+        w = (p[0] - co * v[0], p[1] - co * v[1], p[2] - co * v[2])
+        y = (v[0] - co * p[0], v[1] - co * p[1], v[2] - co * p[2])
+        m = cross(v, p)
+        for i in range(chain.first[d - 1], chain.first[d]):
+            dlog[i] += f * (dot(y, X[i]) / length[d - 1] + chain.hinge[i] * dot(chain.axis[i], m))
+        for i in range(chain.first[d], chain.first[d + 1]):
+            dlog[i] += f * dot(w, X[i]) / length[d]
+        if abs(z[d]) < 1.0:
+            for i in range(chain.first[d], nv):
+                dlog[i] -= rounded / law.presliding * dl[i]
+        for i in range(chain.first[d], chain.first[d + 1]):
+            f = -law.mu * tendon.T[d] * dl[i]
+            for j in range(nv):
+                J[i, j] += f * dlog[j]

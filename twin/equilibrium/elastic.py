@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.compiled import jit
-from twin.equilibrium.hyperelastic import soften_and_press
+from twin.compiled import inner
+from twin.equilibrium.hyperelastic import Bent, soften_and_press
 
 COUPLING = 1.0 / 6.0
 BEAM_COLUMN = 720.0
@@ -28,7 +28,7 @@ SMALL = 0.02  # of sin^2 of half the angle: below it (16 degrees) the series are
 PROBE = 1e-6  # rad, for the derivative of dphi/dq
 
 
-@jit
+@inner
 def bending(q, i, hand, phi, D):
     """phi (3,) and dphi/dq D (3, 3) of the set whose hinges are i, i+1, i+2, in its hinge axes; `hand` = e1 x e2 . e3.
 
@@ -70,7 +70,7 @@ def bending(q, i, hand, phi, D):
         D[2, m] = u2 + 0.5 * v2 + k * hand * (a * v1 - b * v0)
 
 
-@jit
+@inner
 def bendings(q, chain, phi, D):
     """phi (nv,) and dphi/dq D (n_set, 3, 3) of all sets; a slide is its own phi."""
     for j in range(chain.hand.size):
@@ -80,15 +80,16 @@ def bendings(q, chain, phi, D):
         phi[i] = q[i]
 
 
-@jit
+@inner
 def springs(q, rest, chain, pressure, r, J):
     """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv); returns dE/dP (m), which bowing takes from all tendons'
     lengths. `rest` is phi0 (nv,), `pressure` P the sum of the tendons' tensions (N).
     """
     nv, hand, partner, coupling, stiffness = q.size, chain.hand, chain.partner, chain.coupling, chain.stiffness
-    phi, D, m = np.empty(nv), np.empty((hand.size, 3, 3)), np.empty(nv)
+    bent = Bent(np.empty(nv), np.empty((hand.size, 3, 3)), np.empty(nv), np.empty(nv))
+    phi, D, K, m = bent.phi, bent.D, bent.K, bent.m
     bendings(q, chain, phi, D)
-    K, bowing = np.empty(nv), 0.0
+    bowing = 0.0
     for i in range(nv):
         p = partner[i]
         softer = stiffness[i] * pressure * chain.slender[i] ** 2 / BEAM_COLUMN
@@ -101,7 +102,7 @@ def springs(q, rest, chain, pressure, r, J):
                 J[i, k] = 0.0
     for j in range(hand.size):
         if chain.slide.size:
-            soften_and_press(j, q, rest, chain, phi, D, K, m, r, J)
+            soften_and_press(j, q, rest, chain, bent, r, J)
         o = chain.bends[j]
         for b in range(3):
             r[o + b] = D[j, 0, b] * m[o] + D[j, 1, b] * m[o + 1] + D[j, 2, b] * m[o + 2]

@@ -16,13 +16,17 @@ rod that stretches and bends by Hooke's law, 1 the one above.
 
 from __future__ import annotations
 
-from twin.compiled import jit
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.compiled import inner
 
 SHORTEST = 0.1  # of the rest length: beyond it nothing is believed, and the step that led there is refused
 REFUSED = 1e300
 
 
-@jit
+@inner
 def axial(stretch, share):
     """Axial force over EA and its slope: (lambda - lambda^-2) / 3 of the neo-Hookean `share`, lambda - 1 of the Hookean rest."""
     inverse = 1.0 / stretch
@@ -30,7 +34,7 @@ def axial(stretch, share):
     return share * force + (1.0 - share) * (stretch - 1.0), share * slope + 1.0 - share
 
 
-@jit
+@inner
 def bend(stretch, share):
     """1 + share (b - 1), its first and second derivative."""
     a = 1.0 / stretch
@@ -39,20 +43,30 @@ def bend(stretch, share):
     return 1.0 + share * (b - 1.0), -share * (a2 + 8.0 * a2 * a2 * a) / 3.0, share * (2.0 * a2 * a + 40.0 * a2 * a2 * a2) / 3.0
 
 
-@jit
+@inner
 def twist(stretch, share):
     """1 + share (t - 1), its first and second derivative."""
     a = 1.0 / stretch
     return 1.0 + share * (a - 1.0), -share * a * a, 2.0 * share * a * a * a
 
 
-@jit
-def soften_and_press(j, q, rest, chain, phi, D, K, m, r, J):
+class Bent(NamedTuple):
+    """The chain as it is bent: rotation vectors phi and dphi/dq by set, stiffness and moment, (nv,) each but D."""
+
+    phi: np.ndarray
+    D: np.ndarray  # (n_set, 3, 3)
+    K: np.ndarray
+    m: np.ndarray
+
+
+@inner
+def soften_and_press(j, q, rest, chain, bent, r, J):
     """What stretch changes in set j: its slide's own force, and that of bending and twist felt along it.
 
-    On entry K (nv,) and m (nv,) are stiffness and moment of the linear rod; on return those at the set's stretch, with r and,
+    On entry bent.K and bent.m are stiffness and moment of the linear rod; on return those at the set's stretch, with r and,
     unless J is empty, J of the slide's rows and columns.
     """
+    phi, D, K, m = bent.phi, bent.D, bent.K, bent.m
     i, first = chain.slide[j], chain.bends[j]
     h = chain.unit[i]
     stretch = 1.0 + (q[i] - rest[i]) / h

@@ -18,13 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiled import assign, dot, jit
+from twin.compiled import assign, dot, inner, jit
 from twin.effects.tendon_friction import turn
-from twin.equilibrium.chain import balance, lever
+from twin.equilibrium.chain import balance, copied, lever, settle
 from twin.equilibrium.linear import factorise, substitute
 from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, commit, place
 from twin.springs.force import piece
-from twin.springs.spring import Spring
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
 STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
@@ -46,19 +45,19 @@ class Held(NamedTuple):
     straight: np.ndarray  # m, path lengths on the straight robot
     elastic: float  # m/N, stretch of the tendon alone
     factor: np.ndarray  # (1,)
-    spring: Spring
+    spring: np.ndarray  # (n_tendon,) `Spring.records`
     temperature: np.ndarray  # K, of the springs
     elongation: np.ndarray  # m, of the springs when they last were at rest
     tension: np.ndarray  # N, theirs then
 
 
-@jit
+@inner
 def elongation(held, t, path, tension):
     """Elongation (m) of the spring that pulls tendon t at a path length (m) and a tension."""
-    return held.spring.initial_elongation[t] + path - held.straight[t] - held.elastic * tension / held.factor[0]
+    return held.spring[t].initial_elongation + path - held.straight[t] - held.elastic * tension / held.factor[0]
 
 
-@jit
+@inner
 def linearise(held, s, tension):
     """Free length and stretch of the tendons that springs hold, from the piece of their law they are on; s[t, 0] is the path."""
     for t in range(tension.size):
@@ -70,7 +69,7 @@ def linearise(held, s, tension):
             held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
 
 
-@jit
+@inner
 def longer(held, i, j):
     """How much (m/N) tendon j's tension gives tendon i, both held: by i's own stretch and by the backbone's compression."""
     own = held.stretch[i] if i == j else 0.0
@@ -79,7 +78,7 @@ def longer(held, i, j):
     return own + COMPRESSION / held.factor[0]
 
 
-@jit
+@inner
 def lack(held, t, path, tension):
     """How much too long (m) tendon t is at a path length (m) and all tensions."""
     gap = path - held.free[t]
@@ -97,9 +96,10 @@ def remember(held, s, tension):
             held.tension[t] = tension[t] / held.factor[0]
 
 
-@jit
-def pulls(chain, law, z, path_gradient, pull):
+@inner
+def pulls(at, z, path_gradient, pull):
     """dpath/dq and dr/dT, (n_tendon, nv) each, at the geometry in MuJoCo's data and committed slip states z."""
+    chain, law = at.chain, at.law
     nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
     for t in range(nt):
         wrapped, share = 0.0, 1.0
@@ -118,8 +118,8 @@ def pulls(chain, law, z, path_gradient, pull):
                 pull[t, i] = share * path_gradient[t, i]
 
 
-@jit
-def settle(C, gap, T, by_length, dT):
+@inner
+def tauten(C, gap, T, by_length, dT):
     """dT with C dT = gap for the tendons that end up taut, T + dT = 0 for those that end up slack, 0 where tension is given."""
     nt = T.size
     taut, M = np.empty(nt, np.bool_), np.empty((nt, nt))
@@ -154,20 +154,20 @@ def settle(C, gap, T, by_length, dT):
     return True
 
 
-@jit
-def tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU, held_by):
+@inner
+def tangent(at, state, by_length, LU, held_by):
     """Factors of J + PULL sum B_i A_i' over the taut tendons of `by_length`, which `held_by` (n_tendon,) then names.
 
     J alone need not be positive: a shape that gives way under constant tension may be held by the lengths. Returns whether this is.
     """
-    nt, nv = tension.size, q.size
+    nt, nv = state.T.size, state.q.size
     r, A, B = np.empty(nv), np.empty((nt, nv)), np.empty((nt, nv))
-    z1, s1 = np.empty(z.shape), np.empty(s.shape)
-    place(model, data, chain, q)
-    balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, LU)
-    pulls(chain, law, z1, A, B)
+    z, s = np.empty(state.z.shape), np.empty(state.s.shape)
+    place(at, state.q)
+    balance(at, state, z, s, r, LU)
+    pulls(at, z, A, B)
     for t in range(nt):
-        held_by[t] = by_length[t] and tension[t] > 0.0
+        held_by[t] = by_length[t] and state.T[t] > 0.0
         if held_by[t]:
             for i in range(nv):
                 for j in range(nv):
@@ -175,63 +175,69 @@ def tangent(model, data, chain, rest, law, load, z, s, q, tension, by_length, LU
     return factorise(LU)
 
 
+class Sought(NamedTuple):
+    """What holds the tendons is to become: free lengths (n_tendon,) m of motors, temperatures (n_tendon,) K of springs."""
+
+    free: np.ndarray
+    temperature: np.ndarray
+
+
 @jit
-def reach(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held, last, free, temperature):
-    """Equilibrium with the tendons that motors hold at lengths `free` (n_tendon,) m and the springs at `temperature` (n_tendon,) K,
-    and all tensions.
+def reach(at, state, factors, held, last, sought, tol):
+    """Equilibrium with the tendons that motors and springs hold as `sought`, and all tensions.
 
-    Where the guess q does not lead there the jump is made from `last`, which was at held.free and held.temperature, in ever smaller
-    parts if need be. held.free and held.temperature follow.
+    Where the guess state.q does not lead there the jump is made from the shape `last`, which was at held.free and held.temperature,
+    in ever smaller parts if need be. held.free and held.temperature follow.
 
-    Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits (z, s); with parts, after each. The springs'
+    Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits the slip; with parts, after each. The springs'
     memory is left to `remember`.
     """
-    nt = tension.size
-    q0, T0, T1, free0, warm0 = last.copy(), tension.copy(), tension.copy(), held.free.copy(), held.temperature.copy()
-    move(held, free0, warm0, free, temperature, 1.0)
-    if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held) == 1:
+    T, fresh = state.T, factors.fresh
+    q0, T0, T1, was = last.copy(), T.copy(), T.copy(), Sought(held.free.copy(), held.temperature.copy())
+    move(held, was, sought, 1.0)
+    if hold(at, state, factors, held, tol) == 1:
         return 1
     done, part = 0.0, 1.0
     while done < 1.0:
-        move(held, free0, warm0, free, temperature, done + part)
-        assign(tension, T0)
-        assign(q, q0)
+        move(held, was, sought, done + part)
+        assign(T, T0)
+        assign(state.q, q0)
         fresh[0] = False
-        if hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held) == 1:
+        if hold(at, state, factors, held, tol) == 1:
             done += part
             part = min(2.0 * part, 1.0 - done)
-            assign(q0, q)
-            assign(T0, tension)
+            assign(q0, state.q)
+            assign(T0, T)
         else:
             part *= 0.5
             if part < SMALLEST:
-                move(held, free0, warm0, free, temperature, 1.0)
-                for t in range(nt):
-                    tension[t] = T1[t]
+                move(held, was, sought, 1.0)
+                assign(T, T1)
                 return 0
     return 2
 
 
-@jit
-def move(held, free0, warm0, free, warm, share):
-    """Sets held.free and held.temperature on the way from (free0, warm0) to (free, warm)."""
-    for t in range(free.size):
+@inner
+def move(held, was, sought, share):
+    """Sets held.free and held.temperature on the way from one to the other."""
+    for t in range(sought.free.size):
         if not held.by_spring[t]:
-            held.free[t] = free0[t] + share * (free[t] - free0[t])
-        held.temperature[t] = warm0[t] + share * (warm[t] - warm0[t])
+            held.free[t] = was.free[t] + share * (sought.free[t] - was.free[t])
+        held.temperature[t] = was.temperature[t] + share * (sought.temperature[t] - was.temperature[t])
 
 
-@jit
-def advance(chain, law, z1, s1, q, r, LU, held_by, tension, held):
-    """One Newton step on shape and tensions together, with the `tangent` (LU, held_by) and the balance's (r, z1, s1) at q.
+@inner
+def advance(at, state, factors, held, z, s, r):
+    """One Newton step on shape and tensions together, with the `tangent` in the factors and the balance's (z, s, r) there.
 
     Returns the longest change of a hinge (rad), negative where the lengths have no solution.
     """
+    tension, q, LU, held_by = state.T, state.q, factors.LU, factors.held_by
     nt, nv = tension.size, q.size
     A, B, C, gap, dT = np.empty((nt, nv)), np.empty((nt, nv)), np.empty((nt, nt)), np.empty(nt), np.empty(nt)
-    pulls(chain, law, z1, A, B)
+    pulls(at, z, A, B)
     for t in range(nt):
-        gap[t] = lack(held, t, s1[t, 0], tension)
+        gap[t] = lack(held, t, s[t, 0], tension)
         if held_by[t]:
             for i in range(nv):
                 r[i] += PULL * gap[t] * B[t, i]
@@ -247,7 +253,7 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, held):
         substitute(LU, D[j])
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + longer(held, i, j)
-    if not settle(C, gap, tension, held.which, dT):
+    if not tauten(C, gap, tension, held.which, dT):
         return -1.0
     longest = 0.0
     for i in range(nv):
@@ -255,93 +261,100 @@ def advance(chain, law, z1, s1, q, r, LU, held_by, tension, held):
         for t in range(nt):
             step += dT[t] * D[t, i]
         q[i] -= step
-        longest = max(longest, abs(step) / chain.unit[i])
+        longest = max(longest, abs(step) / at.chain.unit[i])
     for t in range(nt):
         tension[t] = max(0.0, tension[t] + dT[t])
     return longest
 
 
-@jit
-def hold(model, data, chain, rest, law, load, z, s, q, LU, held_by, fresh, tol, tension, held):
+@inner
+def unmet(at, state, held, s, r):
+    """How far (rad) shape and lengths are from what they should be; the springs' laws are linearised on the way."""
+    size = 0.0
+    for i in range(r.size):
+        size = max(size, abs(r[i] / at.chain.stiffness[i]) / at.chain.unit[i])
+    linearise(held, s, state.T)
+    for t in range(state.T.size):
+        if held.which[t]:
+            gap = lack(held, t, s[t, 0], state.T)
+            size = max(size, (abs(gap) if state.T[t] > 0.0 else gap) / CLOSED)
+    return size
+
+
+@inner
+def between(state, start, end, share):
+    """Shape and tensions a share of the way from start to end."""
+    for i in range(state.q.size):
+        state.q[i] = start.q[i] + share * (end.q[i] - start.q[i])
+    for t in range(state.T.size):
+        state.T[t] = start.T[t] + share * (end.T[t] - start.T[t])
+
+
+@inner
+def hold(at, state, factors, held, tol):
     """Newton on shape and tensions at once, with the chord LU while it contracts; a step that lets the residual grow is halved.
 
-    Returns 1 and commits (z, s), or 0.
+    Returns 1 and commits the slip, or 0.
     """
-    nt, nv = tension.size, q.size
-    r, none, q0, T0, q1, T1 = np.empty(nv), np.empty((0, 0)), q.copy(), tension.copy(), q.copy(), tension.copy()
-    z1, s1 = np.empty(z.shape), np.empty(s.shape)
+    r, none, fresh = np.empty(state.q.size), np.empty((0, 0)), factors.fresh
+    z, s = np.empty(state.z.shape), np.empty(state.s.shape)
+    start, end = copied(state), copied(state)
     before, step, chord = 1e300, 1.0, True
     for _ in range(STEPS):
-        place(model, data, chain, q)
-        balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
-        size = 0.0
-        for i in range(nv):
-            size = max(size, abs(r[i] / chain.stiffness[i]) / chain.unit[i])
-        linearise(held, s1, tension)
-        for t in range(nt):
-            if held.which[t]:
-                gap = lack(held, t, s1[t, 0], tension)
-                size = max(size, (abs(gap) if tension[t] > 0.0 else gap) / CLOSED)
+        place(at, state.q)
+        balance(at, state, z, s, r, none)
+        size = unmet(at, state, held, s, r)
         if size < tol:
-            for t in range(nt):
-                assign(z[t], z1[t])
-                assign(s[t], s1[t])
+            settle(state, z, s)
             return 1
         if not size < GROWTH * before:
             if chord and fresh[0]:  # the fault may be the old tangent's: from the last shape with a new one
                 step = 1.0
-                assign(q, q0)
-                assign(tension, T0)
+                between(state, start, start, 0.0)
                 fresh[0], before = False, 1e300
                 continue
             step *= 0.5
             if step < SMALLEST:
                 return 0
-            for i in range(nv):
-                q[i] = q0[i] + step * (q1[i] - q0[i])
-            for t in range(nt):
-                tension[t] = T0[t] + step * (T1[t] - T0[t])
+            between(state, start, end, step)
             continue
         chord = fresh[0] and size <= CONTRACTION * before
         if not chord:
-            fresh[0] = tangent(model, data, chain, rest, law, load, z, s, q, tension, held.which, LU, held_by)
+            fresh[0] = tangent(at, state, held.which, factors.LU, factors.held_by)
             if not fresh[0]:
                 return 0
         before, step = size, 1.0
-        assign(q0, q)
-        assign(T0, tension)
-        longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, held)
+        assign(start.q, state.q)
+        assign(start.T, state.T)
+        longest = advance(at, state, factors, held, z, s, r)
         if longest < 0.0:
             return 0
-        assign(q1, q)
-        assign(T1, tension)
+        assign(end.q, state.q)
+        assign(end.T, state.T)
         if longest > LONGEST_STEP:
             step = LONGEST_STEP / longest
-            for i in range(nv):
-                q[i] = q0[i] + step * (q1[i] - q0[i])
-            for t in range(nt):
-                tension[t] = T0[t] + step * (T1[t] - T0[t])
+            between(state, start, end, step)
     return 0
 
 
-@jit
-def hold_once(model, data, chain, rest, law, load, z, s, q, LU, held_by, tension, held):
-    """One Newton step on shape and tensions from a neighbouring solution with the factors LU of its tangent. Commits (z, s).
+@inner
+def hold_once(at, state, factors, held):
+    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent. Commits the slip.
 
     Returns 1, or 0 where lost.
     """
-    r, none = np.empty(q.size), np.empty((0, 0))
-    z1, s1 = np.empty(z.shape), np.empty(s.shape)
-    place(model, data, chain, q)
-    bowing = balance(q, rest, chain, tension, law, load, z, s, z1, s1, r, none)
-    linearise(held, s1, tension)
-    longest = advance(chain, law, z1, s1, q, r, LU, held_by, tension, held)
-    place(model, data, chain, q)
-    commit(chain, law, z, s, bowing)
+    r, none = np.empty(state.q.size), np.empty((0, 0))
+    z, s = np.empty(state.z.shape), np.empty(state.s.shape)
+    place(at, state.q)
+    bowing = balance(at, state, z, s, r, none)
+    linearise(held, s, state.T)
+    longest = advance(at, state, factors, held, z, s, r)
+    place(at, state.q)
+    commit(at, state, bowing)
     return 1 if 0.0 <= longest < LONGEST_STEP else 0
 
 
-@jit
+@inner
 def dot_n(a, b):
     total = 0.0
     for i in range(a.size):

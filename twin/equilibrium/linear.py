@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from twin.compiled import jit
+from twin.compiled import inner
 
 BLOCK = 4  # pivots eliminated together, so that each row of the rest is read once for four of them
 
 
-@jit
+@inner
 def factorise(A):
     """A -> L U in place (unit lower L). Returns False at the first pivot that is not positive."""
     n = A.shape[0]
@@ -30,7 +30,7 @@ def factorise(A):
     return True
 
 
-@jit
+@inner
 def substitute(LU, b):
     """b -> (L U)^-1 b in place."""
     n = b.size

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.effects import Loads
-from twin.equilibrium import TOLERANCE, Heating
-from twin.equilibrium.lengths import Held, reach, remember
+from twin.bench import ROOM
+from twin.body import TOLERANCE, Problem
+from twin.effects import Drive, Loads
+from twin.equilibrium.chain import State
+from twin.equilibrium.lengths import Held, Sought, reach, remember
+from twin.equilibrium.newton import no_factors
 from twin.errors import SolveError
-from twin.kinematics.robot import ROOM, LoadedRobot
+from twin.kinematics.robot import LoadedRobot
 from twin.springs.heat import heated
-from twin.twin import Twin, heating_of, merged_route
+from twin.twin import Twin
 
 
 class HeatedRobot(LoadedRobot):
@@ -22,27 +25,30 @@ class HeatedRobot(LoadedRobot):
 
     def __init__(self, twin: Twin, loads: Loads | None = None, temperature: float = ROOM) -> None:
         """Raises DataError for a robot without springs, SolveError where cold springs and loads have no equilibrium."""
-        n = twin.robot.n_tendon
-        self.heating: Heating = heating_of(twin, np.full(1, temperature), np.ones(n, bool))
+        self.heating = twin.heating(np.full(1, temperature))
         super().__init__(twin, loads, temperature)
 
     def rest(self) -> None:
         """As at the start of a trial: springs at the room's temperature, the straight robot, then its loads. Raises SolveError."""
         nt, c = self.n_tendon, self.solver
-        route, stiffness = merged_route(self.twin.effects), np.full(1, 1.0 / self.softness)
-        start = c.solve(np.zeros(1), np.zeros((1, nt)), self.loads, route, stiffness=stiffness, heating=self.heating)
+        start = c.solve(
+            Problem(
+                np.zeros(1), np.zeros((1, nt)), self.loads, self.route, (Drive.CURRENT,) * nt, heating=self.heating,
+                stiffness=np.full(1, 1.0 / self.softness),
+            )
+        )  # fmt: skip
         if not start.status.all():
             raise SolveError(f"no shape with cold springs under the loads (payload {1e3 * self.loads.payload:.3g} g); check them")
-        self.tension = start.tension[0] * self.softness
-        self.q, self.slip, self.distal = start.q[0].copy(), start.slip.copy(), start.distal.copy()
-        self.LU, self.fresh, self.held_by = np.empty((self.q.size, self.q.size)), np.zeros(1, bool), np.zeros(nt, bool)
+        self.now = State(start.tension[0] * self.softness, start.q[0].copy(), start.slip.copy(), start.distal.copy())
+        self.factors = no_factors(c.n_slow, nt)
         self.warm = np.full(nt, self.temperature)
         spring = self.heating.spring
         self.held = Held(
-            np.ones(nt, bool), np.ones(nt, bool), c.straight_path.copy(), np.empty(nt), c.straight_path, self.stretch,
-            np.full(1, self.softness), spring, self.warm.copy(), spring.initial_elongation.copy(), spring.initial_tension.copy(),
+            np.ones(nt, bool), np.ones(nt, bool), c.straight_path.copy(), np.empty(nt), c.straight_path, self.route.stretch,
+            np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
+            spring.initial_tension.copy(),
         )  # fmt: skip
-        remember(self.held, self.distal, self.tension)
+        remember(self.held, self.now.s, self.now.T)
 
     def step(self, current: np.ndarray, dt: float) -> np.ndarray:
         """Heat the springs with currents (n_tendon,) A for dt seconds; returns the true base tensions (n_tendon,) N after it.
@@ -51,16 +57,12 @@ class HeatedRobot(LoadedRobot):
         """
         for t in range(self.n_tendon):
             self.warm[t] = heated(self.held.spring, t, self.warm[t], self.held.elongation[t], current[t], self.temperature, dt)
-        model, data, chain, rest, law, load = self.statics
-        last = self.q.copy()
-        found = reach(
-            model, data, chain, rest, law, load, self.slip, self.distal, self.q, self.LU, self.held_by, self.fresh, TOLERANCE,
-            self.tension, self.held, last, self.held.free.copy(), self.warm,
-        )  # fmt: skip
+        sought = Sought(self.held.free.copy(), self.warm)
+        found = reach(self.statics, self.now, self.factors, self.held, self.now.q.copy(), sought, TOLERANCE)
         if found == 0:
             raise SolveError("springs and body find no equilibrium; are the currents what was meant?")
-        remember(self.held, self.distal, self.tension)
-        return self.tension / self.softness
+        remember(self.held, self.now.s, self.now.T)
+        return self.tension
 
     @property
     def elongation(self) -> np.ndarray:

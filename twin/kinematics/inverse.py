@@ -13,10 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.equilibrium import TOLERANCE
-from twin.equilibrium.move import STRIDE, refine, seek
+from twin.body import TOLERANCE
+from twin.equilibrium.chain import State
+from twin.equilibrium.move import Aim, refine, seek
+from twin.equilibrium.newton import no_factors
 from twin.errors import SolveError, TwinError
-from twin.kinematics.robot import LoadedRobot, Shape, State
+from twin.kinematics.robot import LoadedRobot, Shape
 
 NEAR = 1e-5  # m: where the search stops
 
@@ -55,7 +57,7 @@ def inverse(
             break
     if state is None:
         raise SolveError("no equilibrium was found on the way to this point; rest the robot first")
-    tension = state[0] / robot.softness
+    tension = state.T / robot.softness
     reason = None if distance < within else _reason(robot, tip, tension, distance, limit)
     return Reach(robot.reported(tension), _shape_at(robot, state), distance, reason)
 
@@ -101,13 +103,12 @@ def _sought(
     robot: LoadedRobot, tip: np.ndarray, used: np.ndarray, guess: np.ndarray, least: np.ndarray, limit: float
 ) -> tuple[float, State]:
     """The least distance (m) found, infinite where lost, and the state (T, q, z, s) that the robot is in there."""
-    T0, q0, z0, s0 = robot.state()
-    T, q, z, s = guess.copy(), q0.copy(), z0.copy(), s0.copy()
-    ends = (tip, used, least, limit * robot.softness, TOLERANCE, NEAR)
-    distance = seek(*robot.statics, *ends, T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU))
+    start, found = robot.state(), robot.state()._replace(T=guess.copy())
+    aim, factors = Aim(tip, used, least, float(limit * robot.softness), NEAR), no_factors(found.q.size, guess.size)
+    distance = seek(robot.statics, aim, start, found, factors, TOLERANCE)
     if distance >= 0.0:
-        distance = refine(*robot.statics, *ends, STRIDE, T0, q0, z0, s0, T, q, z, s, np.empty_like(robot.LU))
-    return (float(distance) if distance >= 0.0 else math.inf), (T, q, z, s)
+        distance = refine(robot.statics, aim, start, found, factors, TOLERANCE)
+    return (float(distance) if distance >= 0.0 else math.inf), found
 
 
 def _shape_at(robot: LoadedRobot, state: State) -> Shape:
@@ -120,8 +121,7 @@ def _shape_at(robot: LoadedRobot, state: State) -> Shape:
 
 
 def _reason(robot: LoadedRobot, tip: np.ndarray, tension: np.ndarray, distance: float, limit: float) -> str:
-    length = float(robot.twin.robot.build(robot.twin.values).length)
-    far = float(np.linalg.norm(tip))
+    length, far = robot.length, float(np.linalg.norm(tip))
     if far > length:
         return f"the point is {1e3 * far:.1f} mm from the base; the robot is {1e3 * length:.1f} mm long"
     full = [f"tendon {i + 1}" for i in np.flatnonzero(tension > 0.999 * limit)]

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import cast
 
 import numpy as np
 
-from twin.effects import Loads, Signals
-from twin.equilibrium import TOLERANCE, Equilibrium
-from twin.equilibrium.chain import Law, Load
+from twin.bench import ROOM
+from twin.body import TOLERANCE, Problem
+from twin.effects import Drive, Loads, Signals
+from twin.equilibrium import Equilibrium
+from twin.equilibrium.chain import Law, Load, State, Statics, become, copied
 from twin.equilibrium.move import STRIDE, answer, pull
-from twin.equilibrium.newton import place
-from twin.errors import SolveError
-from twin.twin import Twin, merged_route
-
-ROOM = 296.15  # K
-State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # (T, q, z, s), see twin.equilibrium.move
+from twin.equilibrium.newton import no_factors, place
+from twin.errors import DataError, SolveError
+from twin.hinges import HingeChain
+from twin.twin import Twin
 
 
 @dataclass(frozen=True)
@@ -41,44 +41,45 @@ class LoadedRobot:
     """
 
     def __init__(self, twin: Twin, loads: Loads | None = None, temperature: float = ROOM) -> None:
-        """`loads` on the robot, its own gravity alone by default; `temperature` (K) of the room."""
-        self.twin = twin
-        body = twin.robot.build(twin.values)
-        for effect in twin.effects:
-            effect.edit(body)
-        self.solver = Equilibrium(body)
-        loads = loads or Loads(twin.robot.gravity)
-        self.softness = 1.0
-        for effect in twin.effects:
-            loads = effect.surround(loads)
-            self.softness /= float(np.ravel(effect.soften(np.full(1, temperature), np.zeros(1)))[0])
-        self.loads, self.temperature = loads, temperature
-        route = merged_route(twin.effects)
-        self.stretch = float(route.stretch)
+        """`loads` on the robot, its own gravity alone by default; `temperature` (K) of the room.
+
+        Raises DataError for a robot without a backbone that tensions bend.
+        """
+        self.twin, laws, body = twin, twin.laws, twin.body()
+        if "backbone" not in body.parts:
+            raise DataError(f"robot {twin.robot.name!r} has no backbone: its shape under tensions is not known here")
+        self.solver, self.length = cast(Equilibrium, twin.robot.solver(body)), cast(HingeChain, body).length
+        loads = laws.surround(loads or Loads(twin.robot.gravity))
+        self.softness = 1.0 / float(laws.stiffness(np.full(1, temperature), np.zeros(1))[0])
+        self.loads, self.temperature, self.route = loads, temperature, laws.route
         wall = np.array(loads.wall, float) * np.array([1, 1, 1, 1, self.softness])
-        self.law = Law(float(route.mu), float(route.presliding), wall)
+        self.law = Law(float(self.route.mu), float(self.route.presliding), wall)
         f = self.softness
         self.load = Load(np.array(loads.gravity, float) * f, float(loads.payload), np.array(loads.force, float) * f)
-        self.n_tendon = len(self.solver.chain.hole)
+        self.n_tendon = twin.robot.n_tendon
         self._reads = any(e.acts_in("command", "sense") for e in twin.effects)
         self.rest()
 
     def rest(self) -> None:
         """Slack again and all history forgotten: straight, then the loads, as at the start of a trial. Raises SolveError."""
         nt = self.n_tendon
-        start = self.solver.solve(
-            np.zeros(1), np.zeros((1, nt)), self.loads, merged_route(self.twin.effects), stiffness=np.full(1, 1.0 / self.softness)
-        )
+        stiffness = np.full(1, 1.0 / self.softness)
+        start = self.solver.solve(Problem(np.zeros(1), np.zeros((1, nt)), self.loads, self.route, stiffness=stiffness))
         if not start.status.all():
             raise SolveError(f"no shape under the loads alone (payload {1e3 * self.loads.payload:.3g} g); check them")
-        self.tension, self.q, self.slip, self.distal = np.zeros(nt), start.q[0].copy(), start.slip.copy(), start.distal.copy()
-        self.LU, self.fresh = np.empty((self.q.size, self.q.size)), np.zeros(1, bool)
+        self.now = State(np.zeros(nt), start.q[0].copy(), start.slip.copy(), start.distal.copy())
+        self.factors = no_factors(self.solver.n_slow, nt)
 
     @property
-    def statics(self) -> tuple[Any, ...]:
-        """What the functions of `twin.equilibrium.move` need first: MuJoCo's model and data, the chain, its rest, law and load."""
+    def statics(self) -> Statics:
+        """What is in balance, for the functions of `twin.equilibrium.move`."""
         c = self.solver
-        return c.model._address, c.data._address, c.chain, c.spring, self.law, self.load
+        return Statics(c.model._address, c.data._address, c.chain, c.spring, self.law, self.load)
+
+    @property
+    def tension(self) -> np.ndarray:
+        """True base tensions (n_tendon,) N as it stands."""
+        return self.now.T / self.softness
 
     def pull(self, tension: np.ndarray) -> Shape:
         """The shape under load-cell readings `tension` (n_tendon,) N, the robot moved there from where it stands.
@@ -86,35 +87,28 @@ class LoadedRobot:
         Raises SolveError where no equilibrium is found; the robot then stays where it was.
         """
         goal = np.maximum(self.true(np.asarray(tension, float)), 0.0) * self.softness
-        T, q, z, s = self.state()
-        ok = pull(
-            *self.statics, goal, STRIDE, TOLERANCE, T, q, z, s, self.LU,
-            self.fresh,
-        )  # fmt: skip
-        if not ok:
+        moved = self.state()
+        if not pull(self.statics, moved, self.factors, goal, STRIDE, TOLERANCE):
             raise SolveError(f"no equilibrium on the way to tensions {np.round(tension, 3).tolist()} N; are they what was meant?")
-        self.tension, self.q, self.slip, self.distal = T, q, z, s
+        self.now = moved
         return self.shape()
 
     def state(self) -> State:
-        """Copies of (T, q, z, s): what `twin.equilibrium.move.pull` advances."""
-        return self.tension.copy(), self.q.copy(), self.slip.copy(), self.distal.copy()
+        """A copy of where it stands: what `twin.equilibrium.move.pull` advances."""
+        return copied(self.now)
 
     def restore(self, state: State) -> None:
         """Back to an earlier `state`: a pull that was only tried."""
-        self.tension, self.q, self.slip, self.distal = (x.copy() for x in state)
-        self.fresh[0] = False
+        become(self.now, state)
+        self.factors.fresh[0] = False
 
     def shape(self) -> Shape:
         """As it stands after the last `pull` or `rest`."""
         chain = self.solver.chain
-        c = self.solver
-        place(c.model._address, c.data._address, chain, self.q)
+        place(self.statics, self.now.q)
         markers = chain.site[chain.marker]
-        seen = self._signals(self.tension / self.softness, markers)
-        seen = seen.with_(displacement=(self.solver.straight_path - self.distal[:, 0] + self.stretch * seen.tension[0])[None])
-        for effect in self.twin.effects:
-            seen = effect.sense(seen)
+        path = self.solver.straight_path - self.now.s[:, 0] + self.route.elongation(self.tension)
+        seen = self.twin.laws.sense(self._signals(self.tension, markers).with_(displacement=path[None]))
         return Shape(seen.tension[0], seen.displacement[0], seen.markers[0], chain.site[chain.disk[-1]].copy())
 
     def gradient(self) -> np.ndarray:
@@ -123,11 +117,7 @@ class LoadedRobot:
         out = np.empty((self.n_tendon, c.chain.marker.size, 3))
         body = c.model.site_bodyid[c.chain.marker]
         below = (c.model.body_dofadr[body] + c.model.body_dofnum[body]).astype(np.int64)
-        T, q, z, s = self.state()
-        if not answer(
-            *self.statics, T, q, z, s, np.empty_like(self.LU),
-            c.chain.marker, below, out,
-        ):  # fmt: skip
+        if not answer(self.statics, self.state(), np.empty_like(self.factors.LU), c.chain.marker, below, out):
             raise SolveError("the shape is not stable: its markers have no derivative")
         return out * self.softness
 
@@ -149,31 +139,24 @@ class LoadedRobot:
     def burden(self, payload: float) -> None:
         """Another mass (kg) at the tip from now on, the tensions kept. Raises SolveError where that has no equilibrium."""
         self.load = self.load._replace(payload=float(payload))
-        self.fresh[0] = False
-        T, q, z, s = self.state()
-        if not pull(
-            *self.statics, T.copy(), STRIDE, TOLERANCE, T, q, z, s, self.LU,
-            self.fresh,
-        ):  # fmt: skip
+        self.factors.fresh[0] = False
+        moved = self.state()
+        if not pull(self.statics, moved, self.factors, self.now.T, STRIDE, TOLERANCE):
             raise SolveError(f"no shape with {1e3 * payload:.3g} g at the tip")
-        self.q, self.slip, self.distal = q, z, s
+        self.now = moved
 
     def true(self, reported: np.ndarray) -> np.ndarray:
         """Tensions (n_tendon,) N at the base that the load cells report as `reported`."""
         if not self._reads:
             return reported
-        seen = self._signals(reported, np.zeros((0, 3)))
-        for effect in reversed(self.twin.effects):
-            seen = effect.command(seen)
-        return seen.tension[0]
+        return self.twin.laws.command(self._signals(reported, np.zeros((0, 3)))).tension[0]
 
     def reported(self, true: np.ndarray) -> np.ndarray:
         """What the load cells report of tensions (n_tendon,) N."""
-        seen = self._signals(true, np.zeros((0, 3)))
-        for effect in self.twin.effects:
-            seen = effect.sense(seen)
-        return seen.tension[0]
+        return self.twin.laws.sense(self._signals(true, np.zeros((0, 3)))).tension[0]
 
     def _signals(self, tension: np.ndarray, markers: np.ndarray) -> Signals:
         now, nothing = np.zeros(1), np.zeros((1, self.n_tendon))
-        return Signals(now, now, tension[None], nothing, markers[None], np.full(1, self.temperature), np.zeros(self.n_tendon, bool))
+        return Signals(
+            now, now, tension[None], nothing, markers[None], np.full(1, self.temperature), (Drive.TENSION,) * self.n_tendon
+        )

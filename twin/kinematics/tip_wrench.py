@@ -19,7 +19,7 @@ from scipy.optimize import root
 
 from twin.effects import Loads
 from twin.errors import SolveError
-from twin.quantities import Values
+from twin.quantities import Values, each
 from twin.robots import Robot
 
 TOLERANCE = 1e-8  # of the integration, m and rad
@@ -31,11 +31,11 @@ def tip_wrench(robot: Robot, tension: np.ndarray, loads: Loads, values: Values |
     Raises SolveError where shooting finds no moment at the base.
     """
     v = {p.name: p.value for p in robot.parameters} | dict(values or {})
-    s = np.cumsum([v[f"disks.pitch_{k}"] for k in range(1, int(robot.structure["disks"]) + 1)])  # type: ignore[call-overload]
+    s = np.cumsum(each(v, "disks.pitch", int(robot.structure["disks"])))  # type: ignore[call-overload]
     length = float(s[-1])
     bending = v["backbone.youngs_modulus"] * math.pi * v["backbone.radius"] ** 4 / 4.0
     stiffness = np.array([bending, bending, bending / (1.0 + v["backbone.poisson_ratio"])])
-    angle = np.array([v[f"tendons.angle_{i}"] for i in range(1, robot.n_tendon + 1)])
+    angle = each(v, "tendons.angle", robot.n_tendon)
     pull = np.asarray(tension, float) * v["tendons.radius"]
     moment = np.array([-(pull * np.sin(angle)).sum(), (pull * np.cos(angle)).sum(), 0.0])
     at_tip = loads.payload * loads.gravity + loads.force

@@ -5,7 +5,7 @@
     channels.py          what a channel name says: kind, index, axis, finger, SI unit
     recording.py         Recording, Trial, Clouds: SI, read-only, the only thing that travels
     fingerprint.py       a recording's hash
-    quantity_strings.py  units to SI and back (pint)
+    quantity_strings.py  "10 g" to SI
     files.py             which files may be opened and how much of them is read
     tables.py            CSV and Parquet to columns; names the cell at fault
     clouds.py            point clouds (NPZ)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, NamedTuple, cast, get_args
 
-from twin.errors import DataError
-from twin.measurements.quantity_strings import Scale, shown, unit_scale
+from twin.errors import DataError, shown
+from twin.units import Scale, unit_scale
 
 Role = Literal["input", "output", "context"]
 Axis = Literal["x", "y", "z"]

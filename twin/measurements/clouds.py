@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.errors import DataError
+from twin.errors import DataError, shown
 from twin.measurements.files import LARGEST_CLOUD, check_size, located
-from twin.measurements.quantity_strings import shown
 from twin.measurements.recording import Clouds
 
 _MEMBERS = ("points", "offsets", "time")
@@ -68,4 +67,6 @@ def _array(data: bytes, kinds: str) -> np.ndarray:
     body = data[stream.tell() :]
     if any(isinstance(size, bool) or size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(body):
         raise DataError(f"declares shape {shown(shape)} but holds {len(body)} bytes; write it again")
+    if math.prod(shape) > LARGEST_CLOUD // 8:  # small integers would grow on their way to floats
+        raise DataError(f"has shape {shown(shape)}; at most {LARGEST_CLOUD // 8} numbers are read, use fewer points or frames")
     return np.frombuffer(body, dtype).reshape(shape, order="F" if fortran else "C")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import codecs
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
 
-from twin.errors import DataError
-from twin.measurements.quantity_strings import shown
+from twin.errors import DataError, shown
 
-LARGEST_TRIAL = 512 * 2**20  # bytes of a trial's table
-LARGEST_CLOUD = 256 * 2**20  # bytes of a trial's clouds, unpacked
+LARGEST_TRIAL = 96 * 2**20  # bytes of a trial's table: read in less than a gigabyte
+LARGEST_TABLE = 16 * 2**20  # numbers in it
+LARGEST_SET = 2 * LARGEST_TABLE  # numbers in all trials together
+LARGEST_CLOUD = 128 * 2**20  # bytes of a trial's clouds, unpacked
+LONGEST_NAME = 200  # bytes
 LARGEST_TOML = 4 * 2**20  # bytes of measurements.toml
 LONGEST_LINE = 2**20  # bytes
 
@@ -25,10 +29,20 @@ def located(where: object) -> Iterator[None]:
         raise DataError(f"{where}: {fault}") from None
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a file; a path that cannot be one, too long or with a NUL in it, is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def check_name(name: object) -> str:
     """A file name relative to the set's folder. Raises DataError for one that leads out of it."""
     if not isinstance(name, str) or not name.strip():
         raise DataError(f"{shown(name)} is no file name; write one in quotes, relative to the set's folder")
+    if len(name.encode()) > LONGEST_NAME:
+        raise DataError(f"file {shown(name)}: a name of {len(name)} characters; at most {LONGEST_NAME} are allowed")
     path = PurePosixPath(name)
     abroad = path.is_absolute() or ".." in path.parts or "\\" in name or PureWindowsPath(name).drive
     if abroad or not path.name or not name.isprintable():
@@ -92,6 +106,14 @@ def read_text(path: Path, largest: int) -> bytes:
         raise DataError(f"{path}: cannot be read ({_reason(fault)})") from None
     data = b"".join(chunks).removeprefix(codecs.BOM_UTF8)
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def parse_toml(data: bytes) -> dict[str, Any]:
+    """TOML bytes as a table. Raises DataError for text that is none, is nested too deep or has numbers of thousands of digits."""
+    try:
+        return tomllib.loads(data.decode())
+    except (ValueError, RecursionError) as fault:
+        raise DataError(f"not TOML ({str(fault)[:120]}); correct the file") from None
 
 
 def _reason(fault: Exception) -> str:

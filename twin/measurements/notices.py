@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from twin.errors import shown
 from twin.measurements.channels import Channel
 from twin.measurements.plausible import SLACK_SIGMAS
 from twin.measurements.recording import Trial
 from twin.measurements.tables import Table
 
+MOST_NAMED = 5  # undeclared columns
+
 
 def notices_of(channels: Sequence[Channel], trials: Sequence[Trial], tables: Sequence[Table]) -> list[str]:
     """Undeclared columns, conditions that are not understood, inputs with gaps or below zero, and channels empty in a trial."""
     notices = []
-    for name, files in _where((table.path.name, table.extra) for table in tables).items():
-        notices.append(f"column {name!r} is not declared in measurements.toml and not read ({_listed(files)})")
+    extra = _where((table.path.name, table.extra) for table in tables)
+    if len(extra) > MOST_NAMED:
+        named = ", ".join(map(shown, list(extra)[:MOST_NAMED]))
+        files = list(dict.fromkeys(itertools.chain.from_iterable(extra.values())))
+        notices.append(
+            f"{len(extra)} columns are not declared in measurements.toml and not read: {named} and others ({_listed(files)})"
+        )
+    else:
+        for name, files in extra.items():
+            notices.append(f"column {shown(name)} is not declared in measurements.toml and not read ({_listed(files)})")
     for name, files in _where((trial.name, trial.other) for trial in trials).items():
         notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_listed(files)})")
     for channel in channels:

@@ -12,13 +12,15 @@ from twin.measurements.recording import Trial
 from twin.measurements.tables import Table
 
 _LEAST_SAMPLES = 3
+SHORTEST_STEP, LONGEST_TRIAL = 1e-6, 1e7  # s: a microsecond, faster than any robot here is logged; four months
 # How far below zero an input tension may read: sigmas of declared noise, or what the zero of a load cell may be off; the wider
 # counts. An offset is data, which the diagnosis can name (load_cell_bias); a pushing tendon is not.
 SLACK_SIGMAS, _ZERO_OFFSET = 5.0, 0.3  # -, N
 
 
 def check_table(table: Table, channels: Sequence[Channel]) -> None:
-    """Raises DataError, naming the cell, for an infinite value, time that does not increase, a pushing tendon and less than 0 K."""
+    """Raises DataError, naming the cell, for an infinite value, time that does not increase or cannot be in seconds, a pushing
+    tendon and less than 0 K."""
     time = table.columns["time"]
     _check_finite(table, "time", time)
     if len(missing := np.flatnonzero(np.isnan(time))):
@@ -27,6 +29,14 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         at = int(back[0]) + 1
         order = f"{float(time[at])!r} after {float(time[at - 1])!r}"
         raise DataError(f"{table.cell(at, 'time')}: {order}; time must strictly increase, sort or split the trial")
+    steps = np.diff(time)
+    if len(short := np.flatnonzero(steps < SHORTEST_STEP)):
+        step = f"a step of {float(steps[short[0]]):.3g} s; time is in seconds, and at least {SHORTEST_STEP:g} s apart"
+        raise DataError(f"{table.cell(int(short[0]) + 1, 'time')}: {step}")
+    if len(time) and not abs(time[0]) + (time[-1] - time[0]) <= LONGEST_TRIAL:
+        raise DataError(
+            f"{table.cell(len(time) - 1, 'time')}: {float(time[-1])!r} s; time is in seconds, and at most {LONGEST_TRIAL:g} s"
+        )
     for channel in channels:
         column = channel.scale.to_si(table.columns[channel.name])
         _check_finite(table, channel.name, column)
@@ -67,11 +77,12 @@ def check_roles(channels: Sequence[Channel]) -> None:
             raise DataError(f'no {role} channel; give at least one [[channel]] role = "{role}"')
 
 
-def check_trials(channels: Sequence[Channel], trials: Sequence[Trial], least_trials: int) -> None:
+def check_trials(channels: Sequence[Channel], trials: Sequence[Trial], left_out: Sequence[str], least_trials: int) -> None:
     """Raises DataError for too few usable trials, and for a channel without a single value in them."""
     if len(trials) < least_trials:
         needed = f"at least {least_trials} are needed, each with {_LEAST_SAMPLES} samples and an output value"
-        raise DataError(f"{len(trials)} usable trials; {needed}")
+        why = f" ({'; '.join(left_out[:3])}{', ...' if len(left_out) > 3 else ''})" if left_out else ""
+        raise DataError(f"{len(trials)} usable trials; {needed}{why}")
     for channel in channels:
         if trials and all(np.all(np.isnan(trial.values[channel.name])) for trial in trials):
             raise DataError(f"channel {channel.name} has no value in any usable trial; remove it, or export the data again")

@@ -16,13 +16,11 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from twin.errors import DataError
-from twin.measurements.files import LARGEST_TRIAL, LONGEST_LINE, check_size, read_text
-from twin.measurements.quantity_strings import shown
+from twin.errors import DataError, shown
+from twin.measurements.files import LARGEST_TABLE, LARGEST_TRIAL, LONGEST_LINE, check_size, read_text
 
 _NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
 _MISSING = ("", "nan", "+nan", "-nan")  # compared in lower case
-_LARGEST_COUNT = LARGEST_TRIAL // 8  # numbers in a Parquet file
 
 
 @dataclass(frozen=True)
@@ -50,8 +48,8 @@ def read_table(path: Path, names: Sequence[str]) -> Table:
 
 def _read_csv(path: Path, names: Sequence[str]) -> Table:
     data = read_text(path, LARGEST_TRIAL)
-    first, _, _ = data.partition(b"\n")
-    header = [name.strip() for name in _cells(path, 1, first.decode())]
+    end = data.find(b"\n")
+    header = [name.strip() for name in _cells(path, 1, (data if end < 0 else data[:end]).decode())]
     extra = _check_header(f"{path}, row 1", header, names)
     return Table(path, _fast_columns(data, header, names) or _slow_columns(path, data, header, names), extra, first_row=2)
 
@@ -83,7 +81,9 @@ def _fast_columns(data: bytes, header: Sequence[str], names: Sequence[str]) -> d
         )
     except pa.ArrowException:
         return None
-    return {name: _numbers(table.column(name)) for name in names}
+    columns = {name: _numbers(table.column(name)) for name in names}
+    odd = any(np.count_nonzero(np.isnan(columns[name])) > table.column(name).null_count for name in names)
+    return None if odd else columns  # pyarrow takes `nan(1)` for a NaN
 
 
 def _slow_columns(path: Path, data: bytes, header: Sequence[str], names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -120,8 +120,8 @@ def _read_parquet(path: Path, names: Sequence[str]) -> Table:
         with pyarrow.parquet.ParquetFile(path) as file:
             schema, count = file.schema_arrow, file.metadata.num_rows
             extra = _check_header(str(path), schema.names, names)
-            if count * len(names) > _LARGEST_COUNT:
-                raise DataError(f"{path}: {count} rows; at most {_LARGEST_COUNT // len(names)} are read, split the trial")
+            if count * len(names) > LARGEST_TABLE:
+                raise DataError(f"{path}: {count} rows; at most {LARGEST_TABLE // len(names)} are read, split the trial")
             for name in names:
                 kind = schema.field(name).type
                 if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):

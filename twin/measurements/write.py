@@ -12,10 +12,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from twin.errors import DataError
+from twin.errors import DataError, shown
 from twin.measurements.conditions import SCALARS
 from twin.measurements.files import check_name
-from twin.measurements.quantity_strings import shown
 from twin.measurements.read import FILE, FORMAT
 from twin.measurements.recording import Recording, Trial
 from twin.measurements.toml_text import toml_lines

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from twin.diagnose import Diagnosis
+from twin.diagnose import Diagnosis, Suspicion
 from twin.evaluate import KIND
 from twin.report.contents import experiment_words
+from twin.report.loops import loop_words
 from twin.report.numbers import SHOWN, plus_minus
 from twin.report.sections.before_after import rows
 from twin.report.sections.effects import table
@@ -18,9 +21,13 @@ from twin.report.sentence import blind, groups, headline, sentence
 def console(diagnosis: Diagnosis) -> RenderableType:
     """The sentence, the error before and after, the effects, and the next experiment."""
     d = diagnosis
-    parts: list[RenderableType] = [Text(sentence(d), style="bold"), Text("")]
+    parts: list[RenderableType] = []
+    if d.suspicions:
+        count = f"{len(d.suspicions)} suspicion{'s' if len(d.suspicions) > 1 else ''}"
+        parts += [Text(f"{count} about what the files mean, told before the fit: settle them before you believe this.", "yellow")]
+    parts += [Text(sentence(d), style="bold"), Text("")]
     for group in groups(d):
-        title = f"{KIND[group].replace('_', ' ')} error on held-out trials ({d.bench.recording.source})"
+        title = f"{KIND[group].replace('_', ' ')} error on sealed trials ({d.bench.recording.source})"
         error = _table()
         for name, justify in (("", "left"), (f"RMS, {SHOWN[group][0]}", "right"), ("95 % confidence", "right")):
             error.add_column(name, justify=justify)  # type: ignore[arg-type]
@@ -40,6 +47,7 @@ def console(diagnosis: Diagnosis) -> RenderableType:
             values = "\n".join(f"{n} = {plus_minus(f)}" for n, f in claim.parameters.items())
             effects.add_row(str(row["name"]), Text(values), str(row["probability"]), str(row["error"]))
         parts += [Text("effects in force", style="dim"), effects, Text("")]
+    parts += [Text(loop_words(d)), Text("")]
     if d.verdict in ("partly_explained", "unexplained"):
         parts.append(Text(d.description))
     if (words := experiment_words(d)) is not None:
@@ -50,6 +58,12 @@ def console(diagnosis: Diagnosis) -> RenderableType:
         count = f"{len(d.notices)} notice{'s' if len(d.notices) > 1 else ''}"
         parts.append(Text(f"{count} about the data in the report.", style="dim"))
     return Group(*parts)
+
+
+def suspected(found: Sequence[Suspicion]) -> RenderableType:
+    """What the files may mean otherwise, each with the change that would remove it."""
+    said = [Text.assemble((f"{s.kind}: ", "bold"), f"{s.words}.\n  Change that would remove it: {s.change}.") for s in found]
+    return Group(Text("What the files may mean otherwise (nothing is repaired):", style="yellow"), *said, Text(""))
 
 
 def _table() -> Table:

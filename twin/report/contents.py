@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from twin.bench import Bench, drives
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.identifiability import Visibility
 from twin.evaluate import KIND
 from twin.quantities import Fitted
+from twin.report.loops import advice, table
 from twin.report.numbers import SHOWN, finite
-from twin.report.sentence import groups, headline, sentence, structure_left
+from twin.report.sentence import error_words, groups, headline, labels, structure_left, verdict_words
 
 FORMAT = "twin-report/1"
 
@@ -24,7 +24,8 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
     return {
         "format": FORMAT,
         "verdict": d.verdict,
-        "summary": sentence(d),
+        "summary": verdict_words(d),
+        "suspicions": [{"kind": s.kind, "words": s.words, "change": s.change} for s in d.suspicions],
         "effects": [
             {"id": c.effect, "parameters": _parameters(c.parameters), "error_without": finite(c.error, factor), **_weight(c)}
             for c in d.claims
@@ -43,6 +44,7 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
             "after": finite(d.structure_after),
             "components": {name: finite(size) for name, size in d.structure.items()},
         },
+        "loops": table(d.loops, labels(d, tuple(loop.trial for loop in d.loops.each))),
         "ambiguous": [list(effects) for effects in d.ambiguous],
         "next_experiment": experiment_words(d),
         "identifiability": [_visibility(v) for v in d.identifiability],
@@ -60,20 +62,15 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
     }
 
 
-def labels(diagnosis: Diagnosis, trials: tuple[int, ...]) -> list[str]:
-    """Names of the bench's trials `trials` as reports print them: without the file's ending."""
-    label = {t.name: t.label for t in diagnosis.bench.recording.trials}
-    return [label[diagnosis.bench.inputs[k].name] for k in trials]
-
-
 def experiment_words(diagnosis: Diagnosis) -> str | None:
     """The next experiment in words and numbers; None where none is needed or none would settle the doubt."""
-    e = diagnosis.experiment
+    e, asked = diagnosis.experiment, advice(diagnosis)
     if e is None:
-        return None
+        return asked
     runs = "one run separates" if e.repeats == 1 else f"{e.repeats} runs together separate"
     one, other = (" + ".join(names).replace("_", " ") or "no effect" for names in e.between)
-    return f"{e.words}: {runs} {one} from {other} by {(e.separation * e.repeats) ** 0.5:.0f} standard errors"
+    words = f"{e.words}: {runs} {one} from {other} by {(e.separation * e.repeats) ** 0.5:.0f} standard errors"
+    return f"{words}; and {asked}" if asked else words
 
 
 def _weight(claim: Claim) -> dict[str, float | None]:
@@ -99,7 +96,10 @@ def _parameters(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:
 
 
 def _error(d: Diagnosis) -> dict[str, Any]:
-    out = {"split": "held-out trials", "trials": labels(d, d.held_trials), **_of_group(d, headline(d))}
+    out = {"split": "held-out trials", "trials": labels(d, d.sealed_trials), **_of_group(d, headline(d))}
+    out |= {"summary": error_words(d), "no_equilibrium": labels(d, d.errors.lost), "left_out": list(d.errors.spikes)}
+    if d.folds:
+        out["folds"] = [{"trial": labels(d, (f.trial,))[0], "verdict": f.verdict, "effects": list(f.effects)} for f in d.folds]
     if len(groups(d)) > 1:
         out["by_kind"] = {KIND[g]: _of_group(d, g) for g in groups(d)}
     return out
@@ -127,7 +127,7 @@ def _noise(d: Diagnosis) -> dict[str, Any]:
         "source": d.noise.source,
         "inputs": {
             c.name: {"sigma": finite(float(s), SHOWN[of][1]), "unit": SHOWN[of][0]}
-            for c, s, of in zip(drives(d.bench), d.noise.drive, driven(d.bench), strict=True)
+            for c, s, of in zip(d.bench.drivers, d.noise.drive, d.bench.drives, strict=True)
         },
         "channels": {
             o.channel.name: {
@@ -136,9 +136,3 @@ def _noise(d: Diagnosis) -> dict[str, Any]:
             for o, s, r in zip(outputs, d.noise.sigma, d.noise.rho, strict=True)
         },
     }  # fmt: skip
-
-
-def driven(bench: Bench) -> list[str]:
-    """What drives each tendon: "tension", "displacement" or "current"."""
-    held = zip(bench.by_length, bench.by_current, strict=True)
-    return ["displacement" if length else "current" if current else "tension" for length, current in held]

@@ -42,6 +42,7 @@ def page(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> str:
         .render(
             **common,
             robot=diagnosis.bench.robot,
+            suspicions=diagnosis.suspicions,
             sentence=sentence(diagnosis),
             verdict=diagnosis.verdict,
             date=provenance.get("date", ""),

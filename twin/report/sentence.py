@@ -8,7 +8,8 @@ from twin import evaluate
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.effects import named
-from twin.report.numbers import SHOWN, number, percent, plus_minus, upper_first
+from twin.evaluate import KIND
+from twin.report.numbers import SHOWN, number, percent, plus_minus
 
 MOST = 3  # parameters of an effect named in a sentence
 
@@ -54,7 +55,7 @@ def claim_words(claim: Claim) -> str:
 def rivals(diagnosis: Diagnosis) -> list[str]:
     """Other explanations within the accuracy of the evidence, in words: sets that do not contain what is claimed."""
     claimed = {c.effect for c in diagnosis.claims}
-    others = [effects for effects in diagnosis.ambiguous if not claimed <= set(effects)]
+    others = [effects for effects in diagnosis.ambiguous if not claimed or not claimed <= set(effects)]
     return [" with ".join(effect_words(e) for e in effects) for effects in others]
 
 
@@ -74,32 +75,68 @@ def blind(diagnosis: Diagnosis) -> str | None:
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict, what it rests on, and the error on trials no fit has seen."""
-    d, group, e = diagnosis, headline(diagnosis), diagnosis.errors
-    unit, factor = SHOWN[group]
-    nominal, before, after, floor = (number(x[group] * factor) for x in (e.nominal, e.calibrated, e.after, e.floor))
-    count = len(d.held_trials)
-    unseen = f"on {count} trial{'s' if count != 1 else ''} no fit has seen"
-    error = f"error is {after} {unit}, from {nominal} {unit} as described (noise floor {floor} {unit})"
-    if d.verdict == "noise":
-        return f"No missing effect: after calibration only noise is left; {unseen} the {error}."
-    left = structure_left(d)
-    if d.verdict == "unexplained":
-        return (
-            f"Unexplained: after calibration a structured error of {d.structure_before:.2f} sigma is left that no known "
-            f"effect may claim; it moves mostly with {left}. {upper_first(unseen)} the {error}."
+    """The verdict, what it rests on, and the error on sealed trials."""
+    return f"{verdict_words(diagnosis)} {error_words(diagnosis)}"
+
+
+def verdict_words(diagnosis: Diagnosis) -> str:
+    """The verdict and what it rests on: all of it from trials that were not sealed."""
+    d = diagnosis
+    left, others = structure_left(d), rivals(d)
+    if not d.claims:
+        start = (
+            "No missing effect: after calibration only noise is left."
+            if d.verdict == "noise"
+            else f"Unexplained: after calibration a structured error of {d.structure_before:.2f} sigma is left that no known "
+            f"effect may claim; it moves mostly with {left}."
         )
+        alike = f" It could be {' or '.join(others[:2])}: these data cannot tell which, so neither is claimed." if others else ""
+        return start + alike
     many = len(d.claims) > 1
     start = "Partly explained" if d.verdict == "partly_explained" else f"Missing effect{'s' if many else ''}"
     names = " and ".join(claim_words(c) for c in d.claims)
     share = explained_share(d)
     they = "Together they explain" if many else "It explains"
-    explains = "" if share is None else f"{they} {percent(share)} of the structured error; "
-    verb = "falls" if e.after[group] < e.calibrated[group] else "goes"
-    change = f"the error {verb} from {before} to {after} {unit} (noise floor {floor} {unit})"
-    others = rivals(d)
+    explains = "" if share is None else f" {they} {percent(share)} of the structured error."
     doubt = f" These data cannot tell {'them' if many else 'it'} from {' or '.join(others[:2])}." if others else ""
     little = left and d.structure_after <= d.bars.left and d.line[0] <= d.bars.faint
     rest = " Little is left, but something speaks against it: see what is left, and the notices." if little else ""
     rest = f" What is left moves mostly with {left}." if left and not little else rest
-    return f"{start}: {names}. {upper_first(explains + unseen)} {change}.{doubt}{rest}"
+    return f"{start}: {names}.{explains}{doubt}{rest}"
+
+
+def error_words(diagnosis: Diagnosis) -> str:
+    """The error on sealed trials, whatever it says."""
+    d, group, e = diagnosis, headline(diagnosis), diagnosis.errors
+    unit, factor = SHOWN[group]
+    nominal, before, after, floor = (number(x[group] * factor) for x in (e.nominal, e.calibrated, e.after, e.floor))
+    count = len(d.sealed_trials) - len(e.lost)
+    where = f"On {count} sealed trial{'s' if count != 1 else ''}" + (", each in turn," if d.folds else "")
+    if d.claims:
+        verb = "falls" if e.after[group] < e.calibrated[group] else "goes"
+        words = f"{where} the error {verb} from {before} to {after} {unit} (noise floor {floor} {unit})."
+    else:
+        words = f"{where} the error is {after} {unit}, from {nominal} {unit} as described (noise floor {floor} {unit})."
+    if worse := [g for g in groups(d) if e.after[g] > e.calibrated[g]]:
+        by = max(e.after[g] / e.calibrated[g] - 1.0 for g in worse)
+        of = " and ".join(KIND[g].replace("_", " ") for g in worse)
+        words += f" There this twin is worse than the calibrated one in {of}, by {percent(by)}."
+    if e.lost:
+        words += f" It has no equilibrium for sealed {', '.join(labels(d, e.lost))}, which counts for nothing here."
+    return words + _stable(d)
+
+
+def _stable(d: Diagnosis) -> str:
+    """Where every trial was sealed in turn: how often the claims came out, and what that took."""
+    if not d.folds:
+        return ""
+    n = len(d.folds)
+    same = sum(f.effects == tuple(c.effect for c in d.claims) for f in d.folds)
+    made = f" With so few trials the diagnosis was made {n + 1} times"
+    return f"{made}; {same} of the {n} with one trial sealed come to the same effects."
+
+
+def labels(diagnosis: Diagnosis, trials: tuple[int, ...]) -> list[str]:
+    """Names of the bench's trials `trials` as reports print them: without the file's ending."""
+    label = {t.name: t.label for t in diagnosis.bench.recording.trials}
+    return [label[diagnosis.bench.inputs[k].name] for k in trials]

@@ -32,14 +32,15 @@ class Variable:
 def variables(bench: Bench) -> Iterator[tuple[str, Variable]]:
     """Each variable with its kind, as `giveaway.WORDS` names it."""
     inputs, n = bench.inputs, bench.n_sample
-    pull = np.concatenate([i.command for i in inputs]) * np.where(bench.by_length, 1e3, 1.0)
-    slope = np.concatenate([_slopes(i.time, i.command) for i in inputs]) * np.where(bench.by_length, 1e3, 1.0)
+    factor = np.array([d.shown[1] for d in bench.drives])
+    pull = np.concatenate([i.command for i in inputs]) * factor
+    slope = np.concatenate([_slopes(i.time, i.command) for i in inputs]) * factor
     still = STILL * np.median(np.abs(slope), axis=0)
     strongest = np.argmax(pull, axis=1)
     every, no = np.ones(n, bool), np.zeros(n)
     for t in range(bench.n_tendon):
         side = np.where(np.abs(slope[:, t]) > still[t], np.sign(slope[:, t]), 0.0)
-        what, unit = ("displacement", "mm") if bench.by_length[t] else ("current", "A") if bench.by_current[t] else ("tension", "N")
+        what, unit = bench.drives[t], bench.drives[t].shown[0]
         title, which, shown = f"{what} of tendon {t + 1} ({unit})", f"in which tendon {t + 1} pulls hardest", strongest == t
         yield "loop", Variable(title, pull[:, t], side, shown, True, which)
         yield "tension", Variable(title, pull[:, t], no, shown, False, which)

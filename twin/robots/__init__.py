@@ -1,9 +1,10 @@
-"""A family of bodies -> MuJoCo: `robot.toml` gives the numbers, the family's builder an `MjSpec` and the names in it.
+"""Robots and the families they are of: `robot.toml` gives the numbers, the family's module builds a body and names its solvers.
 
-A robot is a folder under `models/` (or any folder with a `robot.toml`); a family is a module here with a `build` function.
+A robot is a folder under `models/` (or any folder with a `robot.toml`); a family is a module here (family.py says what it holds)
+with a SCHEMA of every number it reads: unit, range, default and meaning (schema.py).
 """
 
-from twin.robots.body import Body, Frame, Jaw, JointSet, hinge_pairs
-from twin.robots.robot import Robot, available, load
+from twin.robots.family import Family, families, family
+from twin.robots.robot import Robot, available, compile_solver, load
 
-__all__ = ["Body", "Frame", "Jaw", "JointSet", "Robot", "available", "hinge_pairs", "load"]
+__all__ = ["Family", "Robot", "available", "compile_solver", "families", "family", "load"]

@@ -38,8 +38,6 @@ class Stiffness:
 
 
 class Backbone(Protocol):
-    SCALARS: ClassVar[Mapping[str, str]]  # its parameters: unit by name
-    STATIONS: ClassVar[Mapping[str, str]]  # those it has as a list along it
     in_channels: ClassVar[bool]
 
     def __init__(self, values: Mapping[str, float], disk_z: np.ndarray) -> None: ...
@@ -53,11 +51,6 @@ class Backbone(Protocol):
 class Wire:
     """A rod of radius r (1 + taper (1/2 - s/L)), modulus E, and mass spread evenly."""
 
-    SCALARS: ClassVar[Mapping[str, str]] = {
-        "backbone.radius": "m", "backbone.mass": "kg", "backbone.youngs_modulus": "Pa", "backbone.poisson_ratio": "1",
-        "backbone.radius_taper": "1", "disks.mass": "kg", "disks.radius": "m", "tendons.radius": "m", "damping.time": "s",
-    }  # fmt: skip
-    STATIONS: ClassVar[Mapping[str, str]] = {}
     in_channels: ClassVar[bool] = False
 
     def __init__(self, values: Mapping[str, float], disk_z: np.ndarray) -> None:
@@ -97,11 +90,6 @@ class Cast:
     """A solid of revolution whose radius is linear between stations, of modulus E and density rho, incompressible; its tendons run
     at radius + slope s from the axis."""
 
-    SCALARS: ClassVar[Mapping[str, str]] = {
-        "backbone.density": "kg/m^3", "backbone.youngs_modulus": "Pa", "backbone.stiffening": "1", "tendons.radius": "m",
-        "tendons.slope": "1", "damping.time": "s",
-    }  # fmt: skip
-    STATIONS: ClassVar[Mapping[str, str]] = {"backbone.station": "m", "backbone.radius": "m"}
     in_channels: ClassVar[bool] = True
 
     def __init__(self, values: Mapping[str, float], disk_z: np.ndarray) -> None:

@@ -13,29 +13,35 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from twin.errors import DataError
-from twin.robots.backbone import BODIES, Backbone, Cast, Piece, Wire
-from twin.robots.body import Body, Frame, JointSet
+from twin.body import Frame, marker_senses, tendon_ports, tendon_senses
+from twin.dynamics import Dynamics
+from twin.equilibrium import Equilibrium
+from twin.hinges import HingeChain, JointSet
+from twin.quantities import each
+from twin.robots.backbone import BODIES, Backbone, Piece
+from twin.robots.continuum_schema import SCHEMA, Continuum
+
+__all__ = ["SCHEMA", "build", "dynamics", "statics"]
 
 ALUMINIUM = [0.72, 0.74, 0.78, 1.0]
 NITI = [0.35, 0.38, 0.44, 1.0]
 TIMESTEP = 1e-3  # s
 
 
-def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
+def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HingeChain:
     """The robot of `structure` (counts) and `values` (SI, by parameter name) as an editable MuJoCo model.
 
     Base frame: origin on the backbone at the base hole plate, +z along the straight robot, angles from +x towards +y.
-    `structure`: disks, tendons; body ("wire" if not given, or "cast"); tendons_end, the disk they end at (the last); markers,
-    "disk" for a marker disk_K on every disk, or a list of disks that carry marker_1, marker_2, ... at offset_x|y|z from the centre.
+    What `structure` and `values` hold is in continuum_schema.py.
     """
-    n_disk, n_tendon, end, on_disk = _checked(structure, values)
-    pitch = [values.get(f"disks.pitch_{k}", values.get("disks.pitch", 0.0)) for k in range(1, n_disk + 1)]
-    disk_z = np.concatenate([[0.0], np.cumsum(pitch)])
+    shape = Continuum.model_validate(dict(structure))
+    n_disk, n_tendon, end = shape.disks, shape.tendons, shape.tendons_end or shape.disks
+    on_disk = None if shape.markers == "disk" else list(shape.markers)
+    disk_z = np.concatenate([[0.0], np.cumsum(each(values, "disks.pitch", n_disk))])
     length = float(disk_z[-1])
-    backbone = BODIES[str(structure.get("body", "wire"))](values, disk_z)
+    backbone = BODIES[shape.body](values, disk_z)
     spec = _world()
-    angles = [values[f"tendons.angle_{i}"] for i in range(1, n_tendon + 1)]
+    angles = list(each(values, "tendons.angle", n_tendon))
     tendons = [[f"tendon_{i}_hole_{k}" for k in range(end + 1)] for i in range(1, n_tendon + 1)]
     _drill(spec.worldbody, backbone.hole_radius(0.0), angles, 0, 0.0)
     plate = 1.3 * (values["disks.radius"] if not backbone.in_channels else backbone.radius(0.0))
@@ -56,7 +62,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
             if disk <= end:
                 _drill(body, backbone.hole_radius(float(disk_z[disk])), angles, disk, at)
             body.add_site(name=f"disk_{disk}_centre", pos=[0, 0, at], size=[5e-4, 0, 0])
-            for name, offset in _glued(on_disk, disk, values):
+            for name, offset in _glued(shape, disk, values):
                 body.add_site(name=name, pos=[*offset[:2], at + offset[2]], size=[1.2e-3, 0, 0], rgba=[0.9, 0.2, 0.2, 1])
         parent, before = body, z
     for i, sites in enumerate(tendons, 1):
@@ -65,63 +71,30 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
         [f"disk_{k}" for k in range(1, n_disk + 1)] if on_disk is None else [f"marker_{m}" for m in range(1, len(on_disk) + 1)]
     )
     tip = f"disk_{n_disk}" if on_disk is None else f"disk_{n_disk}_centre"
-    return Body(
+    return HingeChain(
         spec=spec,
+        n_tendon=n_tendon,
+        parts=frozenset({"weight", "elasticity", "backbone", "markers", "load cells"}),
+        drives=tendon_ports(n_tendon, values.get("springs.resistance", 1.0)),
+        senses=tendon_senses(n_tendon) | marker_senses([*markers, "tip"]),
+        frame=Frame.of(values),
         joints=tuple(joints),
         tendons=tuple(tuple(s) for s in tendons),
-        markers={**{name: name for name in markers}, "tip": tip},
+        markers=(*markers, tip),
         disks=tuple(f"disk_{k}_centre" for k in range(1, n_disk + 1)),
         tip=f"disk_{n_disk}_centre",
         length=length,
         bows=not backbone.in_channels,
-        frame=Frame.of(values),
         stiffening=values.get("backbone.stiffening", 0.0),
     )
 
 
-COUNTS = ("disks", "tendons")  # whole numbers its structure needs
-LISTS = {"disks.pitch": "m", "tendons.angle": "rad"}
-OFFSETS = ("markers.offset_x", "markers.offset_y", "markers.offset_z")
-UNITS = {
-    **LISTS, "markers.axial_offset": "m", **dict.fromkeys(OFFSETS, "m"), **Cast.SCALARS, **Cast.STATIONS, **Wire.SCALARS,
-    **Frame.UNITS,
-}  # fmt: skip  # of the parameters this family is built from
-
-
-def _checked(structure: Mapping[str, object], values: Mapping[str, float]) -> tuple[int, int, int, list[int] | None]:
-    """Disks, tendons, where they end, disks that carry markers (None: all). Raises DataError for counts and parameters this family
-    cannot be built from."""
-    n_disk, n_tendon = int(structure["disks"]), int(structure["tendons"])  # type: ignore[call-overload]
-    if n_disk < 1 or n_tendon < 1:
-        raise DataError(f"disks = {n_disk}, tendons = {n_tendon}; at least one of each is needed")
-    end = structure.get("tendons_end", n_disk)
-    if not (isinstance(end, int) and 1 <= end <= n_disk):
-        raise DataError(f"structure: tendons_end is {end!r}; a disk from 1 to {n_disk} is needed")
-    kind = structure.get("body", "wire")
-    if kind not in BODIES:
-        raise DataError(f"structure: body is {kind!r}; allowed: {', '.join(BODIES)}")
-    body, markers = BODIES[str(kind)], structure.get("markers", "disk")
-    if markers == "disk":
-        on_disk, lists = None, {"markers.axial_offset": n_disk}
-    elif isinstance(markers, list) and all(isinstance(k, int) and 1 <= k <= n_disk for k in markers):
-        on_disk, lists = markers, dict.fromkeys(OFFSETS, len(markers))
-    else:
-        raise DataError(f'structure: markers is {markers!r}; "disk" or a list of disks from 1 to {n_disk} is needed')
-    stations = sum(name.startswith("backbone.station_") for name in values)
-    lists |= {} if "disks.pitch" in values else {"disks.pitch": n_disk}
-    lists |= {"tendons.angle": n_tendon, **dict.fromkeys(body.STATIONS, max(stations, 2))}
-    needed = {*body.SCALARS, *(f"{name}_{k}" for name, n in lists.items() for k in range(1, n + 1))}
-    if missing := sorted(needed - set(values)):
-        raise DataError(f"parameter {missing[0]!r} is missing; {n_disk} disks and {n_tendon} tendons need it")
-    return n_disk, n_tendon, end, on_disk
-
-
-def _glued(on_disk: list[int] | None, disk: int, values: Mapping[str, float]) -> list[tuple[str, list[float]]]:
+def _glued(shape: Continuum, disk: int, values: Mapping[str, float]) -> list[tuple[str, list[float]]]:
     """Names of the markers on a disk, and where they sit from its centre (m)."""
-    if on_disk is None:
-        return [(f"disk_{disk}", [0.0, 0.0, values[f"markers.axial_offset_{disk}"]])]
-    numbers = [m for m, k in enumerate(on_disk, 1) if k == disk]
-    return [(f"marker_{m}", [values[f"{name}_{m}"] for name in OFFSETS]) for m in numbers]
+    if shape.markers == "disk":
+        return [(f"disk_{disk}", [0.0, 0.0, float(each(values, "markers.axial_offset", shape.disks)[disk - 1])])]
+    offsets = np.stack([each(values, f"markers.offset_{a}", len(shape.markers)) for a in "xyz"], axis=1)
+    return [(f"marker_{m + 1}", offsets[m].tolist()) for m, k in enumerate(shape.markers) if k == disk]
 
 
 def _world() -> mujoco.MjSpec:
@@ -194,3 +167,11 @@ def _thread(spec: mujoco.MjSpec, i: int, sites: list[str]) -> None:
         tendon.wrap_site(sites[d + 1])
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
         motor.gear = [-1, 0, 0, 0, 0, 0]
+
+
+def statics(body: HingeChain) -> Equilibrium:
+    return Equilibrium(body)
+
+
+def dynamics(body: HingeChain) -> Dynamics:
+    return Dynamics(body)

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from twin.errors import SolveError
+from twin.quantities import each
 
 TIMESTEP = 2e-3  # s
 DAMPING = 1e-2  # s, of the rod: shapes at rest do not depend on it
@@ -24,7 +25,7 @@ LONGEST = 4000  # steps to rest
 def build(structure: Mapping[str, object], values: Mapping[str, float], gravity: np.ndarray) -> mujoco.MjModel:
     """The rod, its disks at `disk_K`, tendon 1 as one motor a segment (ctrl: tension in N)."""
     n = int(structure["disks"])  # type: ignore[call-overload]
-    pitch = np.array([values[f"disks.pitch_{k}"] for k in range(1, n + 1)])
+    pitch = each(values, "disks.pitch", n)
     z = np.concatenate([[0.0], np.cumsum(pitch)])
     arm = values["tendons.radius"]
     mass = (values["disks.mass"] + values["backbone.mass"]) / n

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,15 +9,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
-from twin.effects import named
-from twin.errors import DataError, UnknownNameError
-from twin.quantities import Parameter, Values, overrides, si_factor, si_unit
-from twin.robots.body import Body
-from twin.robots.toml_file import opened
-from twin.springs import PARAMETERS, Spring, springs_of
+from twin.body import Body, Problem, Solver
+from twin.effects import Loads
+from twin.errors import DataError, TwinError, UnknownNameError, listed, shown
+from twin.forms import Form, Line, fill
+from twin.measurements.files import is_file, read_text
+from twin.quantities import Parameter, Values, overrides
+from twin.robots.effect_tables import read_effects
+from twin.robots.family import family
+from twin.robots.schema import GRAVITY, Fact, Quantity, Row, Schema, Structure, absent, parameters, unknown
+from twin.robots.toml_file import LARGEST, checked
+from twin.springs import Spring, springs_of
 
 FORMAT = "twin-robot/1"
+FILE = "robot.toml"
 
 
 @dataclass(frozen=True)
@@ -52,8 +57,21 @@ class Robot:
 
     def build(self, values: Values | None = None) -> Body:
         """The MuJoCo body at the given parameter values, nominal where none is given. Raises TwinError for a bad name."""
-        family = importlib.import_module(f"twin.robots.{self.family}")
-        return family.build(self.structure, overrides(self.parameters, values or {}))
+        return family(self.family).build(self.structure, overrides(self.parameters, values or {}))
+
+    def solver(self, body: Body, *, dynamic: bool = False) -> Solver:
+        """What solves a body of this robot's family, by statics or by MuJoCo steps. Raises DataError where it has no dynamics."""
+        made_by = family(self.family)
+        if not dynamic:
+            return made_by.statics(body)
+        if made_by.dynamics is None:
+            raise DataError(f"robot {self.name!r} is predicted by statics only: a {self.family} has no dynamics here")
+        return made_by.dynamics(body)
+
+    def objections(self, values: Values) -> list[str]:
+        """What is wrong between this robot's numbers, at the given values, that are each in order."""
+        schema = family(self.family).SCHEMA
+        return schema.objections(schema.structure.model_validate(dict(self.structure)), overrides(self.parameters, values))
 
     def springs(self, n: int, values: Values | None = None) -> Spring:
         """The SMA springs of n tendons at the given parameter values. Raises DataError where the robot describes none."""
@@ -80,90 +98,106 @@ def load(name: str, relative_to: Path | None = None) -> Robot:
     folder = models_folder() / name
     if name not in available():
         folder = (relative_to or Path.cwd()) / name
-        if not (folder / "robot.toml").is_file():
-            raise UnknownNameError("robot", name, available())
-    return _read(folder.resolve())
+        if not is_file(folder / FILE):
+            besides = (
+                f", or a path from {shown(str(relative_to or Path.cwd()), 300)} to a folder with a {FILE} (`twin new` makes one)"
+            )
+            raise UnknownNameError("robot", name, available(), besides)
+    return _read(folder.resolve(), read_text(folder / FILE, LARGEST))
+
+
+def compile_solver() -> None:
+    """Compile the static solve of backbones (or load it from disk) by solving nothing."""
+    robot = next(r for r in map(load, available()) if "backbone" in r.build().parts)
+    n = np.zeros((1, robot.n_tendon))
+    robot.solver(robot.build()).solve(Problem(np.zeros(1), n, Loads(np.zeros(3))))
 
 
 @lru_cache(maxsize=16)
-def _read(folder: Path) -> Robot:
-    with opened(folder / "robot.toml", FORMAT) as table:
-        try:
-            robot = _robot(folder, table)
-            _check(robot)
-            return robot
-        except KeyError as error:
-            raise DataError(f"{error.args[0]!r} is missing") from None
-        except (TypeError, ValueError, AttributeError) as error:
-            raise DataError(f"{error}; compare it with the robots that ship with the twin") from None
+def _read(folder: Path, data: bytes) -> Robot:
+    try:
+        return _robot(folder, checked(data, FORMAT))
+    except TwinError as error:
+        raise DataError(f"{folder / FILE}: {error}") from None
+
+
+class RobotFile(Form):
+    """The top of a `robot.toml`."""
+
+    format: str = Field(description=f'"{FORMAT}"')
+    family: Line = Field(description="what kind of body it is")
+    title: Line = Field(description="one line for people")
+    structure: dict[str, Any] = Field(description="whole numbers and choices")
+    parameters: dict[str, Any] = Field(description="every number with unit and source")
+    gravity: dict[str, Any] = Field(
+        description="value = [x, y, z] in the base frame, unit, source; a measurement set may say otherwise"
+    )
+    accuracy: dict[str, Any] = Field(description="value, unit, source: the description's own error; no smaller effect is claimed")
+    effect: list[Any] = Field([], description="laws the robot is known to have, as in twin.toml")
 
 
 def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
-    gravity = np.array(table["gravity"]["value"], float) * si_factor(table["gravity"]["unit"], "gravity")
-    gravity.setflags(write=False)
-    _check_numbers("accuracy", table["accuracy"])
+    """The robot of a file's content. Raises DataError with all that is wrong with it."""
+    problems: list[str] = []
+    file = fill(RobotFile, table, "", problems)
+    if file is None:
+        raise DataError(listed(problems))
+    schema = family(file.family).SCHEMA
+    structure = fill(schema.structure, file.structure, "structure", problems)
+    problems += structure.objections() if structure else []
+    if structure is None or problems:
+        raise DataError(listed(problems))
+    found = _parameters(schema, structure, file.parameters, problems)
+    gravity = _read_fact(GRAVITY, file.gravity, {"axis": 3}, problems)
+    accuracy = _read_fact(schema.accuracy, file.accuracy, {}, problems)
+    effects = read_effects(file.effect, structure.counts()["tendon"], problems)
+    if not problems:
+        problems += schema.objections(structure, {p.name: p.value for p in found})
+    if problems:
+        raise DataError(listed(problems))
+    pull = np.array([p.value for p in gravity])
+    pull.setflags(write=False)
     return Robot(
         name=folder.name,
-        family=table["family"],
-        title=table["title"],
+        family=file.family,
+        title=file.title,
         folder=folder,
-        structure=table["structure"],
-        parameters=tuple(p for name, entry in table["parameters"].items() for p in _parameters(name, entry)),
-        gravity=gravity,
-        accuracy=float(table["accuracy"]["value"]) * si_factor(table["accuracy"]["unit"], "accuracy"),
-        effects=tuple((e["id"], dict(e.get("parameters", {}))) for e in table.get("effect", [])),
+        structure=structure.model_dump(exclude_none=True),
+        parameters=tuple(p for p in found if p.name not in {row.name for row in schema.rows if row.stated}),
+        gravity=pull,
+        accuracy=accuracy[0].value,
+        effects=tuple((e.id, e.values) for e in effects),
     )
 
 
-def _check(robot: Robot) -> None:
-    """What a robot's file must hold beyond its form. Raises TwinError."""
-    if robot.gravity.shape != (3,) or not np.isfinite(robot.gravity).all():
-        raise DataError(f"gravity is {robot.gravity.tolist()}; three finite numbers are needed")
-    if importlib.util.find_spec(f"twin.robots.{robot.family}") is None:
-        raise DataError(f"no family named {robot.family!r}; a family is a module of twin.robots, as 'continuum'")
-    family = importlib.import_module(f"twin.robots.{robot.family}")
-    units = family.UNITS | PARAMETERS
-    for p in robot.parameters:
-        needed = units.get(p.name, units.get(p.name.rpartition("_")[0]))
-        if needed is not None and p.unit != needed:
-            raise DataError(f"parameter {p.name!r} is in {p.unit}; a unit like {needed!r} is needed")
-    for name in family.COUNTS:
-        if not isinstance(robot.structure.get(name), int):
-            raise DataError(f"structure: {name} is {robot.structure.get(name)!r}; a whole number is needed")
-    for identifier, values in robot.effects:
-        named(identifier)(values, robot.n_tendon)
-    robot.build()
-
-
-def _check_numbers(name: str, entry: Mapping[str, object]) -> None:
-    for key in {"value", "std", "low", "high"} & set(entry):
-        numbers = entry[key] if isinstance(entry[key], list) else [entry[key]]
-        if not all(isinstance(n, int | float) and np.isfinite(n) for n in numbers):  # type: ignore[union-attr]
-            raise DataError(f"parameter {name!r}: {key} is {entry[key]!r}; finite numbers are needed")
-
-
-def _parameters(name: str, entry: Mapping[str, object]) -> list[Parameter]:
-    if not isinstance(entry, Mapping):
-        raise DataError(f"parameter {name!r} is {entry!r}; write {{ value = ..., unit = ..., source = ... }}")
-    missing = {"value", "unit", "source"} - set(entry)
+def _parameters(schema: Schema, structure: Structure, table: Mapping[str, Any], problems: list[str]) -> list[Parameter]:
+    """All parameters of a robot, those its file leaves out at their defaults; all that is wrong is added to `problems`."""
+    taken = schema.taken(structure)
+    problems += [f"parameters: {unknown(name, schema, taken)}" for name in table if name not in taken]
+    written = {taken[name].group for name in table if name in taken}
+    found: list[Parameter] = []
+    missing = []
+    for name, row in taken.items():
+        if name in table:
+            entry = fill(Quantity, table[name], f"parameter {name!r}", problems)
+            found += _read_row(row, entry, structure.counts(), problems) if entry else []
+        elif row.default is not None:
+            found.append(absent(row))
+        elif not row.stated and (not row.group or row.group in written):
+            missing.append(name)
     if missing:
-        raise DataError(f"parameter {name!r} lacks {', '.join(sorted(missing))}; every number has a unit and a source")
-    factor = si_factor(str(entry["unit"]), f"parameter {name!r}")
-    unit = si_unit(str(entry["unit"]), f"parameter {name!r}")
-    _check_numbers(name, entry)
-    value = entry["value"]
-    many = isinstance(value, list)
-    numbers: list[float] = [float(v) for v in value] if isinstance(value, list) else [float(value)]  # type: ignore[arg-type]
-    std = float(entry["std"]) * factor if "std" in entry else None  # type: ignore[arg-type]
-    return [
-        Parameter(
-            name=f"{name}_{k}" if many else name,
-            value=v * factor,
-            unit=unit,
-            low=float(entry["low"]) * factor if "low" in entry else -np.inf,  # type: ignore[arg-type]
-            high=float(entry["high"]) * factor if "high" in entry else np.inf,  # type: ignore[arg-type]
-            source=str(entry["source"]),
-            std=std,
-        )
-        for k, v in enumerate(numbers, 1)
-    ]
+        problems.append(f"parameters that are missing: {', '.join(missing)}")
+    return found
+
+
+def _read_fact(row: Row, table: object, counts: Mapping[str, int], problems: list[str]) -> list[Parameter]:
+    fact = fill(Fact, table, row.name, problems)
+    return _read_row(row, Quantity(**dict(fact)), counts, problems) if fact else []
+
+
+def _read_row(row: Row, entry: Quantity, counts: Mapping[str, int], problems: list[str]) -> list[Parameter]:
+    try:
+        return parameters(row, entry, counts)
+    except DataError as error:
+        problems.append(f"parameter {row.name!r}: {error}")
+        return []

@@ -8,36 +8,76 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
-from twin.errors import DataError
-from twin.robots.body import Jaw
+from twin.body import Body, Path, Port, Problem, Sense
+from twin.effects import Drive
+from twin.equilibrium.antagonists import Pair, follow
+from twin.robots.transmission_schema import SCHEMA, Transmission
+
+__all__ = ["SCHEMA", "build", "dynamics", "statics"]
 
 STEEL = [0.72, 0.74, 0.78, 1.0]
 TIMESTEP = 1e-3  # s
 ANCHOR = 1.001  # of the pulley's radius: an anchor inside the pulley would not be wrapped
-COUNTS = ("tendons",)
-UNITS = {
-    "drum.radius": "m", "pulley.radius": "m", "jaw.rest": "rad", "jaw.length": "m", "jaw.mass": "kg", "shaft.length": "m",
-    "tendons.wrap": "rad", "tendons.pretension": "N", "tendons.stretch": "m/N",
-}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jaw(Body):
+    """A rigid jaw on one hinge, turned by a pair of antagonist tendons from a drum.
+
+    Turning the drum by q (rad) pulls tendon 1 in by drum q (m) and pays tendon 2 out by as much; turning the jaw by a from its
+    `rest` (rad) takes pulley (a - rest) of tendon 1 and gives as much of tendon 2; `pulley` (m) is negative where they cross.
+    At rest both pull with `pretension` (N) and give way by `stretch` (m/N); on its way each turns by `wrap` (rad) over idlers.
+    """
+
+    drum: float
+    pulley: float
+    rest: float
+    wrap: float
+    pretension: float
+    stretch: float
+
+
+class Antagonists:
+    """A jaw ready to be solved. It is rigid: it does not creep, and has no stiffness of its own."""
+
+    n_slow = 0
+
+    def __init__(self, body: Jaw) -> None:
+        self.body = body
+        self.straight_path = np.zeros(2)
+
+    def solve(self, problem: Problem) -> Path:
+        """Equilibria under displacements (n, 2) m and the loads' torque; shows the angles (n, 2) rad of drum and jaw, and the
+        torques (n, 2) N m that act on them from outside."""
+        body, route, u = self.body, problem.route, problem.command
+        torque = np.broadcast_to(np.asarray(problem.loads.torque, float), len(u))
+        stretch = body.stretch + route.stretch
+        pair = Pair(body.pretension, stretch, route.stiffening, route.mu * body.wrap, route.presliding)
+        y, tension, status = follow(u, torque / body.pulley, pair)
+        q = body.rest + y / body.pulley
+        drum = 0.5 * (u[:, 0] - u[:, 1]) / body.drum  # what both tendons have lost is slack
+        others = {
+            "angle": np.column_stack([drum, q]),
+            "torque": np.column_stack([body.drum * (tension[:, 0] - tension[:, 1]), torque]),
+        }
+        return Path(
+            tension=tension, path=np.column_stack([-y, y]), markers=np.empty((len(u), 0, 3)), status=status, q=q[:, None],
+            others=others,
+        )  # fmt: skip
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
     """The robot of `structure` and `values` (SI, by parameter name) as an editable MuJoCo model.
 
-    Base frame: origin at the drum's end of the shaft, +z along it; the jaw turns about y. `structure`: tendons, 2; crossed, whether
-    the jaw turns against the drum. Raises DataError for what this family cannot be built from.
+    Base frame: origin at the drum's end of the shaft, +z along it; the jaw turns about y. What `structure` and `values` hold is
+    in transmission_schema.py.
     """
-    crossed = structure.get("crossed", False)
-    if structure["tendons"] != 2 or not isinstance(crossed, bool):
-        raise DataError(f"structure: tendons = {structure['tendons']!r}, crossed = {crossed!r}; needed are 2, and true or false")
-    if missing := sorted(set(UNITS) - set(values)):
-        raise DataError(f"parameter {missing[0]!r} is missing; a transmission needs it")
-    for name in ("drum.radius", "pulley.radius", "jaw.length", "jaw.mass", "shaft.length"):
-        if not values[name] > 0.0:
-            raise DataError(f"parameter {name!r} is {values[name]:g}; a number above zero is needed")
+    crossed = Transmission.model_validate(dict(structure)).crossed
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.timestep, spec.option.gravity = TIMESTEP, [0, 0, 0]
@@ -53,7 +93,6 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
     blade = {**shown, "mass": values["jaw.mass"]}
     jaw.add_geom(type=capsule, size=[0.3 * radius, 0, 0], fromto=[0, 0, 0, 0, 0, values["jaw.length"]], **blade)
     jaw.add_site(name="jaw_tip", pos=[0, 0, values["jaw.length"]], size=[5e-4, 0, 0])
-    tendons = []
     for i, side in ((1, -1.0 if crossed else 1.0), (2, 1.0 if crossed else -1.0)):
         base, anchor, beside = f"tendon_{i}_base", f"tendon_{i}_anchor", f"tendon_{i}_side"
         spec.worldbody.add_site(name=base, pos=[side * radius, 0, 0], size=[5e-4, 0, 0])
@@ -65,22 +104,31 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
         tendon.wrap_site(anchor)
         motor = spec.add_actuator(name=f"tendon_{i}", target=f"tendon_{i}", trntype=mujoco.mjtTrn.mjTRN_TENDON)
         motor.gear = [-1, 0, 0, 0, 0, 0]
-        tendons.append((base, anchor))
+    drum = values["drum.radius"]
     return Jaw(
         spec=spec,
-        joints=(),
-        tendons=tuple(tendons),
-        markers={},
-        disks=(),
-        tip="jaw_tip",
-        length=length,
-        bows=False,
-        pivots=("joint_2",),
+        n_tendon=2,
         parts=frozenset({"antagonists"}),
-        drum=values["drum.radius"],
+        antagonists=True,
+        tendons=tuple((f"tendon_{i}_base", f"tendon_{i}_anchor") for i in (1, 2)),
+        drives=((Port("joint_1_angle", Drive.DISPLACEMENT, (drum, -drum)),),),
+        senses={
+            **{f"tendon_{i}_{group}": Sense(group, i - 1) for i in (1, 2) for group in ("tension", "displacement")},
+            "joint_2_angle": Sense("angle", 1),
+            "joint_1_torque": Sense("torque", 0),
+        },
+        loads={"joint_2_torque": "torque"},
+        drum=drum,
         pulley=-radius if crossed else radius,
         rest=values["jaw.rest"],
         wrap=values["tendons.wrap"],
         pretension=values["tendons.pretension"],
         stretch=values["tendons.stretch"],
     )
+
+
+def statics(body: Jaw) -> Antagonists:
+    return Antagonists(body)
+
+
+dynamics = None  # a jaw is predicted by statics only

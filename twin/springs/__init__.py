@@ -9,6 +9,6 @@ superelastic.py   a spring of another kind, that no current drives: elongation -
 from __future__ import annotations
 
 from twin.springs.alone import pull
-from twin.springs.spring import PARAMETERS, Spring, springs_of
+from twin.springs.spring import Spring, springs_of
 
-__all__ = ["PARAMETERS", "Spring", "pull", "springs_of"]
+__all__ = ["Spring", "pull", "springs_of"]

@@ -13,7 +13,7 @@ from twin.springs.spring import Spring
 @jit
 def step_along(spring, time, current, elongation, ambient, temperature, tension):
     for t in range(current.shape[0]):
-        warm, e, s = ambient[t, 0], spring.initial_elongation[t], spring.initial_tension[t]
+        warm, e, s = ambient[t, 0], spring[t].initial_elongation, spring[t].initial_tension
         for i in range(time.size):
             if i > 0:
                 warm = heated(spring, t, warm, e, current[t, i - 1], ambient[t, i - 1], time[i] - time[i - 1])
@@ -37,8 +37,6 @@ def pull(
     shape = np.shape(current)
     temperature, tension = np.empty(shape), np.empty(shape)
     around = np.ascontiguousarray(np.broadcast_to(ambient, shape), float)
-    step_along(
-        spring, np.asarray(time, float), np.ascontiguousarray(current, float), np.ascontiguousarray(elongation, float), around,
-        temperature, tension,
-    )  # fmt: skip
+    current, elongation = np.ascontiguousarray(current, float), np.ascontiguousarray(elongation, float)
+    step_along(spring.records, np.asarray(time, float), current, elongation, around, temperature, tension)
     return temperature, tension

@@ -23,15 +23,16 @@ FLATTEST = 1e-3  # of E_M: the least slope of a plateau
 
 @jit
 def branches(spring, t, temperature):
-    """Force (N) at zero elongation and slope (N/m) of the upper and of the lower branch of spring t at `temperature` (K)."""
-    k, e_in = spring.force_per_kelvin[t], spring.transformation_elongation[t]
-    EA, EM = spring.austenite_stiffness[t], spring.martensite_stiffness[t]
-    start = max(spring.detwinning_start[t], k * (temperature - spring.martensite_start[t]))
-    finish = max(spring.detwinning_finish[t], k * (temperature - spring.martensite_finish[t]))
+    """Force (N) at zero elongation and slope (N/m) of the upper and of the lower branch of spring t of the `Spring.records` at
+    `temperature` (K)."""
+    k, e_in = spring[t].force_per_kelvin, spring[t].transformation_elongation
+    EA, EM = spring[t].austenite_stiffness, spring[t].martensite_stiffness
+    start = max(spring[t].detwinning_start, k * (temperature - spring[t].martensite_start))
+    finish = max(spring[t].detwinning_finish, k * (temperature - spring[t].martensite_finish))
     slope_up = sloped(start, finish, finish / EM + e_in - start / EA, FLATTEST * EM)
     upper = finish - slope_up * (finish / EM + e_in)
-    begin = k * (temperature - spring.austenite_start[t])
-    end = k * (temperature - spring.austenite_finish[t])
+    begin = k * (temperature - spring[t].austenite_start)
+    end = k * (temperature - spring[t].austenite_finish)
     slope_down = sloped(end, begin, begin / EM + e_in - end / EA, FLATTEST * EM)
     return upper, slope_up, end - slope_down * end / EA, slope_down
 
@@ -45,7 +46,7 @@ def sloped(low, high, length, least):
 @jit
 def piece(spring, t, temperature, elongation, last_elongation, last_tension):
     """Y (N) and its slope (N/m) at an elongation (m); a negative Y is a slack spring."""
-    EA, EM = spring.austenite_stiffness[t], spring.martensite_stiffness[t]
+    EA, EM = spring[t].austenite_stiffness, spring[t].martensite_stiffness
     upper, slope_up, lower, slope_down = branches(spring, t, temperature)
     Y, slope = EM * (elongation - last_elongation) + last_tension, EM
     if lower + slope_down * elongation > Y:
@@ -54,6 +55,6 @@ def piece(spring, t, temperature, elongation, last_elongation, last_tension):
         Y, slope = upper + slope_up * elongation, slope_up
     if EA * elongation < Y:
         Y, slope = EA * elongation, EA
-    if EM * (elongation - spring.transformation_elongation[t]) > Y:
-        Y, slope = EM * (elongation - spring.transformation_elongation[t]), EM
+    if EM * (elongation - spring[t].transformation_elongation) > Y:
+        Y, slope = EM * (elongation - spring[t].transformation_elongation), EM
     return Y, slope

@@ -25,16 +25,17 @@ REFERENCE = 296.15  # K, of the surroundings the loss is quoted in
 
 @jit
 def loss(spring, t, above, elongation, ambient):
-    """Heat loss (W/K) of spring t, `above` (K) the surroundings at `ambient` (K), at an elongation (m)."""
-    y = elongation / spring.coils[t]
-    h = spring.loss[t] + above * (spring.loss_warm[t] + above * spring.loss_warm_2[t] + y * spring.loss_warm_open[t])
-    h += y * (spring.loss_open[t] + y * spring.loss_open_2[t])
-    return max(LEAST_LOSS, h * (1.0 + spring.loss_surroundings[t] * (ambient - REFERENCE)))
+    """Heat loss (W/K) of spring t of the `Spring.records`, `above` (K) the surroundings at `ambient` (K), at an elongation (m)."""
+    y = elongation / spring[t].coils
+    h = spring[t].loss + above * (spring[t].loss_warm + above * spring[t].loss_warm_2 + y * spring[t].loss_warm_open)
+    h += y * (spring[t].loss_open + y * spring[t].loss_open_2)
+    return max(LEAST_LOSS, h * (1.0 + spring[t].loss_surroundings * (ambient - REFERENCE)))
 
 
 def memory(spring: Spring) -> np.ndarray:
     """Time (s) over which each spring averages its heat, WARM above the surroundings: capacity over loss."""
-    h = [loss(spring, t, WARM, float(spring.initial_elongation[t]), REFERENCE) for t in range(len(spring.capacity))]
+    of = spring.records
+    h = [loss(of, t, WARM, float(spring.initial_elongation[t]), REFERENCE) for t in range(len(spring.capacity))]
     return spring.capacity / np.array(h)
 
 
@@ -43,5 +44,5 @@ def heated(spring, t, temperature, elongation, current, ambient, dt):
     """Temperature (K) of spring t after dt (s) under a constant current (A) in surroundings at `ambient` (K)."""
     above = temperature - ambient
     h = loss(spring, t, above, elongation, ambient)
-    keep = np.exp(-h * dt / spring.capacity[t])
-    return ambient + spring.resistance[t] / h * (1.0 - keep) * current * current + keep * above
+    keep = np.exp(-h * dt / spring[t].capacity)
+    return ambient + spring[t].resistance / h * (1.0 - keep) * current * current + keep * above

@@ -36,7 +36,16 @@ class Spring(NamedTuple):
     initial_tension: np.ndarray  # N
     loss_surroundings: np.ndarray  # 1/K, relative change of the loss per kelvin of the surroundings above 23 degC
 
+    @property
+    def records(self) -> np.ndarray:
+        """(n_spring,) one record a spring, with the same fields: one array, which compiled code takes in a fraction of the time."""
+        out = np.empty(len(self.capacity), _RECORD)
+        for name, value in zip(self._fields, self, strict=True):
+            out[name] = value
+        return out
 
+
+_RECORD = np.dtype([(name, float) for name in Spring._fields])
 UNITS = {
     "resistance": "ohm", "capacity": "J/K", "coils": "1", "loss": "W/K", "loss_warm": "W/K^2", "loss_warm_2": "W/K^3",
     "loss_open": "W/(K*m)", "loss_open_2": "W/(K*m^2)", "loss_warm_open": "W/(K^2*m)", "martensite_start": "K",

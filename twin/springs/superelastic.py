@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.compiled import jit
-from twin.quantities import si_factor
+from twin.units import unit_scale
 
 HALVINGS = 60  # of the interval that holds the stress: to rounding
 
@@ -46,10 +46,13 @@ class Superelastic(NamedTuple):
     austenite_finish: float
 
 
+SI = dict(zip(Superelastic._fields, ("m", "m", "m", "1", "Pa", "Pa", "1", "Pa", "Pa", "Pa", "Pa"), strict=True))
+
+
 def published() -> Superelastic:
     """The spring of superelastic.toml."""
     table = tomllib.loads((Path(__file__).parent / "superelastic.toml").read_text())["parameters"]
-    return Superelastic(*(float(table[n]["value"]) * si_factor(table[n]["unit"], n) for n in Superelastic._fields))
+    return Superelastic(*(unit_scale(table[n]["unit"], SI[n]).to_si(float(table[n]["value"])) for n in Superelastic._fields))
 
 
 @jit

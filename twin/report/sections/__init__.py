@@ -10,6 +10,7 @@ from twin.report.sections import (
     effects,
     identifiability,
     leftover,
+    loops,
     made_with,
     next_experiment,
     noise,
@@ -24,6 +25,7 @@ from twin.report.sections.section import Section, Story
 SECTIONS: tuple[Callable[[Story], Section], ...] = (
     before_after.section,
     effects.section,
+    loops.section,
     residual.section,
     shapes.section,
     tip.section,

@@ -1,4 +1,4 @@
-"""The error on trials no fit has seen: as described, calibrated, with the effects; and the noise floor."""
+"""The error on sealed trials: as described, calibrated, with the effects; and the noise floor."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
 from twin.evaluate import KIND
-from twin.report.contents import labels
 from twin.report.numbers import SHOWN, number, places, upper_first
 from twin.report.plots import ACCENT, BEFORE, MEASURED, Plot, figure
 from twin.report.sections.section import Section, Story
-from twin.report.sentence import groups
+from twin.report.sentence import error_words, groups, labels
 
 ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with the effects"}
 
@@ -21,7 +20,8 @@ def section(story: Story) -> Section:
         {"kind": upper_first(KIND[g].replace("_", " ")), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)}
         for g in groups(d)
     ]
-    return Section("before-after", "Before and after", "before_after.html", {"tables": tables, "trials": labels(d, d.held_trials)})
+    content = {"tables": tables, "trials": labels(d, d.sealed_trials), "words": error_words(d)}
+    return Section("before-after", "Before and after", "before_after.html", content)
 
 
 def rows(d: Diagnosis, group: str) -> list[dict[str, str]]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from twin.report.contents import labels
 from twin.report.sections.section import Section, Story
+from twin.report.sentence import labels
 
 
 def section(story: Story) -> Section:
@@ -18,7 +18,7 @@ def section(story: Story) -> Section:
         ("folder", str(r.folder) if r.folder else "in memory"),
         ("samples", f"{d.bench.n_sample} in {len(d.bench.inputs)} trials, {len(d.bench.outputs)} output channels"),
         ("trials fitted", ", ".join(labels(d, d.fitted_trials))),
-        ("trials held out", ", ".join(labels(d, d.held_trials))),
+        ("trials sealed", ", ".join(labels(d, d.sealed_trials))),
         ("robot", f"{d.bench.robot.name}: {d.bench.robot.title}"),
         *_flat(story.provenance),
     ]

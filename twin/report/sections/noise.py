@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from twin.evaluate import KIND
-from twin.report.contents import driven
 from twin.report.numbers import SHOWN, column
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import groups
@@ -28,6 +27,6 @@ def section(story: Story) -> Section:
                 "floor": column([SHOWN[g][1] * d.errors.floor[g]])[0],
             }
         )
-    inputs = [f"{SHOWN[of][1] * s:.3g} {SHOWN[of][0]}" for s, of in zip(d.noise.drive, driven(d.bench), strict=True)]
+    inputs = [f"{SHOWN[of][1] * s:.3g} {SHOWN[of][0]}" for s, of in zip(d.noise.drive, d.bench.drives, strict=True)]
     content = {"rows": rows, "inputs": ", ".join(inputs), "origin": d.noise.source}
     return Section("noise", "The noise", "noise.html", content)

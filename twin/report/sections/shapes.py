@@ -1,4 +1,4 @@
-"""Measured and predicted shapes of a few poses of held-out trials, in 3-D with equal axes."""
+"""Measured and predicted shapes of a few poses of sealed trials, in 3-D with equal axes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
-from twin.report.contents import labels
 from twin.report.numbers import MM
 from twin.report.plots import BEFORE, MEASURED, Plot, figure, numbers
 from twin.report.sections.section import Section, Story
+from twin.report.sentence import labels
 from twin.report.stages import before_and_after, markers
 
 POSES = 4
@@ -25,10 +25,10 @@ def section(story: Story) -> Section:
 
 
 def poses(d: Diagnosis) -> list[tuple[int, int]]:
-    """(trial, sample) of up to four complete held-out poses that differ most: the most bent first, then the furthest from those."""
+    """(trial, sample) of up to four complete sealed poses that differ most: the most bent first, then the furthest from those."""
     columns = [c for _, three in markers(d.bench) for c in three]
     tip = columns[-3:]
-    at = [(k, n) for k in d.held_trials for n in np.flatnonzero(np.isfinite(d.bench.measured[k][:, columns]).all(axis=1))]
+    at = [(k, n) for k in d.sealed_trials for n in np.flatnonzero(np.isfinite(d.bench.measured[k][:, columns]).all(axis=1))]
     if not at:
         return []
     place = np.array([d.bench.measured[k][n, tip] for k, n in at])

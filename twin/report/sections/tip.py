@@ -1,4 +1,4 @@
-"""One held-out trial in time: where the tip was, where the twins put it, and how far off they are."""
+"""One sealed trial in time: where the tip was, where the twins put it, and how far off they are."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from twin.diagnose import Diagnosis
-from twin.report.contents import labels
 from twin.report.numbers import SHOWN
 from twin.report.plots import MEASURED, MOST_POINTS, Plot, figure, numbers, plain, thin
 from twin.report.sections.section import Section, Story
+from twin.report.sentence import labels
 from twin.report.stages import before_and_after, markers, residuals
 
 ROW = 170
@@ -31,9 +31,9 @@ def _first_group(d: Diagnosis) -> tuple[str, list[int]]:
 
 
 def _telling(d: Diagnosis, columns: list[int]) -> int:
-    """The held-out trial in which the two predictions differ most."""
+    """The sealed trial in which the two predictions differ most."""
     first, second = (d.predictions[s.key] for s in before_and_after(d))
-    return max(d.held_trials, key=lambda k: float(np.nan_to_num(np.mean((first[k][:, columns] - second[k][:, columns]) ** 2))))
+    return max(d.sealed_trials, key=lambda k: float(np.nan_to_num(np.mean((first[k][:, columns] - second[k][:, columns]) ** 2))))
 
 
 def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:

@@ -1,0 +1,96 @@
+"""Which set is gone on with: by structure, and by what it predicts of trials left out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from twin.diagnose import choose as stage
+from twin.diagnose.choose import beside, choose, halved, most_predictive, predicting
+from twin.diagnose.null import Thresholds
+from twin.diagnose.search import Search
+from twin.diagnose.weigh import better
+
+STUDY = cast(Any, None)
+
+
+def weighed(*effects: str, score: float, size: float, unseen: float, headline: float | None = None) -> Any:
+    """A set of effects with its evidence, smooth error, and RMS on trials left out (all outputs, headline)."""
+    twin = SimpleNamespace(effects=effects)
+    fit = SimpleNamespace(model=SimpleNamespace(twin=twin), unseen=unseen, headline=unseen if headline is None else headline)
+    return SimpleNamespace(effects=effects, score=score, discrepancy=SimpleNamespace(size=size), fit=fit)
+
+
+@pytest.fixture(autouse=True)
+def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage, "left_out", lambda study, fit: SimpleNamespace(square=fit.unseen**2, headline=fit.headline**2))
+    monkeypatch.setattr(stage, "solves", lambda study, twin: True)
+
+
+def searched(base: Any, *sets: Any) -> Search:
+    ranked = tuple(sorted((base, *sets), key=lambda w: -w.score))
+    return Search(base, ranked[0], ranked)
+
+
+def test_a_set_is_chosen_by_what_it_predicts_only_if_each_of_its_effects_halves_the_squared_error() -> None:
+    base = weighed(score=0.0, size=6.0, unseen=4.0)
+    imitation = weighed("routing", score=40.0, size=5.5, unseen=3.8)
+    cause = weighed("drive", score=20.0, size=3.5, unseen=2.0)
+    assert most_predictive(STUDY, searched(base, imitation, cause)) is cause
+    assert most_predictive(STUDY, searched(base, imitation)) is None, "nothing predicts: the evidence has the word"
+    weak = weighed("drive", score=20.0, size=5.0, unseen=3.0)  # 9/16 of the square
+    assert most_predictive(STUDY, searched(base, imitation, weak)) is None
+    both = weighed("drive", "routing", score=25.0, size=3.4, unseen=1.9)
+    assert most_predictive(STUDY, searched(base, imitation, cause, both)) is cause, "the second effect does not pay"
+
+
+@pytest.mark.parametrize(
+    ("size", "unseen", "headline", "said"),
+    [(3.0, 4.0, 4.0, True), (3.1, 2.0, 2.0, True), (3.1, 2.0, 3.9, False), (3.1, 3.9, 2.0, False), (3.1, 3.0, 3.0, False)],
+)
+def test_halved_is_the_structure_or_both_errors_left_out(size: float, unseen: float, headline: float, said: bool) -> None:
+    base = weighed(score=0.0, size=6.0, unseen=4.0)
+    assert halved(STUDY, base, weighed("drive", score=9.0, size=size, unseen=unseen, headline=headline)) is said
+
+
+def test_what_halves_the_structure_is_gone_on_with_as_the_evidence_ranks_it() -> None:
+    base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
+    found = searched(base, best)
+    assert choose(STUDY, found, Thresholds()).best is best
+
+
+def test_a_set_that_leaves_a_fitted_trial_without_equilibrium_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = weighed(score=0.0, size=6.0, unseen=4.0)
+    falls, stands = weighed("ageing", score=90.0, size=0.1, unseen=0.1), weighed("drift", score=50.0, size=1.0, unseen=1.0)
+    monkeypatch.setattr(stage, "solves", lambda study, twin: "ageing" not in twin.effects)
+    assert predicting(STUDY, searched(base, falls, stands), 10.0) is stands
+
+
+@pytest.mark.parametrize("stands", [True, False])
+def test_what_is_found_beside_the_core_is_taken_if_every_trial_can_be_predicted_with_it(
+    monkeypatch: pytest.MonkeyPatch, stands: bool
+) -> None:
+    base, core = weighed(score=9.0, size=6.0, unseen=4.0), weighed("drive", score=5.0, size=3.0, unseen=2.0)
+    both = weighed("drive", "play", score=7.0, size=2.0, unseen=1.0)
+    core.fit.evaluation = None
+    monkeypatch.setattr(stage, "fit", lambda *_, **__: core.fit)
+    monkeypatch.setattr(stage, "weigh", lambda *_: core)
+    monkeypatch.setattr(stage, "dictionary", lambda *_: None)
+    monkeypatch.setattr(stage, "search", lambda *_: SimpleNamespace(best=both, all=(both, core)))
+    monkeypatch.setattr(stage, "solves", lambda study, twin: stands or "play" not in twin.effects)
+    widened = beside(cast(Any, SimpleNamespace(objective=None)), core, searched(base, core), Thresholds())
+    assert widened.best is (both if stands else core)
+    assert widened.base is base
+    assert [w.effects for w in widened.all] == [(), ("drive", "play"), ("drive",)]
+
+
+def test_of_two_fits_of_one_law_the_lower_cost_wins_and_of_two_laws_the_evidence() -> None:
+    def fitted(cost: float, score: float, *free: str) -> Any:
+        return SimpleNamespace(fit=SimpleNamespace(cost=cost, model=SimpleNamespace(free=free)), score=score)
+
+    trapped, lower = fitted(9.0, 40.0, "turn", "sine"), fitted(5.0, 30.0, "turn", "sine")
+    assert better(lower, trapped)
+    assert not better(trapped, lower)
+    assert better(trapped, fitted(1.0, 30.0, "turn", "sine", "cosine"))

@@ -1,0 +1,118 @@
+"""What passes the gates: by hand, with refits whose costs are known."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from twin.diagnose import gate as stage
+from twin.diagnose.gate import gate
+from twin.diagnose.identifiability import Visibility
+from twin.diagnose.null import Thresholds
+from twin.diagnose.screen import Screening
+
+N = 10_000  # samples
+STUDY: Any = SimpleNamespace(objective=SimpleNamespace(n=N), progress=lambda words: None)
+
+
+class World:
+    """Sets of effects whose |z|^2 falls by n a^2 for each effect of a sigmas."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **sigmas: float) -> None:
+        self.sigmas = sigmas
+        self.harmful: set[str] = set()
+        self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
+        monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
+        monkeypatch.setattr(stage, "left_out", lambda study, fit: self.left_out(fit.effects))
+        monkeypatch.setattr(stage, "extended", lambda study, rest, rival, start: self.of(*rest.effects, rival))
+
+    def of(self, *effects: str) -> Any:
+        square = N * (1.0 + sum(a**2 for e, a in self.sigmas.items() if e not in effects))
+        fit = SimpleNamespace(z=np.array([np.sqrt(square)]), effects=tuple(sorted(effects)), fitted=lambda e: {})
+        size = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
+        return SimpleNamespace(effects=tuple(sorted(effects)), fit=fit, score=-square, discrepancy=SimpleNamespace(size=size))
+
+    def left_out(self, effects: tuple[str, ...]) -> Any:
+        hurt = len(self.harmful & set(effects))
+        return SimpleNamespace(
+            hurt=hurt, worse=lambda than: hurt > than.hurt, structure=self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[1]
+        )
+
+    def gated(self, *effects: str, table: tuple[Visibility, ...] = (), material: float = 0.13) -> Any:
+        best = self.of(*effects)
+        found: Any = SimpleNamespace(base=self.of(), best=best, all=(best, self.of()))
+        pattern: Any = SimpleNamespace(effect="rival", start=None)
+        screening = Screening(SimpleNamespace(patterns=(pattern,)), Thresholds(material=material), table)  # type: ignore[arg-type]
+        return gate(STUDY, found, screening)
+
+
+def row(effect: str, apart: float, rival: str = "rival") -> Visibility:
+    return Visibility(effect, 0.1, apart, 0.1, rival, ("x", 1.0, "1"), ())
+
+
+def test_an_effect_that_moves_too_little_is_listed_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = World(monkeypatch, friction=0.5, delay=0.12).gated("friction", "delay")
+    assert found.best.effects == ("friction",)
+    assert [(s.effect, round(s.contribution, 6)) for s in found.small] == [("delay", 0.12)]
+    assert set(found.without) == {"friction"}
+    assert World(monkeypatch, friction=0.5, delay=0.14).gated("friction", "delay").small == ()
+
+
+def test_the_bar_is_the_twins_accuracy_where_that_is_higher(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = World(monkeypatch, friction=0.5).gated("friction", material=0.6)
+    assert found.best.effects == ()
+    assert found.without == {}
+
+
+@pytest.mark.parametrize(("left", "unseen", "kept"), [(0.1, 0.2, True), (0.1, 0.6, False), (0.9, 0.2, False)])
+def test_beside_a_much_larger_one_it_must_take_half_of_what_is_left_on_trials_left_out_too(
+    monkeypatch: pytest.MonkeyPatch, left: float, unseen: float, kept: bool
+) -> None:
+    world = World(monkeypatch, large=4.0, small=0.5)
+    world.rest = {("large", "small"): (left, unseen), ("large",): (1.0, 1.0)}
+    found = world.gated("large", "small")
+    assert found.best.effects == (("large", "small") if kept else ("large",))
+    assert [s.effect for s in found.small] == ([] if kept else ["small"])
+
+
+def test_of_several_the_one_that_predicts_worse_goes_and_a_single_one_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, friction=1.0, routing=0.5)
+    world.harmful = {"routing"}
+    found = world.gated("friction", "routing")
+    assert found.best.effects == ("friction",)
+    assert found.small == ()
+    world.harmful = {"friction"}
+    assert world.gated("friction").best.effects == ("friction",)  # the judge has the word
+
+
+def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rival takes all but 20 of |z|^2 that the effect takes: less than five standard errors, squared."""
+    world = World(monkeypatch, friction=0.5, rival=0.0)
+    found = world.gated("friction", table=(row("friction", apart=0.6),))
+    assert found.best.effects == ("friction",), "the rival explains nothing"
+    world.of = _as_good(world, "friction", 20.0)  # type: ignore[method-assign]
+    found = world.gated("friction", table=(row("friction", apart=0.6),))
+    assert found.best.effects == ()
+    assert [(d.effect, d.rival, d.found.effects, d.other.effects) for d in found.doubts] == [
+        ("friction", "rival", ("friction",), ("rival",))
+    ]
+    assert world.gated("friction", table=(row("friction", apart=0.4),)).best.effects == ("friction",), "the design tells them"
+    world.of = _as_good(world, "friction", 30.0)  # type: ignore[method-assign]
+    assert world.gated("friction", table=(row("friction", apart=0.6),)).best.effects == ("friction",), "the data tell them"
+
+
+def _as_good(world: World, effect: str, short: float) -> Any:
+    """World.of in which the rival imitates the effect but for `short` of |z|^2."""
+
+    def of(*effects: str) -> Any:
+        stands = tuple(effect if e == "rival" else e for e in effects)
+        made = World.of(world, *stands)
+        made.effects = tuple(sorted(effects))
+        made.fit.effects = made.effects
+        made.score -= short if "rival" in effects else 0.0
+        return made
+
+    return of

@@ -1,0 +1,303 @@
+"""Laws against closed forms beyond their docstrings' examples, and how they meet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.test_effects import some_signals
+from twin.bench import prepare
+from twin.effects import Drive, Effect, Loads, Signals, named
+from twin.errors import DataError
+from twin.laws import Laws
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import load
+from twin.twin import Twin, simulate
+
+ROBOT = load("continuum")
+
+
+def law(name: str, **values: float) -> Effect:
+    return named(name)(values, 3)
+
+
+def test_delayed_strain_relaxes_while_the_robot_rests_between_trials() -> None:
+    """A weak tip force held for 20 s, a pause, nothing: what is left is a (1 - exp(-20 s/tau)) exp(-pause/tau) of the instant
+    bend, and fades on."""
+    amplitude, tau, held = 0.3, 10.0, np.linspace(0.0, 20.0, 41)
+    channels = (
+        *(Channel(f"tendon_{i}_tension", "input", "N") for i in (1, 2, 3)),
+        *(Channel(f"disk_8_{a}", "output", "mm") for a in "xyz"),
+    )
+
+    def trial(name: str, start: float, force: float) -> Trial:
+        values = {c.name: np.zeros(41) for c in channels}
+        return Trial(name, held, values, {"tip_force": np.array([force, 0.0, 0.0])}, start=start)
+
+    def tips(pause: float) -> tuple[np.ndarray, np.ndarray]:
+        trials = (trial("a.csv", 0.0, 1e-3), trial("b.csv", 20.0 + pause, 0.0))
+        day = Recording("continuum", "made", "simulation", np.zeros(3), channels, trials)
+        twin = Twin(ROBOT, {}, (law("backbone_creep", amplitude=amplitude, time=tau),))
+        a, b = (t.true.markers[:, 7, 0] for t in simulate(twin, prepare(day, ROBOT)))
+        return a, b
+
+    for pause in (0.0, 10.0, 25.0):
+        loaded, rest = tips(pause)
+        # 0.4 mm, so 1e-3 rad of nonlinearity squared; solved to 1e-7 rad of 5e-3; the bend itself follows the delayed strain.
+        np.testing.assert_allclose(loaded / loaded[0], 1 + amplitude * (1 - np.exp(-held / tau)), rtol=2e-4)
+        left = amplitude * (1 - np.exp(-20.0 / tau)) * np.exp(-(pause + held) / tau)
+        np.testing.assert_allclose(rest / loaded[0], left, rtol=2e-3, atol=2e-4)
+
+
+def test_a_delay_shifts_currents_by_the_heat_they_bring() -> None:
+    """Rows of a second, each with a current of its own: by whole rows the currents are those before; by half a row the heat I^2 of
+    both neighbours counts half. Nothing flows before the log."""
+    t = np.arange(6.0)
+    current = np.array([1.0, 2.0, 0.0, 3.0, 1.0, 2.0])[:, None]
+    zero = np.zeros((6, 1))
+    seen = Signals(t, t, zero, zero, np.zeros((6, 0, 3)), t, (Drive.CURRENT,), current)
+    one, half, early = (named("time_delay")({"delay": d}, 1).command(seen).current[:, 0] for d in (1.0, 0.5, -1.0))
+    np.testing.assert_allclose(one, [0.0, 1.0, 2.0, 0.0, 3.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(half**2, [0.5, 2.5, 2.0, 4.5, 5.0, 2.5], atol=1e-12)
+    np.testing.assert_allclose(early, [2.0, 0.0, 3.0, 1.0, 2.0, 0.0], atol=1e-12)  # and none after it
+
+
+def test_a_delay_shifts_tensions_and_displacements_alike() -> None:
+    seen = some_signals()
+    delayed = law("time_delay", delay=0.3).command(seen)
+    then = np.clip(seen.time - 0.3, seen.time[0], None)
+    # The signals are sines of 0.3 rad/s; cubics through samples up to 0.8 s apart miss them by far less than 1 % of the swing.
+    np.testing.assert_allclose(delayed.tension, 1.5 + np.sin(0.3 * then[:, None] + np.arange(3)), atol=0.01)
+    np.testing.assert_allclose(delayed.displacement, 5e-3 * np.sin(0.3 * then[:, None] + np.arange(3)), atol=5e-5)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_cell_drifts_by_its_rate_and_bends_over_the_hour(sign: float) -> None:
+    """rate t + bend t^2 / 1 h: after half an hour and after two."""
+    drift = law("load_cell_drift", rate_1=sign * 1e-4, bend_1=sign * 2e-5, bend_3=sign * 5e-5)
+    seen = some_signals(n=2).with_(clock=np.array([1800.0, 7200.0]))
+    wander = drift.sense(seen).tension - seen.tension
+    np.testing.assert_allclose(wander[:, 0], sign * np.array([0.18 + 0.018, 0.72 + 0.288]), rtol=1e-12)
+    np.testing.assert_allclose(wander[:, 1], 0.0, atol=1e-15)
+    np.testing.assert_allclose(wander[:, 2], sign * np.array([0.045, 0.72]), rtol=1e-12)
+
+
+def test_cells_read_what_their_equations_say() -> None:
+    seen = some_signals(n=3)
+    T = seen.tension
+    np.testing.assert_allclose(law("load_cell_bias", bias_2=0.2).sense(seen).tension, T + np.array([0, 0.2, 0]), rtol=1e-14)
+    np.testing.assert_allclose(law("load_cell_gain", gain_3=1.2).sense(seen).tension, T * [1, 1, 1.2], rtol=1e-14)
+    mixed = law("load_cell_crosstalk", share_1_3=0.1, share_2_1=-0.05).sense(seen).tension
+    np.testing.assert_allclose(mixed[:, 0], T[:, 0] + 0.1 * T[:, 2], rtol=1e-14)
+    np.testing.assert_allclose(mixed[:, 1], T[:, 1] - 0.05 * T[:, 0], rtol=1e-14)
+    np.testing.assert_allclose(mixed[:, 2], T[:, 2], rtol=1e-14)
+
+
+def test_the_camera_turns_about_the_bases_origin_and_shifts() -> None:
+    seen = some_signals(n=3)
+    x, y, z = np.moveaxis(seen.markers, -1, 0)
+    turned = law("camera_misalignment", turn_z=0.3, shift_y=2e-3).sense(seen).markers
+    c, s = np.cos(0.3), np.sin(0.3)
+    np.testing.assert_allclose(turned, np.stack([c * x - s * y, s * x + c * y + 2e-3, z], axis=-1), atol=1e-15)
+
+
+def test_a_lag_of_a_step_and_of_a_ramp() -> None:
+    """After a ramp of 1 s to one: 1 - tau (1 - exp(-1/tau)) exp(-(t - 1)/tau); two lags in series of a ramp that never ends are
+    late by the sum of both times."""
+    t = np.linspace(0.0, 60.0, 241)
+    up = np.minimum(t, 1.0)[:, None] * np.ones(3)
+    seen = Signals(t, t, up, 1e-3 * up, np.zeros((241, 0, 3)), t, (Drive.TENSION,) * 3)
+    lagged = law("actuator_lag", time=2.0).drive(seen)
+    after = t >= 1.0
+    expected = 1.0 - 2.0 * (1 - np.exp(-0.5)) * np.exp(-(t[after] - 1.0) / 2.0)
+    np.testing.assert_allclose(lagged.tension[after, 1], expected, rtol=1e-12)
+    np.testing.assert_allclose(lagged.displacement[after, 1], 1e-3 * expected, rtol=1e-12)
+    ramp = seen.with_(tension=t[:, None] * np.ones(3))
+    late = law("actuator_lag", time=1.0, time_2=2.0).drive(ramp).tension[-1, 0]
+    assert late == pytest.approx(60.0 - 3.0, rel=1e-9)
+
+
+def test_laws_meet_in_the_order_of_the_signal() -> None:
+    """A cell with a gain, then a bias: readings are gain T + bias, and undone the other way round."""
+    both = Laws((law("load_cell_gain", gain_1=2.0), law("load_cell_bias", bias_1=0.5)))
+    seen = some_signals(n=2)
+    read = both.sense(seen)
+    np.testing.assert_allclose(read.tension[:, 0], 2.0 * seen.tension[:, 0] + 0.5, rtol=1e-14)
+    np.testing.assert_allclose(both.command(read).tension, seen.tension, rtol=1e-13)
+
+
+def test_stiffnesses_multiply_stretches_add_and_strains_follow_each_other() -> None:
+    soft, old = law("temperature_softening", rate=0.01), law("backbone_ageing", rate=1e-5)
+    warm, clock = np.array([296.15, 306.15]), np.array([0.0, 3600.0])
+    np.testing.assert_allclose(Laws((soft, old)).stiffness(warm, clock), [1.0, 0.9 * 0.964], rtol=1e-12)
+    np.testing.assert_array_equal(Laws(()).stiffness(warm, clock), 1.0)
+    laws = Laws(
+        (
+            law("tendon_elasticity", stretch=2e-5),
+            law("tendon_friction", mu=0.2, presliding=1e-4),
+            law("tendon_elasticity", stretch=3e-5),
+        )
+    )
+    assert laws.route.stretch == pytest.approx(5e-5)
+    assert (laws.route.mu, laws.route.presliding) == (0.2, 1e-4)
+    creep = Laws(
+        (law("backbone_creep", amplitude=0.1, time=5.0, amplitude_2=0.2, time_2=50.0), law("backbone_creep", amplitude=0.3))
+    ).creep
+    assert creep.amplitude == (0.1, 0.2, 0.3)
+    assert creep.time == (5.0, 50.0, 10.0)
+
+
+def test_loads_add_up_and_turn() -> None:
+    laws = Laws((law("tip_payload", mass=0.005), law("base_tilt", about_x=np.pi / 6)))
+    loads = laws.surround(Loads(np.array([0.0, 0.0, 9.0]), payload=0.01))
+    assert loads.payload == pytest.approx(0.015)
+    np.testing.assert_allclose(loads.gravity, [0.0, -4.5, 9.0 * np.sqrt(0.75)], atol=1e-12)
+
+
+def test_a_law_that_finds_nothing_to_act_on_is_refused() -> None:
+    jaw = load("cable_tool")
+    with pytest.raises(DataError, match=r"backbone_creep acts on backbone, which robot 'cable_tool' has not"):
+        Twin(jaw, {}, (named("backbone_creep")({"amplitude": 0.1}, 2),)).body()
+
+
+def test_laws_that_change_the_body_all_change_it() -> None:
+    """Rest angles u h (1 + slope (s/L - 1/2)), stiffnesses (1 + gradient (s/L - 1/2)), a hole moved along and across its radius."""
+    laws = Laws(
+        (
+            law("backbone_precurvature", about_x=0.5, about_y=-0.2, slope=0.4),
+            law("stiffness_gradient", gradient=0.3),
+            law("tendon_routing", angle_2=0.1, radius_2=1e-3),
+        )
+    )
+    plain, body = ROBOT.build(), ROBOT.build()
+    laws.edit(body, "continuum")
+    chain: Any = plain
+    for at in chain.joints:
+        along = at.arclength - 0.5
+        for name, curvature in ((at.bend_x, 0.5), (at.bend_y, -0.2), (at.twist, 0.0)):
+            before, after = plain.spec.joint(name), body.spec.joint(name)
+            assert after.springref - before.springref == pytest.approx(curvature * at.length * (1 + 0.4 * along), abs=1e-15)
+            np.testing.assert_allclose(after.stiffness, np.array(before.stiffness) * (1 + 0.3 * along), rtol=1e-12)
+    assert sum(at.length for at in chain.joints) == pytest.approx(0.12)  # m: every piece of the backbone has its hinges
+    for i, holes in enumerate(chain.tendons):
+        for name in holes:
+            x, y, z = plain.spec.site(name).pos
+            was, now = complex(x, y), complex(*body.spec.site(name).pos[:2])
+            moved = (abs(was) + 1e-3) / abs(was) * np.exp(0.1j) if i == 1 else 1.0
+            assert abs(now - was * moved) < 1e-15
+            assert body.spec.site(name).pos[2] == z
+
+
+def test_an_asymmetric_body_is_stiff_about_one_axis_and_soft_about_the_other() -> None:
+    """The bending stiffness of each joint set as a tensor: EI (1 + e (cos 2a, sin 2a; sin 2a, -cos 2a)), whatever the axes."""
+    plain: Any = ROBOT.build()
+    body: Any = ROBOT.build()
+    law("stiffness_asymmetry", along=-0.1, across=0.2).edit(body)
+    for at in plain.joints:
+        tensor = np.zeros((2, 2))
+        for name in (at.bend_x, at.bend_y):
+            joint = body.spec.joint(name)
+            axis = np.array(joint.axis[:2])
+            tensor += np.array(joint.stiffness).flat[0] * np.outer(axis, axis)
+        EI = np.array(plain.spec.joint(at.bend_x).stiffness).flat[0]
+        np.testing.assert_allclose(tensor / EI, [[0.9, 0.2], [0.2, 1.1]], atol=1e-12)
+
+
+def test_springs_cool_and_change_phase_as_their_laws_say() -> None:
+    plain = ROBOT.springs(3)
+    cooled = law("sma_cooling", factor=1.5, share_1=2.0, forced=1e-3, rate=0.01).spring(plain)
+    share = np.array([2.0, 1.0, 0.5])  # the last one's makes the product one
+    np.testing.assert_allclose(cooled.loss, 1.5 * share * (plain.loss + 1e-3), rtol=1e-12)
+    for name in ("loss_warm", "loss_warm_2", "loss_open", "loss_open_2", "loss_warm_open"):
+        np.testing.assert_allclose(getattr(cooled, name), 1.5 * share * getattr(plain, name), rtol=1e-12)
+    np.testing.assert_allclose(cooled.loss_surroundings, plain.loss_surroundings + 0.01, rtol=1e-12)
+    moved = law("sma_hysteresis", width=6.0, shift=1.0, spread=2.0, plateau=1.1).spring(plain)
+    heating, cooling = (plain.austenite_start + plain.austenite_finish) / 2, (plain.martensite_start + plain.martensite_finish) / 2
+    np.testing.assert_allclose((moved.austenite_start + moved.austenite_finish) / 2, heating + 4.0, rtol=1e-12)
+    np.testing.assert_allclose((moved.martensite_start + moved.martensite_finish) / 2, cooling - 2.0, rtol=1e-12)
+    np.testing.assert_allclose(moved.austenite_finish - moved.austenite_start, 2 * (plain.austenite_finish - plain.austenite_start))
+    np.testing.assert_allclose(
+        moved.martensite_start - moved.martensite_finish, 2 * (plain.martensite_start - plain.martensite_finish)
+    )
+    np.testing.assert_allclose(moved.detwinning_start, 1.1 * plain.detwinning_start, rtol=1e-12)
+    np.testing.assert_allclose(moved.detwinning_finish, 1.1 * plain.detwinning_finish, rtol=1e-12)
+
+
+def test_a_drive_gives_less_beyond_its_limit() -> None:
+    """T - loss (r(T - limit) - r(-limit)), r(x) = (x + sqrt(x^2 + corner^2)) / 2: nothing lost at rest."""
+    law_ = law("actuator_saturation", loss=0.4, limit=2.0, corner=0.5)
+    pull = np.array([0.0, 1.0, 2.0, 5.0])[:, None] * np.ones(3)
+    t = np.arange(4.0)
+    given = law_.drive(Signals(t, t, pull, 0 * pull, np.zeros((4, 0, 3)), t, (Drive.TENSION,) * 3)).tension[:, 0]
+
+    def r(x: float) -> float:
+        return (x + np.sqrt(x * x + 0.25)) / 2
+
+    np.testing.assert_allclose(given, [T - 0.4 * (r(T - 2.0) - r(-2.0)) for T in (0.0, 1.0, 2.0, 5.0)], rtol=1e-12)
+    assert given[0] == 0.0
+
+
+def test_play_is_an_operator_with_a_width_of_its_own_a_drive() -> None:
+    """Pulled 1 mm and paid out again in steps of 0.1 mm, gap 0.2 mm (0.3 mm in the second), swap half the gap, slack 0.05 mm."""
+    u = 1e-3 * np.concatenate([np.linspace(0, 1, 11), np.linspace(0.9, 0, 10)])[:, None] * np.ones(3)
+    t = np.arange(21.0)
+    play = law("tendon_backlash", gap=2e-4, swap=1e-4, slack=5e-5, gap_2=1e-4)
+    signals = Signals(t, t, 0 * u, u, np.zeros((21, 0, 3)), t, (Drive.DISPLACEMENT,) * 3)
+    moved = play.drive(signals).displacement
+    for j, half in ((0, 1e-4), (1, 1.5e-4), (2, 1e-4)):
+        side = np.clip(np.arange(11.0), 0, 1), np.clip(1.0 - np.arange(1.0, 11.0), -1, 1)
+        np.testing.assert_allclose(moved[:, j], u[:, j] - 5e-5 - half * np.concatenate(side), atol=1e-15)
+    by_tension = signals.with_(drives=(Drive.TENSION,) * 3)
+    np.testing.assert_array_equal(play.drive(by_tension).displacement, u)  # no motor holds a length: the gap shows in its reading
+    np.testing.assert_allclose(play.sense(by_tension).displacement - u, u - moved, atol=1e-15)
+    np.testing.assert_array_equal(play.sense(signals).displacement, u)
+
+
+def test_a_wall_stands_where_it_is_said_and_stiffening_tendons_saturate() -> None:
+    wall = law("contact", azimuth=0.5, distance=0.03, stiffness=100.0).surround(Loads(np.zeros(3))).wall
+    point = 0.031 * np.array([np.cos(0.5), np.sin(0.5), 0.0])  # a millimetre beyond it
+    assert wall[:3] @ point - wall[3] == pytest.approx(-1e-3)
+    assert np.linalg.norm(wall[:3]) == pytest.approx(1.0)
+    assert wall[4] == 100.0
+    route = law("tendon_elasticity", stretch=1e-4, stiffening=0.5).route()
+    tension = np.array([0.0, 1.0, 4.0])
+    np.testing.assert_allclose(route.elongation(tension), 1e-4 * (1 - np.exp(-0.5 * tension)) / 0.5, rtol=1e-12)
+    np.testing.assert_allclose(law("tendon_elasticity", stretch=1e-4).route().elongation(tension), 1e-4 * tension, rtol=1e-12)
+
+
+def test_fits_start_at_every_guess_and_at_each_tendon_alone_and_all() -> None:
+    """Of a law of each tendon: one start a tendon and one of all, with its first parameter, then with both."""
+    starts = list(named("load_cell_drift").starts([], 3))
+    assert [s.free for s in starts] == [
+        ("rate_1",), ("rate_2",), ("rate_3",), ("rate_1", "rate_2", "rate_3"),
+        ("rate_1", "bend_1"), ("rate_2", "bend_2"), ("rate_3", "bend_3"),
+        ("rate_1", "bend_1", "rate_2", "bend_2", "rate_3", "bend_3"),
+    ]  # fmt: skip
+    table = {p.name: p for p in named("load_cell_drift").declared(3)}
+    for start in starts:
+        assert dict(start.values) == {n: table[n].value + table[n].step for n in start.free}
+    creep = list(named("backbone_creep").starts([], 3))
+    assert [dict(s.values)["time"] for s in creep] == [3.0, 15.0, 80.0]
+    assert {s.free for s in creep} == {("amplitude", "time")}  # the second retardation time only where the first is in force
+
+
+def test_springs_and_drives_are_sought_where_they_are() -> None:
+    """No start without springs; play in all drives, and in each that moves; walls only where the robot reaches."""
+    still = some_signals()
+    heated = still.with_(drives=(Drive.CURRENT,) * 3)
+    for name in ("sma_cooling", "sma_hysteresis"):
+        assert list(named(name).starts([still], 3)) == []
+        assert len(list(named(name).starts([heated], 3))) >= 3
+    one_moves = still.with_(displacement=still.displacement * np.array([0.0, 1.0, 0.0]))
+    assert [s.free for s in named("tendon_backlash").starts([one_moves], 3)] == [("gap", "swap"), ("gap_2", "swap")]
+    assert len(list(named("tendon_backlash").starts([still.with_(antagonists=True)], 2))) == 1
+    limits = [s.values["limit"] for s in named("actuator_saturation").starts([still], 3)]
+    assert limits
+    assert max(limits) < still.tension.max()
+    reached = still.markers[..., :2]
+    for start in named("contact").starts([still], 3):
+        towards = np.array([np.cos(start.values["azimuth"]), np.sin(start.values["azimuth"])])
+        beyond = ((reached @ towards).max(axis=1) > start.values["distance"]).mean()
+        assert 0.0 < beyond < 0.5  # touched in some samples, not in most

@@ -1,0 +1,153 @@
+"""The noise model on data whose noise is known: white, correlated, with a robot that changed between repeats, and made white."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from twin.bench import Bench, prepare
+from twin.measurements import Channel, Recording, Trial
+from twin.residual import Noise, Whitener, estimate_noise, repeats
+from twin.robots import load
+
+ROBOT = load("continuum")
+N, SIGMA = 400, 2e-4  # samples a trial; m
+TIME = np.linspace(0.0, 40.0, N)
+PULL = np.stack([1.0 + np.sin(0.5 * TIME), 0.5 + 0.01 * TIME, 0.3 * np.cos(TIME) ** 2], axis=1)  # N
+CHANNELS = (
+    *(Channel(f"tendon_{i}_tension", "input", "N", 0.01) for i in (1, 2, 3)),
+    *(Channel(f"disk_8_{a}", "output", "mm") for a in "xyz"),
+)
+DEAF = [np.zeros((N, 3, 3))] * 2  # outputs that do not feel the inputs
+
+
+def bench(*, payload: float = 0.0, further: float = 0.0, channels: tuple[Channel, ...] = CHANNELS) -> Bench:
+    """Two trials with the same commands, the second with a payload and its tensions `further` (N)."""
+    trials = []
+    for k, (mass, more) in enumerate([(0.0, 0.0), (payload, further)]):
+        values = {c.name: np.zeros(N) for c in CHANNELS} | {f"tendon_{i + 1}_tension": PULL[:, i] + more for i in range(3)}
+        trials.append(Trial(f"{k}.csv", TIME, values, {"tip_payload": mass}, start=100.0 * k))
+    return prepare(Recording("continuum", "made", "simulation: none", np.zeros(3), channels, tuple(trials)), ROBOT)
+
+
+TWO = bench()
+
+
+def coloured(rng: np.random.Generator, rho: float, n: int = N) -> np.ndarray:
+    """AR(1) noise (n, 3) of unit variance, from its stationary start."""
+    x = rng.normal(size=(n, 3))
+    for i in range(1, n):
+        x[i] = rho * x[i - 1] + np.sqrt(1 - rho**2) * x[i]
+    return x
+
+
+def estimated(residual: list[np.ndarray], G: list[np.ndarray] = DEAF) -> Noise:
+    return estimate_noise(TWO, [0, 1], residual, G)[0]
+
+
+def test_the_noise_is_found_with_its_memory() -> None:
+    """1,200 differences of two trials: sigma to 2 % for white noise (1 / sqrt(2 n)), three times that where ten neighbours are
+    alike; rho to 2 % beside the 1 / N a line taken out costs."""
+    rng = np.random.default_rng(0)
+    for rho in (0.0, 0.5, 0.8):
+        noise = estimated([SIGMA * coloured(rng, rho) for _ in range(2)])
+        np.testing.assert_allclose(noise.sigma, SIGMA, rtol=0.06 if rho < 0.6 else 0.15)
+        np.testing.assert_allclose(noise.rho, rho, atol=0.06)
+        np.testing.assert_array_equal(noise.drive, 0.01)  # as declared
+        assert noise.source == "1 pairs of repeated trials"
+
+
+def test_white_noise_is_called_correlated_no_oftener_than_three_standard_errors_are_exceeded() -> None:
+    """One-sided, 1 in 741: of 150 days at most two (more: 1 in 1,000). Noise correlated by six standard errors is caught always but
+    for 1 in 741 (one of three below); a bar at 30 or at 0.3 standard errors fails here."""
+    rng = np.random.default_rng(1)
+    white = sum(estimated([SIGMA * rng.normal(size=(N, 3)) for _ in range(2)]).rho[0] > 0.0 for _ in range(150))
+    assert white <= 2
+    rho = 6.0 / np.sqrt(3 * N)
+    caught = sum(estimated([SIGMA * coloured(rng, rho) for _ in range(2)]).rho[0] > 0.0 for _ in range(40))
+    assert caught >= 38
+
+
+def test_what_changed_between_repeats_is_not_noise() -> None:
+    """The second time each channel starts elsewhere and drifts, each load cell has another zero and the robot another stiffness: a
+    hundred times the noise, and it is taken out; sigma is what was drawn, to its own 2 % and the nine numbers spent of 1,200."""
+    rng = np.random.default_rng(2)
+    G = rng.normal(size=(N, 3, 3)) * 1e-3 * (1.0 + 0.3 * np.sin(np.outer(TIME, [0.2, 0.3, 0.4])))[:, :, None]
+    changed = 0.02 * np.outer(TIME / 40.0, [1.0, -1.0, 0.5]) + 0.01
+    changed += np.einsum("nmt,nt->nm", G, np.array([3.0, -2.0, 1.0]) + 5.0 * PULL)
+    residual = [SIGMA * rng.normal(size=(N, 3)), SIGMA * rng.normal(size=(N, 3)) + changed]
+    assert np.std(changed) > 30 * SIGMA
+    # The load cells' declared 0.01 N reach the markers as 0.01 sqrt(3) mm through G, some 1e-5 m of the 2e-4 drawn.
+    np.testing.assert_allclose(estimated(residual, [G, G]).sigma, SIGMA, rtol=0.06)
+
+
+def test_a_missing_sample_is_no_noise() -> None:
+    rng = np.random.default_rng(3)
+    residual = [SIGMA * rng.normal(size=(N, 3)) for _ in range(2)]
+    residual[0][::3, 1] = np.nan
+    np.testing.assert_allclose(estimated(residual).sigma, SIGMA, rtol=0.06)
+
+
+def test_without_repeats_noise_is_read_off_second_differences_and_said() -> None:
+    """A residual that is smooth and a hundred times the noise is none of it."""
+    lone = bench(payload=0.01)
+    rng = np.random.default_rng(4)
+    smooth = 100 * SIGMA * np.sin(0.3 * TIME)[:, None]
+    residual = [SIGMA * rng.normal(size=(N, 3)) + smooth for _ in range(2)]
+    noise, notes = estimate_noise(lone, [0, 1], residual, DEAF)
+    np.testing.assert_allclose(noise.sigma, SIGMA, rtol=0.06)  # 2,400 second differences, each kin to four others
+    np.testing.assert_array_equal(noise.rho, 0.0)
+    assert "second differences" in noise.source
+    assert len(notes) == 1
+
+
+def test_repeats_have_the_same_loads_and_the_same_commands_but_for_noise() -> None:
+    assert repeats(TWO) == [(0, 1)]
+    assert repeats(bench(payload=1e-3)) == []
+    # Commands span 2 N: 3 % of it, 0.06 N, is within what repeats differ by.
+    assert repeats(bench(further=0.05)) == [(0, 1)]
+    assert repeats(bench(further=0.08)) == []
+
+
+def test_whitened_noise_is_white_whatever_drives_and_wherever_samples_lack() -> None:
+    """Marker noise with memory, and that of load cells through G, each drawn by its own recipe: unit variance, no correlation
+    between rows or channels."""
+    rng = np.random.default_rng(5)
+    n, rho, cell = 20000, 0.6, 0.02
+    G = rng.normal(size=(n, 3, 3)) * 0.01
+    sigma = np.array([1e-4, 2e-4, 3e-4])
+    for kind in ("memory", "cells"):
+        noise = Noise(sigma, np.full(3, cell if kind == "cells" else 1e-9), np.full(3, rho if kind == "memory" else 0.0), "made")
+        x = sigma * (coloured(rng, rho, n) if kind == "memory" else rng.normal(size=(n, 3)))
+        if kind == "cells":
+            x = x + np.einsum("nmt,nt->nm", G, cell * rng.normal(size=(n, 3)))
+        x[rng.random((n, 3)) < 0.2] = np.nan
+        z = Whitener(noise, [x], [G], [np.zeros((n, 3))]).trial(0, x)
+        seen = np.isfinite(x)
+        assert np.all(z[~seen] == 0.0)
+        np.testing.assert_allclose([np.mean(z[seen[:, j], j] ** 2) for j in range(3)], 1.0, atol=0.04)  # 16,000 squares: 1.1 %
+        both = seen[:, 0] & seen[:, 1]
+        assert abs(np.mean(z[both, 0] * z[both, 1])) < 0.04
+        assert abs(np.mean(z[1:] * z[:-1])) < 0.02
+
+
+def test_the_floor_is_the_cameras_noise_and_that_of_the_cells() -> None:
+    """RMS distance of a marker: sqrt(sum over x, y, z of sigma^2 + sum over tendons (G sigma_T)^2)."""
+    noise = Noise(np.array([1e-4, 2e-4, 2e-4]), np.array([0.01, 0.0, 0.02]), np.zeros(3), "made")
+    G = np.zeros((N, 3, 3))
+    G[:, 0, 0], G[:, 1, 2], G[:, 2, 1] = 0.04, 0.01, 5.0
+    expected = np.sqrt(1e-8 + 4e-8 + 4e-8 + (4e-4) ** 2 + (2e-4) ** 2)
+    assert noise.floor(TWO, [G, G])["marker"] == pytest.approx(expected)
+
+
+def test_load_cells_of_which_one_says_nothing_are_all_estimated_and_that_is_said() -> None:
+    """Noise of 0.05 N a cell, felt through G by three outputs whose own is far less: found to some 5 % (3,600 numbers, with the
+    outputs' own to be told from it), whatever two of the cells declare."""
+    rng = np.random.default_rng(6)
+    silent = (*CHANNELS[:2], Channel("tendon_3_tension", "input", "N"), *CHANNELS[3:])
+    G = rng.normal(size=(N, 3, 3)) * 0.04
+    felt = [np.einsum("nmt,nt->nm", G, 0.05 * rng.normal(size=(N, 3))) + SIGMA * rng.normal(size=(N, 3)) for _ in range(2)]
+    noise, notes = estimate_noise(bench(channels=silent), [0, 1], felt, [G, G])
+    np.testing.assert_allclose(noise.drive, 0.05, rtol=0.1)
+    assert any("no noise declared for the inputs" in n for n in notes)
+    assert estimate_noise(TWO, [0, 1], felt, [G, G])[0].drive.tolist() == [0.01] * 3

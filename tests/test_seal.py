@@ -1,0 +1,73 @@
+"""The sealed trials' errors: their interval, and trials a twin has no equilibrium for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.test_design import bench
+from tools.bench.design import bench_day
+from twin.bench import Bench
+from twin.diagnose import seal
+from twin.diagnose.seal import Opened, interval
+from twin.errors import SolveError
+
+
+def test_the_interval_covers_as_often_as_it_says() -> None:
+    """95 % of 400 intervals of the RMS of white noise in eight trials of 100: 378 to 392 by chance, and a bootstrap over 80 blocks
+    is some 2 % short. One cut at the quartiles would cover half."""
+    covered = 0
+    for seed in range(400):
+        squares = np.random.default_rng(seed).normal(size=(8, 100)) ** 2
+        low, high = interval(list(squares), seed)
+        covered += low < 1.0 < high
+    assert 0.90 < covered / 400 < 0.98
+
+
+def test_blocks_keep_neighbours_together() -> None:
+    """Errors alike over ten samples are known ten times worse than as many independent ones."""
+    rng = np.random.default_rng(0)
+    alike, white = np.repeat(rng.normal(size=(8, 10)), 10, axis=1) ** 2, rng.normal(size=(8, 100)) ** 2
+    width = [np.subtract(*interval(list(x), 0)[::-1]) for x in (alike, white)]
+    assert 2.0 < width[0] / width[1] < 5.0  # sqrt(10) = 3.2, from 80 blocks known to some 15 %
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
+    """Trials 1 and 3 sealed; the final twin, "after", has no equilibrium on trial 3. Every twin is 1 mm off in x."""
+    day: Bench = bench(bench_day("default", np.random.default_rng(0)))
+
+    def simulate(twin: Any, bench: Bench, trials: Any) -> list[Any]:
+        if twin.name == "after" and 3 in trials:
+            raise SolveError("no equilibrium")
+        return [SimpleNamespace(true=k) for k in trials]
+
+    monkeypatch.setattr(seal, "simulate", simulate)
+    monkeypatch.setattr(seal, "report", lambda effects, true: true)
+    off = np.array([1e-3 if o.axis == 0 else 0.0 for o in day.outputs])
+    monkeypatch.setattr(seal, "readings", lambda bench, k: bench.measured[k] - off)
+    monkeypatch.setattr(seal, "sensitivity", lambda bench, trials, twin, predicted: [np.zeros((*y.shape, 3)) for y in predicted])
+    base, final = (SimpleNamespace(name=n, effects=()) for n in ("base", "after"))
+    noise = SimpleNamespace(floor=lambda bench, G: {"marker": 4e-4})
+    study = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(noise=noise)))
+    conclusion: Any = SimpleNamespace(base=base, final=final, study=study)
+    return Opened.of(day, [y - 2.0 * off for y in day.measured], [(conclusion, [1, 3])])
+
+
+def test_a_sealed_trial_without_equilibrium_is_named_and_counts_for_no_stage(opened: Opened) -> None:
+    errors = opened.errors(0)
+    assert errors.lost == (3,)
+    assert errors.nominal["marker"] == pytest.approx(2e-3)
+    assert errors.calibrated["marker"] == pytest.approx(1e-3)
+    assert errors.after["marker"] == pytest.approx(1e-3)
+    assert errors.floor == {"marker": pytest.approx(4e-4)}
+    assert np.isnan(opened.error(lambda c: c.final))
+    assert opened.error(lambda c: c.base) == pytest.approx(1e-3)
+
+
+def test_only_sealed_trials_are_opened(opened: Opened) -> None:
+    assert opened.trials == [1, 3]
+    assert [k for k, y in enumerate(opened.bench.measured) if np.isfinite(y).any()] == [1, 3]

@@ -1,0 +1,77 @@
+"""Beam search over sets of effects, by hand: evidence is a table, refits cost nothing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from twin.diagnose import search as stage
+from twin.diagnose.null import Thresholds
+from twin.diagnose.search import search
+
+STUDY: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None)
+
+
+class World:
+    """Every set scores what its effects are worth, one by one, and what they are worth only together."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, worth: dict[str, float], together: dict[str, float] | None = None) -> None:
+        self.worth, self.together = worth, together or {}
+        self.refitted: list[tuple[str, ...]] = []
+        monkeypatch.setattr(stage, "dictionary", lambda objective, fit: None)
+        monkeypatch.setattr(stage, "rank", self.rank)
+        monkeypatch.setattr(stage, "extended", lambda study, member, effect, start: self.of(*member.effects, effect))
+        monkeypatch.setattr(stage, "fuller", lambda study, w, effects, accept: w)
+        monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
+
+    def of(self, *effects: str) -> Any:
+        effects = tuple(sorted(effects))
+        score = sum(self.worth[e] for e in effects) + self.together.get("+".join(effects), 0.0)
+        score -= 400.0 * (len(effects) > 1 and any(e.startswith("decoy") for e in effects))
+        self.refitted.append(effects)
+        fit = SimpleNamespace(effects=effects, z=np.zeros(1), model=SimpleNamespace(free=effects), cost=-score)
+        return SimpleNamespace(effects=effects, score=score, fit=fit, discrepancy=None)
+
+    def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any) -> list[Any]:
+        """All promise enough to be tried."""
+        return [SimpleNamespace(effect=e, start=None, gain=1e6) for e in self.worth if e not in fit.effects]
+
+    def found(self) -> Any:
+        base = self.of()
+        patterns: Any = SimpleNamespace(beside=lambda effects: None)
+        return search(STUDY, base, patterns, Thresholds())
+
+
+def test_three_effects_are_found_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "drift": 200.0, "tilt": -5.0})
+    assert world.found().best.effects == ("creep", "drift", "friction")
+
+
+def test_an_effect_that_does_not_pay_is_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, {"friction": 500.0, "creep": 11.0})
+    assert world.found().best.effects == ("friction",)
+    assert World(monkeypatch, {"friction": 500.0, "creep": 13.0}).found().best.effects == ("creep", "friction")
+    assert World(monkeypatch, {"friction": 11.0}).found().best.effects == ()
+
+
+def test_what_pays_stays_when_the_lean_sets_are_weighed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Backward elimination drops no effect whose removal costs more than it saves."""
+    found = World(monkeypatch, {"friction": 500.0, "creep": 300.0}).found()
+    assert found.best.effects == ("creep", "friction")
+    assert {w.effects for w in found.all} >= {(), ("friction",), ("creep",), ("creep", "friction")}
+
+
+def test_an_imitation_that_led_is_dropped_when_the_causes_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`routing` leads, two decoys fill the beam, so that the causes are met beside `routing` only: that these two do as well
+    without it shows when it is dropped."""
+    worth = {"routing": 600.0, "decoy_a": 350.0, "decoy_b": 340.0, "friction": 300.0, "creep": 280.0}
+    found = World(monkeypatch, worth, {"creep+friction": 500.0, "creep+friction+routing": -95.0}).found()
+    assert found.best.effects == ("creep", "friction")
+
+
+def test_every_set_weighed_is_listed_best_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores = [w.score for w in World(monkeypatch, {"friction": 500.0, "creep": 300.0}).found().all]
+    assert scores == sorted(scores, reverse=True)

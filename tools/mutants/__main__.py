@@ -1,0 +1,91 @@
+"""See the package's docstring."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tomllib
+from collections import Counter
+from fnmatch import fnmatchcase
+from pathlib import Path
+from random import Random
+
+from tools.mutants.attempt import Tree
+from tools.mutants.by_hand import by_hand
+from tools.mutants.groups import GROUPS, group_of
+from tools.mutants.mutant import Mutant
+from tools.mutants.operators import mutants
+
+HERE = Path(__file__).parent
+OUTCOMES, REASONS = HERE / "outcomes.json", HERE / "reasons.toml"
+KINDS = ("killed", "timed out", "survived")
+SHOWN = (*KINDS, "with a reason")
+NEW = "survived"  # or never tried
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tools.mutants", description="One line changed: do the tests see it?")
+    parser.add_argument("what", choices=["run", "table"])
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--each", type=int, default=25, help="mutants sampled of each group")
+    parser.add_argument("--only", nargs="+", choices=sorted(GROUPS), help="groups")
+    parser.add_argument("--patience", type=float, default=300.0, help="s, for the tests of one mutant")
+    args = parser.parse_args()
+    if args.what == "run":
+        run(args.only or list(GROUPS), args.seed, args.each, args.patience)
+    print(table(_known()))
+
+
+def run(groups: list[str], seed: int, each: int, patience: float) -> None:
+    """Tries the sampled mutants and those by hand, of these groups; the killed are not tried again, nor survivors
+    with a reason. Raises SystemExit where a group's tests fail on the tree as it is."""
+    tree = Tree(HERE.parents[1])
+    try:
+        known, texts = _known(), tree.texts()
+        for group in groups:
+            own = {f: t for f, t in texts.items() if group_of(f) == group}
+            todo = [m for m in (*by_hand(own), *sampled(own, seed, each)) if known.get(m.key, NEW) == NEW and not reason(m.key)]
+            if todo and (code := tree.run(group, None, None)) != 0:
+                raise SystemExit(f"the tests of {group} do not pass on the tree as it is (pytest's exit code {code})")
+            for mutant in todo:
+                known[mutant.key] = tree.outcome(mutant, patience)
+                OUTCOMES.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
+                print(f"{known[mutant.key]:10} {mutant.file}:{mutant.number} ({mutant.kind}) {mutant.new.strip()}", flush=True)
+    finally:
+        tree.close()
+
+
+def sampled(texts: dict[str, str], seed: int, each: int) -> list[Mutant]:
+    every = [m for file, text in texts.items() for m in mutants(file, text)]
+    return Random(seed).sample(every, min(each, len(every)))
+
+
+def table(known: dict[str, str]) -> str:
+    """Counts by package, the rate of all tried and of those without a reason to survive, and the survivors with theirs."""
+    counts: dict[str, Counter[str]] = {}
+    for key, outcome in known.items():
+        file = key.split(":")[0]
+        package = file.split("/")[1].removesuffix(".py")
+        counts.setdefault(package, Counter())[outcome] += 1
+        counts[package]["with a reason"] += outcome == "survived" and reason(key) is not None
+    counts["all"] = sum(counts.values(), Counter())
+    lines = [f"{'':14}{'tried':>8}" + "".join(f"{k:>15}" for k in SHOWN) + f"{'rate':>8}{'of the others':>15}"]
+    for package, c in counts.items():
+        seen, tried = c["killed"] + c["timed out"], sum(c[k] for k in KINDS)
+        others = seen / max(tried - c["with a reason"], 1)
+        lines.append(f"{package:14}{tried:8}" + "".join(f"{c[k]:15}" for k in SHOWN) + f"{seen / max(tried, 1):8.1%}{others:15.1%}")
+    survivors = sorted(k for k, outcome in known.items() if outcome == "survived")
+    return "\n".join([*lines, *(f"{reason(k) or 'NO TEST SEES IT'}: {k}" for k in survivors)])
+
+
+def reason(key: str) -> str | None:
+    """Why no test need see a mutant: by the first pattern of reasons.toml that its key fits."""
+    return next((why for like, why in tomllib.loads(REASONS.read_text()).items() if fnmatchcase(key, like)), None)
+
+
+def _known() -> dict[str, str]:
+    return json.loads(OUTCOMES.read_text()) if OUTCOMES.exists() else {}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Which modules are changed, and the tests that must see it: few enough to end in a minute on an unchanged tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatch
+
+
+@dataclass(frozen=True)
+class Group:
+    """Modules (patterns of paths) and what pytest is given for them, the quickest first."""
+
+    modules: tuple[str, ...]
+    tests: tuple[str, ...]
+
+    def has(self, file: str) -> bool:
+        return any(fnmatch(file, pattern) for pattern in self.modules)
+
+
+LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks"
+
+
+def _stage(name: str, *tests: str) -> Group:
+    return Group((f"twin/diagnose/{name}.py",), tests or (f"tests/test_{name}.py",))
+
+
+GROUPS = {
+    "effects": Group(
+        ("twin/effects/[!_]*.py",),
+        (
+            "tests/test_laws.py",
+            "tests/test_conformance.py",
+            "tests/test_effects.py",
+            "tests/test_transmission_error.py",
+            "-k",
+            LAWS,
+        ),
+    ),
+    "calibrate": Group(
+        ("twin/calibrate.py",),
+        ("tests/test_calibrate.py", "-k", "intervals or linear or widen or neighbour_serve or thousandth or hardly"),
+    ),
+    "residual": Group(("twin/residual.py",), ("tests/test_residual.py",)),
+    "laws": Group(("twin/laws.py",), ("tests/test_laws.py", "tests/test_dynamics.py", "-k", "laws or alike")),
+    "bench": Group(("twin/bench.py",), ("tests/test_prepare.py", "tests/test_evaluate.py", "tests/test_design.py")),
+    "twin": Group(
+        ("twin/twin.py",), ("tests/test_evaluate.py", "tests/test_laws.py", "tests/test_dynamics.py", "tests/test_transmission.py")
+    ),
+    "evaluate": Group(("twin/evaluate.py",), ("tests/test_evaluate.py",)),
+    "choose": _stage("choose"),
+    "gate": _stage("gate"),
+    "judge": _stage("judge"),
+    "search": _stage("search"),
+    "null": _stage("null"),
+    "split": _stage("split"),
+    "spikes": _stage("spikes", "tests/test_spikes.py", "-k", "not bench and not delay"),
+    "left_out": _stage("left_out"),
+    "design": _stage("design"),
+    "loops": _stage("loops", "tests/test_loops.py", "-k", "not day"),
+    "seal": _stage("seal"),
+    "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
+    "shape": Group(("twin/shape/*.py",), ("tests/test_shape.py", "-k", "error_bar or nothing")),
+    "control": Group(("twin/control/*.py",), ("tests/test_control.py",)),
+    "kinematics": Group(("twin/kinematics/*.py",), ("tests/test_kinematics.py",)),
+    "equilibrium": Group(
+        ("twin/equilibrium/*.py",), ("tests/test_balance.py", "tests/test_equilibrium.py", "tests/test_lengths.py")
+    ),
+    "robots": Group(("twin/robots/continuum.py",), ("tests/test_robots.py",)),
+    "numbers": Group(("twin/report/numbers.py",), ("tests/report/test_report_words.py",)),
+}
+
+
+def group_of(file: str) -> str | None:
+    """The group that a module belongs to."""
+    return next((name for name, group in GROUPS.items() if group.has(file)), None)

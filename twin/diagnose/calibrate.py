@@ -1,0 +1,34 @@
+"""Stage `calibrate`: the noise of the fitted trials, and the robot's own uncertain parameters fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.bench import Bench
+from twin.calibrate import fit
+from twin.diagnose.diagnosis import Settings
+from twin.diagnose.evidence import Evidence
+from twin.diagnose.objective import objective_of
+from twin.diagnose.spikes import without_spikes
+from twin.diagnose.split import blind
+from twin.diagnose.study import Progress, Study
+from twin.diagnose.weigh import Weighed, weigh
+from twin.twin import Twin
+
+
+def calibrate(
+    bench: Bench, twin: Twin, sealed: Sequence[int], nominal: Sequence[np.ndarray], settings: Settings, progress: Progress
+) -> tuple[Study, Weighed, list[str]]:
+    """The study of all trials but the `sealed` ones, the calibrated robot, and what had to be assumed or left out, in words.
+
+    `nominal` (n_k, n_output) is the uncalibrated prediction. From here on what was measured on sealed trials is not there.
+    """
+    fitted = [k for k in range(len(bench.inputs)) if k not in sealed]
+    bench, alone = without_spikes(blind(bench, sealed), nominal)
+    progress("noise")
+    start, objective, notes = objective_of(bench, twin, fitted, settings)
+    study = Study(objective, Evidence(bench, fitted), progress)
+    progress("calibration")
+    return study, weigh(study, fit(objective, start, refresh=True)), [*alone, *notes]

@@ -1,0 +1,43 @@
+"""What a diagnosis concludes before the sealed trials are opened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twin.diagnose.gate import Gated
+from twin.diagnose.judge import Judgement
+from twin.diagnose.screen import Screening
+from twin.diagnose.search import Search
+from twin.diagnose.study import Study
+from twin.twin import Twin
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What each stage handed on."""
+
+    study: Study
+    screening: Screening
+    found: Search
+    gated: Gated
+    judged: Judgement
+    notices: tuple[str, ...]
+
+    @property
+    def base(self) -> Twin:
+        """The calibrated robot, no effect added."""
+        return self.found.base.fit.model.twin
+
+    @property
+    def final(self) -> Twin:
+        """The twin the verdict leaves in force."""
+        return self.judged.final.fit.model.twin
+
+    def without(self, effect: str) -> Twin:
+        """The final twin less one effect, everything else fitted again; itself where the effect is not claimed."""
+        claimed = any(c.effect == effect for c in self.judged.claims)
+        return self.gated.without[effect].fit.model.twin if claimed else self.final
+
+    def weighed(self, effects: tuple[str, ...]) -> Twin | None:
+        """The twin of a set of effects that the search weighed."""
+        return next((w.fit.model.twin for w in self.found.all if w.effects == tuple(sorted(effects))), None)

@@ -1,0 +1,111 @@
+"""Stage `gate`: drop what is too small, what may be a larger law's fault, what predicts worse, and what cannot be told apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twin.diagnose.left_out import left_out
+from twin.diagnose.screen import Screening
+from twin.diagnose.search import Search
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import CLEAR, FORM, HALF
+from twin.diagnose.weigh import Weighed, extended, refit_without
+
+
+@dataclass(frozen=True)
+class Small:
+    """An effect found and not claimed: its fit, and how far (sigma) dropping it moved the fitted trials."""
+
+    effect: str
+    fitted: Weighed
+    contribution: float
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """An effect that these data cannot tell from its `rival`; the set it was found in, and the one with the rival in its place."""
+
+    effect: str
+    rival: str
+    found: Weighed
+    other: Weighed
+
+
+@dataclass(frozen=True)
+class Gated:
+    """What stays, its refits with one effect dropped, and what did not pass."""
+
+    best: Weighed
+    without: dict[str, Weighed] = field(default_factory=dict)
+    small: tuple[Small, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
+
+    def contribution(self, study: Study, effect: str) -> float:
+        return contribution(study, self.best, self.without[effect])
+
+
+def gate(study: Study, found: Search, screening: Screening) -> Gated:
+    """One effect after the other, the smallest first, until all that is left passes."""
+    best, own = found.best, set(found.base.effects)
+    small: list[Small] = []
+    doubts: list[Doubt] = []
+    while True:
+        without = {e: refit_without(study, found.base, best, e) for e in best.effects if e not in own}
+        moved = {e: contribution(study, best, w) for e, w in without.items()}
+        if not moved:
+            return Gated(best, {}, tuple(small), tuple(doubts))
+        least = min(moved, key=lambda e: moved[e])
+        if moved[least] < screening.bars.material or _may_be_form(study, moved, best, without[least], least):
+            small.append(Small(least, best, moved[least]))
+            best = without[least]
+            continue
+        harmful = [e for e in moved if len(moved) > 1 and left_out(study, best.fit).worse(left_out(study, without[e].fit))]
+        if harmful:
+            best = without[min(harmful, key=lambda e: moved[e])]
+            continue
+        if (doubt := _doubt(study, found, screening, best, without)) is None:
+            return Gated(best, without, tuple(small), tuple(doubts))
+        doubts.append(doubt)
+        best = without[doubt.effect]
+
+
+def contribution(study: Study, best: Weighed, without: Weighed) -> float:
+    """How far (sigma RMS) dropping an effect and refitting everything else moves the fitted trials."""
+    fall = float(without.fit.z @ without.fit.z - best.fit.z @ best.fit.z)
+    return float(np.sqrt(max(0.0, fall) / study.objective.n))
+
+
+def _may_be_form(study: Study, moved: dict[str, float], best: Weighed, without: Weighed, least: str) -> bool:
+    """Whether an effect is so much smaller than another that it may be what that one's law gets wrong: unless it explains half of
+    all that is left without it, on trials left out in turn too. A large law's faults leave more."""
+    if moved[least] >= FORM * max(moved.values()):
+        return False
+    sizes = [(w.discrepancy.size, left_out(study, w.fit).structure) for w in (best, without)]
+    return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))
+
+
+def _doubt(study: Study, found: Search, screening: Screening, best: Weighed, without: dict[str, Weighed]) -> Doubt | None:
+    """The first effect, of those smaller than what the design tells from its closest rival, that the rival in its place explains as
+    well to within five standard errors; None where there is none. A rival that is in the set itself was fitted beside it."""
+    rows = {v.effect: v for v in screening.table}
+    for effect in sorted(without, key=lambda e: contribution(study, best, without[e])):
+        row = rows.get(effect)
+        if row is None or row.rival in ("", *best.effects) or contribution(study, best, without[effect]) >= row.apart:
+            continue
+        other = _in_its_place(study, found, screening, without[effect], row.rival)
+        if other is not None and other.score > best.score - CLEAR:
+            return Doubt(effect, row.rival, best, other)
+    return None
+
+
+def _in_its_place(study: Study, found: Search, screening: Screening, rest: Weighed, rival: str) -> Weighed | None:
+    """The set `rest` with the rival, as the search weighed it or fitted now; None without equilibrium."""
+    effects = tuple(sorted((*rest.effects, rival)))
+    weighed = [w for w in found.all if w.effects == effects]
+    if not weighed:
+        study.progress(f"{rival} in its place")
+        starts = [p.start for p in screening.patterns.patterns if p.effect == rival]
+        weighed = [w for start in starts if (w := extended(study, rest, rival, start)) is not None]
+    return max(weighed, key=lambda w: w.score, default=None)

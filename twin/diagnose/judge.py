@@ -1,0 +1,155 @@
+"""Stage `judge`: noise, explained, partly explained or unexplained; the claims, how sure they are, and what else it could be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnose.choose import halved
+from twin.diagnose.diagnosis import Claim
+from twin.diagnose.doubts import strained
+from twin.diagnose.evidence import Spectrum
+from twin.diagnose.gate import Gated
+from twin.diagnose.left_out import left_out
+from twin.diagnose.null import Thresholds
+from twin.diagnose.places import misbent
+from twin.diagnose.rigs import Rigs, rigs
+from twin.diagnose.search import Search
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import ACCEPT, ALONE, EVEN, MUCH, RUNNERS, SHARE, TEMPER
+from twin.diagnose.weigh import Weighed
+from twin.diagnose.words import change
+
+
+@dataclass(frozen=True)
+class Signs:
+    """What a verdict is read from: the smooth error (sigma) of the calibrated robot and with the effects, and of these on trials
+    left out; the strongest line left (z-score, Hz).
+
+    `halved`: the effects take half of the error. `strange`: what is left sits at one place of the body, the calibrated error began
+    at once, as that of no known effect does, or a law is at its limit (`strained`, in words).
+    """
+
+    before: float
+    after: float
+    unseen: float
+    line: tuple[float, float]
+    halved: bool
+    strange: bool
+    strained: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict, the model it leaves in force, claims and runners-up (their errors on sealed trials yet unknown), sets of effects
+    that tell the same, and two models between which an experiment should decide."""
+
+    verdict: str
+    final: Weighed
+    claims: tuple[Claim, ...]
+    runners_up: tuple[Claim, ...]
+    ambiguous: tuple[tuple[str, ...], ...]
+    between: tuple[Weighed, Weighed] | None
+    signs: Signs
+    rigs: Rigs | None
+
+
+def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgement:
+    """From what passed the gates; a set that predicts trials left out worse than the calibrated robot counts nothing."""
+    study.progress("verdict")
+    base, best = found.base, gated.best
+    if best is not base and left_out(study, best.fit).worse(left_out(study, base.fit)):
+        best = base
+    added = tuple(e for e in best.effects if e not in base.effects)
+    signs = look(study, base, best, bars)
+    apart = rigs(study.bench, study.trials, base.fit)
+    if apart is not None and apart.fall < base.fit.cost - best.fit.cost:  # what the effects explain needs no second robot
+        apart = None
+    said = "unexplained" if apart else verdict(bool(added), signs, bars)
+    if said in ("noise", "unexplained") and best is not base:
+        signs = replace(signs, after=base.discrepancy.size, unseen=left_out(study, base.fit).structure, strained=())
+        best, added = base, ()
+    claims = _claims(study, found, gated, best, added, signs, bars)
+    runners = _runners_up(found, gated, () if said == "unexplained" else added)
+    doubts = tuple(w.effects for d in gated.doubts for w in (d.found, d.other))
+    ambiguous = tuple(dict.fromkeys((*doubts, *_as_good(found, best))))
+    return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart)
+
+
+def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
+    """The signs of the calibrated `base` and of the `best` set."""
+    bench, trials = study.bench, study.trials
+    after = best.discrepancy.size
+    rest = best.discrepancy.mean * study.objective.whitener.noise.sigma  # SI
+    predicted = [bench.measured[k] - r for k, r in zip(trials, best.fit.evaluation.raw, strict=True)]
+    bent = after > bars.left and bool(misbent(bench, trials, rest, predicted))
+    limits = tuple(strained(best.fit))
+    at_once = base.discrepancy.size > bars.left and change(bench, trials, base.fit.z.reshape(rest.shape)) is not None
+    line = Spectrum.of(bench, trials).peak(best.fit.z.reshape(rest.shape) - best.discrepancy.mean)
+    unseen = left_out(study, best.fit).structure
+    return Signs(base.discrepancy.size, after, unseen, line, halved(study, base, best), bent or at_once or bool(limits), limits)
+
+
+def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
+    """In the words of the report's contract; `added`: effects passed the gates."""
+    s = signs
+    much = max(s.after, s.unseen) > max(MUCH, bars.left) or s.line[0] > bars.line
+    if not added:
+        return "unexplained" if much or s.line[0] > bars.faint or s.after > max(ALONE, bars.left) else "noise"
+    if not much and not (s.after > bars.left and s.after > SHARE * s.before):
+        return "partly_explained" if s.strange else "explained"
+    return "partly_explained" if s.halved else "unexplained"
+
+
+def probability(found: Search, effect: str, small: set[str]) -> float:
+    """Share of the tempered weight exp(score / 20) of sets with the effect; sets with a `small`, immaterial one do not count."""
+    material = [w for w in found.all if not small & set(w.effects)]
+    top = max(w.score for w in material)
+    weights = np.array([np.exp((w.score - top) / TEMPER) for w in material])
+    inside = np.array([effect in w.effects for w in material])
+    return float(weights[inside].sum() / weights.sum())
+
+
+def _claims(
+    study: Study, found: Search, gated: Gated, best: Weighed, added: tuple[str, ...], signs: Signs, bars: Thresholds
+) -> tuple[Claim, ...]:
+    """The largest first."""
+    # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
+    sure = max(0.0, 1.0 - signs.after / signs.before) if signs.after > bars.left else 1.0
+    sure = min(sure, EVEN) if signs.strained else sure
+    small = {s.effect for s in gated.small}
+    claims = [
+        Claim(e, best.fit.fitted(e), float("nan"), sure * probability(found, e, small), gated.contribution(study, e)) for e in added
+    ]
+    return tuple(sorted(claims, key=lambda c: -c.contribution))
+
+
+def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[Claim, ...]:
+    """Effects weighed and not claimed, each in its best set, best first."""
+    small = {s.effect for s in gated.small}
+    out: dict[str, Claim] = {}
+    for w in found.all:
+        for e in w.effects:
+            if e not in claimed and e not in found.base.effects and e not in out and e not in small:
+                others = tuple(o for o in w.effects if o != e)
+                out[e] = Claim(e, w.fit.fitted(e), float("nan"), probability(found, e, small), beside=others)
+    return tuple(list(out.values())[:RUNNERS])
+
+
+def _as_good(found: Search, final: Weighed) -> tuple[tuple[str, ...], ...]:
+    """Other sets, not just the claimed one with something added, whose evidence comes within `ACCEPT` of it."""
+    return tuple(
+        w.effects for w in found.all if w.effects and not set(final.effects) <= set(w.effects) and w.score > final.score - ACCEPT
+    )
+
+
+def _rivals(found: Search, gated: Gated, final: Weighed) -> tuple[Weighed, Weighed] | None:
+    """Two models that tell different stories: an effect and what these data cannot tell it from, else the model in force and the
+    best set that does not contain it."""
+    for doubt in gated.doubts:
+        return doubt.found, doubt.other
+    for w in found.all:
+        if w.effects not in (final.effects, found.base.effects) and not set(final.effects) < set(w.effects):
+            return final, w
+    return None

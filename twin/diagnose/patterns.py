@@ -1,0 +1,87 @@
+"""First-order patterns of the effects a model lacks: what each would do to the white residual if it were switched on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bench import Bench
+from twin.calibrate import Fit, Model, Objective
+from twin.effects import Start, catalogue
+from twin.errors import SolveError, TwinError
+from twin.twin import Twin, report
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """What an effect would do first: its start, the amplitudes switched on one by one, and where their columns stand."""
+
+    effect: str
+    start: Start
+    amplitudes: tuple[str, ...]
+    where: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Dictionary:
+    """First-order patterns of all effects not yet in a fitted model: white columns (n, n_column), per unit of each amplitude."""
+
+    patterns: tuple[Pattern, ...]
+    columns: np.ndarray
+
+    def beside(self, effects: Collection[str]) -> Dictionary:
+        """Without the patterns of these effects and of those akin to them."""
+        left = [p for p in self.patterns if p.effect not in effects and not set(catalogue()[p.effect].akin) & set(effects)]
+        return Dictionary(tuple(left), self.columns)
+
+
+def dictionary(objective: Objective, fit: Fit) -> Dictionary:
+    """Patterns of every effect of the catalogue that the model lacks, that finds what it needs and is not akin to one it has."""
+    bench = objective.bench
+    present = {e.id for e in fit.model.twin.effects}
+    predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces]
+    patterns: list[Pattern] = []
+    neighbours: dict[Twin, tuple[Model, float]] = {}
+    index: dict[Twin, int] = {}  # several starts may share a pattern
+    parts = bench.robot.build().parts
+    for identifier, law in catalogue().items():
+        if identifier in present or present & set(law.akin) or not law.needs <= parts:
+            continue
+        for start in law.starts(predicted, bench.n_tendon):
+            try:
+                models, names = _patterns(fit.model, bench, identifier, start)
+            except TwinError:
+                continue
+            where = tuple(index.setdefault(m.twin, len(index)) for m, _ in models)
+            patterns.append(Pattern(identifier, start, tuple(names), where))
+            neighbours |= {m.twin: (m, size) for m, size in models}
+    return Dictionary(tuple(patterns), _solvable_columns(objective, fit, list(neighbours.values())))
+
+
+def _patterns(model: Model, bench: Bench, identifier: str, start: Start) -> tuple[list[tuple[Model, float]], list[str]]:
+    """For each amplitude of the effect, the model with that amplitude alone switched on, and by how much."""
+    law = catalogue()[identifier]
+    off = {p.name: p.value for p in law.declared(bench.n_tendon)}
+    shape = {k: v for k, v in start.values.items() if k in law.shape}
+    names = [n for n in start.free if n not in law.shape]
+    models = []
+    for name in names:
+        value = start.values.get(name, off[name])
+        models.append((model.with_effect(identifier, {**shape, name: value}, (), bench.n_tendon), value - off[name]))
+    return models, names
+
+
+def _solvable_columns(objective: Objective, fit: Fit, neighbours: list[tuple[Model, float]]) -> np.ndarray:
+    """Columns of all neighbours; one that has no equilibrium gets a zero column and so no gain."""
+    try:
+        return objective.columns(fit.evaluation, neighbours)
+    except SolveError:
+        out = np.zeros((fit.z.size, len(neighbours)))
+        for i, neighbour in enumerate(neighbours):
+            try:
+                out[:, i] = objective.columns(fit.evaluation, [neighbour])[:, 0]
+            except SolveError:
+                continue
+        return out

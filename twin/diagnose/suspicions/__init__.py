@@ -1,0 +1,58 @@
+"""Suspicions about what a file means, raised before anything is fitted: units, signs, order, frames, clocks. Nothing is repaired.
+
+case.py       what is looked at, and how a changed file would be predicted
+
+units.py      readings, commands, payloads in another unit than declared
+signs.py      displacements, readings and gravity the other way round
+frames.py     markers mirrored, turned, shifted
+order.py      tendons and markers exchanged
+trials.py     duplicates, another robot, clocks, milliseconds
+channels.py   dead channels, declared noise, room temperature
+described.py  robot.toml off by a thousand
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from twin.bench import Bench
+from twin.diagnose.split import blind
+from twin.diagnose.suspicions import channels, described, frames, order, signs, trials, units
+from twin.diagnose.suspicions.case import Case, Suspicion
+from twin.diagnose.thresholds import AS_GOOD
+from twin.twin import Twin
+
+Kind = Callable[[Case], Iterable[Suspicion]]
+SEEN: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
+    trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs, channels.noise,
+    signs.outputs, signs.size, frames.frame, order.markers,
+)  # fmt: skip
+TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
+    units.payloads, units.torques, signs.gravity, signs.displacements, order.tendons, channels.inputs,
+)  # fmt: skip
+LAST: tuple[Kind, ...] = (
+    units.commands,
+    described.parameters,
+)  # thousandfold loads take long to solve: where nothing else explains
+UNREADABLE = tuple(units.KINDS.values())  # readings in a wrong unit say nothing of loads
+
+
+def suspicions(bench: Bench, twin: Twin, sealed: Sequence[int], nominal: Sequence[np.ndarray] | None) -> tuple[Suspicion, ...]:
+    """All that looks wrong about what the file means, with the change that would remove it.
+
+    `nominal` (n_k, n_output) is the prediction of the twin as described, None where it has no equilibrium. Of sealed trials only
+    inputs and conditions are looked at. Of changes that explain the same readings the likeliest are kept.
+    """
+    case = Case(blind(bench, sealed), twin, nominal)
+    found = [s for kind in SEEN for s in kind(case)]
+    if not any(s.kind in UNREADABLE and s.group == case.group for s in found):
+        found += [s for kind in TRIED for s in kind(case)]
+    for kind in LAST:
+        if not any(s.group == case.group for s in found):
+            found += kind(case)
+    return tuple(s for s in found if s.left <= AS_GOOD * min(o.left for o in found if o.group == s.group))
+
+
+__all__ = ["LAST", "SEEN", "TRIED", "Case", "Suspicion", "suspicions"]

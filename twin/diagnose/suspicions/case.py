@@ -1,0 +1,155 @@
+"""What every suspicion is raised from: the fitted trials, the twin as described, and how well a changed file would be predicted.
+
+A suspicion is a change to the file under which the twin as described, nothing fitted, predicts the data far better. Nothing is
+changed for it: the data go on as they came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from twin.bench import Bench, Inputs
+from twin.diagnose.thresholds import ALIVE, FITS, MOST, STUCK
+from twin.errors import TwinError
+from twin.evaluate import TYPICAL, headline
+from twin.measurements import Channel
+from twin.measurements.channels import KINDS
+from twin.twin import Twin, readings, report, simulate
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """What looks wrong, in the file's units; the change to the file that would remove it; the share of the error that the change
+    would leave, 0 where the file alone shows it, and the group of outputs that tell."""
+
+    kind: str
+    words: str
+    change: str
+    left: float = 0.0
+    group: str = ""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A bench with the sealed trials blind, the twin as described and its prediction (n_k, n_output), None where it has none."""
+
+    bench: Bench
+    twin: Twin
+    predicted: Sequence[np.ndarray] | None
+
+    @property
+    def trials(self) -> list[int]:
+        """Those with something measured."""
+        return [k for k, y in enumerate(self.bench.measured) if np.isfinite(y).any()]
+
+    @property
+    def group(self) -> str:
+        """The outputs that stand for the twin."""
+        return headline(o.group for o in self.bench.outputs)
+
+    @property
+    def unregistered(self) -> bool:
+        """Whether the markers' frame is one of the robot's uncertain parameters, and so no mistake wherever it stands."""
+        return any(p.name.startswith("frame.") for p in self.twin.robot.nuisance)
+
+    def columns(self, group: str) -> list[int]:
+        return [j for j, o in enumerate(self.bench.outputs) if o.group == group]
+
+    def points(self) -> tuple[list[str], np.ndarray]:
+        """Markers seen in x, y and z, base to tip: their names and their columns (n_marker, 3)."""
+        found: dict[int, dict[int, int]] = {}
+        for j, o in enumerate(self.bench.outputs):
+            if o.group == "marker":
+                found.setdefault(o.index, {})[o.axis] = j
+        whole = [[axes[a] for a in range(3)] for _, axes in sorted(found.items()) if len(axes) == 3]
+        names = [self.bench.outputs[c[0]].channel.name.rpartition("_")[0] for c in whole]
+        return names, np.array(whole, int).reshape(-1, 3)
+
+    def dead(self) -> list[int]:
+        """Columns of outputs that stand still where the robot as described moves."""
+        if self.predicted is None:
+            return []
+        y, p = (np.concatenate([v[k] for k in self.trials]) for v in (self.bench.measured, self.predicted))
+        noise = [o.channel.noise or TYPICAL[o.group] for o in self.bench.outputs]
+        still = [np.isfinite(c).any() and np.nanstd(c) < STUCK * s for c, s in zip(y.T, noise, strict=True)]
+        return [j for j, s in enumerate(noise) if still[j] and np.std(p[:, j]) > ALIVE * s]
+
+    def few(self) -> list[int]:
+        """Of the fitted trials those that pull each tendon most and that carry most: enough to try a change on."""
+        if not self.trials:
+            return []
+        pulled = np.array([np.abs(self.bench.inputs[k].command).max(axis=0) for k in self.trials])
+        heaviest = int(np.argmax([self.bench.inputs[k].loads.payload for k in self.trials]))
+        return sorted({self.trials[i] for i in (*pulled.argmax(axis=0)[:MOST].tolist(), heaviest)})
+
+    def again(self, change: Callable[[Inputs], Inputs], twin: Twin | None = None) -> dict[int, np.ndarray] | None:
+        """What would be predicted of the `few` trials, driven and loaded otherwise; None without an equilibrium."""
+        few, twin = self.few(), twin or self.twin
+        bench = replace(self.bench, inputs=tuple(change(i) for i in self.bench.inputs))
+        try:
+            traces = simulate(twin, bench, trials=few)
+            seen = [readings(bench, report(twin.effects, t.true)) for t in traces]
+        except TwinError:
+            return None
+        return dict(zip(few, seen, strict=True)) if all(np.isfinite(y).all() for y in seen) else None
+
+    def as_is(self) -> dict[int, np.ndarray] | None:
+        return None if self.predicted is None else dict(enumerate(self.predicted))
+
+    def error(self, columns: Sequence[int], predicted: dict[int, np.ndarray] | None, trials: Sequence[int] | None = None) -> float:
+        """RMS of measured - predicted over the columns and trials, SI; infinite where nothing is predicted."""
+        if predicted is None:
+            return float("inf")
+        trials = self.trials if trials is None else trials
+        measured = np.concatenate([self.bench.measured[k] for k in trials])
+        shown = np.concatenate([predicted[k] for k in trials])
+        if self.unregistered:
+            shown = self._registered(measured, shown)
+        return rms((measured - shown)[:, columns])
+
+    def motion(self, columns: Sequence[int]) -> float:
+        """RMS of the columns about their means over the fitted trials, SI."""
+        y = np.concatenate([self.bench.measured[k] for k in self.trials])[:, columns]
+        return rms(y - np.nanmean(y, axis=0))
+
+    def better(self, before: float, after: float, columns: Sequence[int]) -> float | None:
+        """The share of the error left by a change to the file, where it takes most of it and little is left; else None."""
+        if not np.isfinite(after) or after >= FITS * min(before, self.motion(columns)):
+            return None
+        return after / before if np.isfinite(before) else 0.5 * after / self.motion(columns)
+
+    def _registered(self, measured: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """Predicted markers turned and shifted onto the measured ones."""
+        _, columns = self.points()
+        if not len(columns):
+            return shown
+        out, flat = shown.copy(), columns.ravel()
+        turn, shift = registration(shown[:, flat].reshape(-1, 3), measured[:, flat].reshape(-1, 3))
+        out[:, flat] = (shown[:, flat].reshape(-1, 3) @ turn.T + shift).reshape(len(shown), -1)
+        return out
+
+
+def rms(r: np.ndarray) -> float:
+    """Root mean square of what is there; infinite where nothing is."""
+    known = r[np.isfinite(r)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("inf")
+
+
+def registration(points: np.ndarray, onto: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Proper rotation (3, 3) and shift (3,) that bring points (n, 3) closest to `onto` (Kabsch, Acta Cryst. A32, 1976)."""
+    known = np.isfinite(points).all(axis=1) & np.isfinite(onto).all(axis=1)
+    if known.sum() < 3:
+        return np.eye(3), np.zeros(3)
+    a, b = points[known], onto[known]
+    turn = Rotation.align_vectors(b - b.mean(axis=0), a - a.mean(axis=0))[0].as_matrix()
+    return turn, b.mean(axis=0) - turn @ a.mean(axis=0)
+
+
+def called(channels: Sequence[Channel]) -> str:
+    """The channels as a pattern: disk_*_*, tendon_*_tension."""
+    patterns = dict.fromkeys(KINDS[c.kind][0].replace("#", "*").replace("@", "*") for c in channels)
+    return ", ".join(patterns)

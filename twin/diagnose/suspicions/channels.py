@@ -1,0 +1,112 @@
+"""Single channels: dead ones, declared noise that cannot be, a room nobody works in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from twin.bench import ROOM, Inputs
+from twin.diagnose.suspicions.case import Case, Suspicion, called, rms
+from twin.diagnose.suspicions.units import others
+from twin.diagnose.thresholds import ALIVE, DROWNED, EXPLAINED, NOISY, QUIET, WORKABLE
+from twin.measurements import Channel
+from twin.units import unit_scale
+
+
+def outputs(case: Case) -> Iterator[Suspicion]:
+    """Outputs that stand still where the robot as described moves."""
+    found = [case.bench.outputs[j].channel.name for j in case.dead()]
+    if found:
+        words = f"{', '.join(found)}: one value all day, and the robot as described moves there"
+        yield Suspicion("dead channel", words, f"remove the [[channel]] {', '.join(found)}, or log again")
+
+
+def inputs(case: Case) -> Iterator[Suspicion]:
+    """A drive that never changes, though the robot moves as if it did."""
+    if case.predicted is None or not case.few():
+        return
+    command = np.concatenate([i.command for i in case.bench.inputs])
+    columns, few = case.columns(case.group), case.few()
+    still = np.ptp(command, axis=0) <= ALIVE * np.array([c.noise or 0.0 for c in case.bench.drivers]) * np.abs(case.bench.pull)
+    left = [case.bench.measured[k][:, columns] - case.predicted[k][:, columns] for k in case.trials]
+    if not rms(np.concatenate(left)) > EXPLAINED * case.motion(columns):
+        return
+    for i in np.flatnonzero(still):
+        top = float(np.abs(command).max())
+
+        def pulled(x: Inputs, i: int = int(i), top: float = top) -> Inputs:
+            return replace(x, command=np.where(np.arange(x.command.shape[1]) == i, 0.5 * top, x.command))
+
+        other = case.again(pulled)
+        if other is None:
+            continue
+        whole, rest = [], []
+        for k in few:
+            along = other[k][:, columns] - case.predicted[k][:, columns]
+            r = np.nan_to_num(case.bench.measured[k][:, columns] - case.predicted[k][:, columns])
+            share = (r * along).sum(axis=1) / (along**2).sum(axis=1)
+            whole.append(r)
+            rest.append(r - share[:, None] * along)
+        if rms(np.concatenate(rest)) < EXPLAINED * rms(np.concatenate(whole)):
+            name = case.bench.drivers[i].name
+            words = f"{name} never changes, and the robot moves as if it did"
+            yield Suspicion("dead input", words, f"log {name} again, or leave out the trials in which it was pulled")
+
+
+def noise(case: Case) -> Iterator[Suspicion]:
+    """Declared noise beside what neighbouring readings scatter by, and beside all that is seen."""
+    odd: list[tuple[Channel, float]] = []
+    for j, o in enumerate(case.bench.outputs):
+        if case.predicted is not None:
+            left = [case.bench.measured[k][:, j] - case.predicted[k][:, j] for k in case.trials]
+            odd += _odd(o.channel, _scatter(left, 0.5), DROWNED * rms(np.concatenate(left)))
+    for i, c in enumerate(case.bench.drivers):
+        read = [x.command[:, i] / case.bench.pull[i] for x in case.bench.inputs]
+        odd += _odd(c, _scatter(read, 0.25), float(np.ptp(np.concatenate(read))) or np.inf)
+    for unit in dict.fromkeys(c.unit for c, _ in odd):
+        alike = [(c, s) for c, s in odd if c.unit == unit]
+        one = alike[0][0].scale.difference().to_si(1.0)
+        said, seen = np.median([c.noise or np.nan for c, _ in alike]) / one, np.median([s for _, s in alike]) / one
+        names = called([c for c, _ in alike])
+        words = f"noise of {names} is declared as {said:.3g} {unit}, and neighbouring readings scatter by {seen:.3g} {unit}"
+        yield Suspicion("declared noise", words, f"noise = {seen:.2g} for {names} (one standard deviation, in {unit})")
+
+
+def _odd(channel: Channel, scatter: float, most: float) -> list[tuple[Channel, float]]:
+    """The channel and its scatter (SI), where its declared noise is far below that, or above it and the `most` that it may be."""
+    said = channel.noise
+    if said is None or not (scatter > NOISY * said or said > max(most, QUIET * scatter)):
+        return []
+    return [(channel, scatter)]
+
+
+def _scatter(columns: list[np.ndarray], quantile: float) -> float:
+    """Standard deviation of white noise whose second differences have this quantile."""
+    second = np.concatenate([np.abs(np.diff(c, n=2)) for c in columns])
+    second = second[np.isfinite(second)]
+    normal = {0.5: 0.6745, 0.25: 0.3186}[quantile]  # quantiles of |x|, x standard normal
+    return float(np.quantile(second, quantile)) / (normal * np.sqrt(6.0)) if second.size else 0.0
+
+
+def room(case: Case) -> Iterator[Suspicion]:
+    """A room temperature at which nobody works."""
+    low, high = WORKABLE
+    recording = case.bench.recording
+    for channel in (c for c in recording.channels if c.kind == "ambient_temperature"):
+        values = np.concatenate([t.values[channel.name] for t in recording.trials])
+        seen = float(np.nanmedian(values))
+        if not low < seen < high:
+            own = channel.scale
+            read = (seen - own.offset) * own.denominator / own.numerator
+            fit = [u for u in others(channel) if low < unit_scale(u, "K").to_si(read) < high]
+            words = f"{channel.name} is {read:.4g} {channel.unit}, and nobody works in a room of {seen - 273.15:.0f} degC"
+            change = f'unit = "{fit[0]}" instead of "{channel.unit}" for {channel.name}' if fit else f"correct {channel.name}"
+            yield Suspicion("temperature unit", words, change)
+    odd = {t.name: float(t.conditions.get("ambient_temperature", ROOM)) for t in recording.trials}
+    for name, kelvin in odd.items():
+        if not low < kelvin < high:
+            words = f"ambient_temperature of {name} is {kelvin:.4g} K, {kelvin - 273.15:.0f} degC"
+            yield Suspicion("temperature unit", words, "its unit: degC, degF or K")
+            return

@@ -1,0 +1,67 @@
+"""Order: tendons or markers exchanged."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from twin.diagnose.suspicions.case import Case, Suspicion, rms
+from twin.diagnose.suspicions.units import best
+from twin.diagnose.thresholds import FITS
+
+
+def tendons(case: Case) -> Iterator[Suspicion]:
+    """Two driving channels exchanged, or all of them counted from another one."""
+    n = case.bench.n_tendon
+    pairs = [_swap(n, i, j) for i, j in itertools.combinations(range(n), 2)]
+    ways = [*pairs, *(np.roll(np.arange(n), s) for s in range(1, n) if n > 2)]
+    names = [c.name for c in case.bench.drivers]
+    if len(set(names)) < n:
+        return  # one drive for several tendons
+    tried = [(_said(names, order), lambda i, o=order: replace(i, command=i.command[:, o])) for order in ways]
+    words = "the robot as described would bend another way than measured under these commands"
+    yield from best(case, "tendon order", words, "{}", tried)
+
+
+def _swap(n: int, i: int, j: int) -> np.ndarray:
+    order = np.arange(n)
+    order[[i, j]] = j, i
+    return order
+
+
+def _said(names: list[str], order: np.ndarray) -> str:
+    return ", ".join(f"the column {names[o]} as {names[i]}" for i, o in enumerate(order) if i != o)
+
+
+def markers(case: Case) -> Iterator[Suspicion]:
+    """Points, or scalar channels of a group, that each follow another one's prediction."""
+    if case.predicted is None:
+        return
+    names, columns = case.points()
+    groups = {"marker": (names, columns)} if not case.unregistered else {}
+    for group in dict.fromkeys(o.group for o in case.bench.outputs if o.group != "marker"):
+        own = case.columns(group)
+        groups[group] = [case.bench.outputs[j].channel.name for j in own], np.array(own)[:, None]
+    y, p = (np.concatenate([v[k] for k in case.trials]) for v in (case.bench.measured, case.predicted))
+    dead = case.dead()
+    for group, (names, columns) in groups.items():
+        alive = np.flatnonzero(~np.isin(columns, dead).any(axis=1))
+        names, columns = [names[a] for a in alive], columns[alive]
+        cost = np.array([[rms(y[:, a] - p[:, b]) for b in columns] for a in columns])
+        if len(columns) < 2 or not np.isfinite(cost).all():
+            continue
+        _, of = linear_sum_assignment(cost**2)
+        moved = np.flatnonzero(of != np.arange(len(of)))
+        if not moved.size:
+            continue
+        before, after = (rms(cost[moved, x]) for x in (moved, of[moved]))
+        if after < FITS * before:
+            change = ", ".join(f"the column{'s' if group == 'marker' else ''} {names[i]} as {names[of[i]]}" for i in moved)
+            words = f"{', '.join(names[i] for i in moved)} each stand where another of them should"
+            yield Suspicion(
+                "marker order" if group == "marker" else "channel order", words, change, after / before, f"{group} order"
+            )

@@ -1,0 +1,98 @@
+"""A fitted model, what the evidence says of it, and its refits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.calibrate import Fit, Model, fit
+from twin.diagnose.evidence import Discrepancy
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import ROUGHLY
+from twin.effects import Start, catalogue
+from twin.errors import SolveError
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, up to a constant."""
+
+    fit: Fit
+    score: float
+    discrepancy: Discrepancy
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return tuple(sorted(e.id for e in self.fit.model.twin.effects))
+
+
+def weigh(study: Study, fitted: Fit) -> Weighed:
+    gain, discrepancy = study.evidence.log_likelihood_gain(fitted.z)
+    prior = fitted.cost - float(fitted.z @ fitted.z)
+    return Weighed(fitted, gain - prior - fitted.effective_parameters() * float(np.log(study.objective.n)), discrepancy)
+
+
+def extended(study: Study, member: Weighed, effect: str, start: Start) -> Weighed | None:
+    """`member` with one effect more; None without equilibrium."""
+    model = member.fit.model.with_effect(effect, dict(start.values), start.free, study.bench.n_tendon)
+    try:
+        found = fit(study.objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY)
+        return weigh(study, found)
+    except SolveError:
+        return None
+
+
+def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float) -> Weighed:
+    """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it.
+
+    Before other effects are added: what the plain law leaves would be taken for them.
+    """
+    n_tendon, parts = study.bench.n_tendon, study.bench.robot.build().parts
+    for effect in effects:
+        richer = catalogue()[effect].richer
+        free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
+        if not richer or set(richer) <= set(free) or not catalogue()[effect].richer_needs <= parts:
+            continue
+        study.progress(f"fuller law of {effect}")
+        table = {p.name: p for p in catalogue()[effect].declared(n_tendon)}
+        law = next(e for e in found.fit.model.twin.effects if e.id == effect)
+        values = {**law.values, **{n: table[n].value + (0.0 if n in law.shape else table[n].step) for n in richer}}
+        model = found.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
+        try:
+            fuller = weigh(study, fit(study.objective, model, J=_own(found.fit)))
+        except SolveError:
+            continue
+        if fuller.score > found.score + accept:
+            found = fuller
+    return found
+
+
+def refit_without(study: Study, base: Weighed, best: Weighed, effect: str) -> Weighed:
+    """The best set less one effect, everything else fitted again.
+
+    A robot fitted with the effect may have no equilibrium without it, where lengths are held: then from the base's robot, and where
+    that has none under the other effects, the base itself.
+    """
+    study.progress(f"without {effect}")
+    keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
+    model = best.fit.model.without_effect(effect)
+    as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
+    for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
+        try:
+            return weigh(study, fit(study.objective, start, J=J))
+        except SolveError:
+            continue
+    return base
+
+
+def better(found: Weighed, than: Weighed) -> bool:
+    """Of two fits of the same effects. With the same parameters free they are minima of one cost, and the lower one is the fit."""
+    if set(found.fit.model.free) == set(than.fit.model.free):
+        return found.fit.cost < than.fit.cost
+    return found.score > than.score
+
+
+def _own(fitted: Fit) -> np.ndarray:
+    """Derivatives for the robot's own parameters, which come first."""
+    return fitted.J[:, [i for i, f in enumerate(fitted.model.free) if f.effect is None]]

@@ -1,0 +1,80 @@
+"""The effects in force, applied together in the order of the signal: the one place where laws meet.
+
+Prediction, a loaded robot, controllers and rollouts all go through here:
+
+    reported -> command -> drive -> [the body, edited, under surround, route, spring, deform, soften] -> sense -> reported
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from twin.effects import Creep, Effect, Loads, Route, Signals
+from twin.errors import DataError
+from twin.springs import Spring
+
+
+@dataclass(frozen=True)
+class Laws:
+    """Effects in the order in which they act on a signal."""
+
+    effects: tuple[Effect, ...]
+
+    def edit(self, body: Any, robot: str) -> None:
+        """Change a body that is not compiled yet. Raises DataError for an effect that finds nothing to act on in the `robot`."""
+        for effect in self.effects:
+            if lacking := effect.needs - body.parts:
+                what = " and ".join(sorted(lacking))
+                raise DataError(f"effect {effect.id} acts on {what}, which robot {robot!r} has not: remove the effect")
+            effect.edit(body)
+
+    def command(self, reported: Signals) -> Signals:
+        """The true inputs behind what was reported."""
+        for effect in reversed(self.effects):
+            reported = effect.command(reported)
+        return reported
+
+    def drive(self, command: Signals) -> Signals:
+        """What the motors do of what they are told."""
+        for effect in self.effects:
+            command = effect.drive(command)
+        return command
+
+    def surround(self, loads: Loads) -> Loads:
+        for effect in self.effects:
+            loads = effect.surround(loads)
+        return loads
+
+    def stiffness(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
+        """(n,) of the body over that described."""
+        stiffness = np.ones(len(clock))
+        for effect in self.effects:
+            stiffness = stiffness * effect.soften(temperature, clock)
+        return stiffness
+
+    def spring(self, spring: Spring) -> Spring:
+        for effect in self.effects:
+            spring = effect.spring(spring)
+        return spring
+
+    @property
+    def route(self) -> Route:
+        """Along the tendons: the first friction, and all stretch."""
+        routes = [e.route() for e in self.effects]
+        rubbing = next((r for r in routes if r.mu > 0.0), Route())
+        return replace(rubbing, stretch=sum(r.stretch for r in routes), stiffening=sum(r.stiffening for r in routes))
+
+    @property
+    def creep(self) -> Creep:
+        """The delayed strains of all of them, one element after the other."""
+        creeps = [e.deform() for e in self.effects]
+        return Creep(tuple(a for c in creeps for a in c.amplitude), tuple(t for c in creeps for t in c.time))
+
+    def sense(self, true: Signals) -> Signals:
+        """What the sensors say of the true signals."""
+        for effect in self.effects:
+            true = effect.sense(true)
+        return true

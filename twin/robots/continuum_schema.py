@@ -1,0 +1,229 @@
+"""The numbers a continuum robot is described by, in the order of its signal: backbone, disks, tendons, markers, frame, springs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from twin.quantities import each
+from twin.robots.schema import Row, Schema, Structure
+from twin.robots.spring_rows import SPRINGS, spring_objections
+
+Disk = Annotated[int, Field(ge=1, le=200)]
+WIRE, CAST = frozenset({'body = "wire"'}), frozenset({'body = "cast"'})
+ON_DISKS, LISTED = frozenset({'markers = "disk"'}), frozenset({"markers = [disk, ...]"})
+MISMATCH = 5e-3  # of the length: how far pitches written with three digits may add up to something else
+FULL_TURN = 2.0 * np.pi
+
+
+class Continuum(Structure):
+    """[structure] of family "continuum"."""
+
+    body: Literal["wire", "cast"] = Field(
+        "wire",
+        description='"wire": a slender rod through disks that does not stretch; "cast": elastomer around its tendons, which does',
+    )
+    disks: Disk = Field(description="how many disks (of a cast body: places where the tendons' channels are followed)")
+    tendons: Annotated[int, Field(ge=1, le=24)] = Field(description="how many tendons")
+    tendons_end: Disk | None = Field(None, description="the disk at which all tendons end; left out: the last")
+    markers: Literal["disk"] | list[Disk] = Field(
+        "disk",
+        description='"disk": a marker disk_K in the centre of every disk; or a list of disks that carry marker_1, marker_2, ...',
+    )
+
+    def counts(self) -> dict[str, int]:
+        return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers)}
+
+    def kinds(self) -> frozenset[str]:
+        return (WIRE if self.body == "wire" else CAST) | (ON_DISKS if self.markers == "disk" else LISTED)
+
+    def objections(self) -> list[str]:
+        out = []
+        if self.tendons_end is not None and self.tendons_end > self.disks:
+            out.append(f"structure: tendons_end is {self.tendons_end}; a disk from 1 to {self.disks} is needed")
+        if self.markers != "disk" and not (self.markers and max(map(int, self.markers)) <= self.disks):
+            out.append(f'structure: markers is {self.markers}; "disk" or a list of disks from 1 to {self.disks} is needed')
+        return out
+
+
+def objections(structure: Continuum, values: Mapping[str, float]) -> list[str]:
+    """What is wrong between numbers that are each in order."""
+    out = []
+    pitch = each(values, "disks.pitch", structure.disks)
+    z = np.concatenate([[0.0], np.cumsum(pitch)])
+    end = z[structure.tendons_end or structure.disks]
+    stated = values.get("backbone.length")  # checked only: what the robot is built from are the pitches
+    if stated is not None and abs(stated - z[-1]) > MISMATCH * z[-1]:
+        out.append(f"backbone.length is {1e3 * stated:g} mm and the pitches add up to {1e3 * z[-1]:g} mm; correct one of them")
+    if structure.body == "wire":
+        hole, rim, wire = values["tendons.radius"], values["disks.radius"], values["backbone.radius"]
+        if not wire < hole <= rim:
+            out.append(
+                f"tendons.radius is {1e3 * hole:g} mm; holes lie between the backbone ({1e3 * wire:g} mm) and the rim of the "
+                f"disks (disks.radius, {1e3 * rim:g} mm)"
+            )
+    else:
+        out += _cast_objections(values, z, end)
+    return out + spring_objections(values)
+
+
+def _cast_objections(values: Mapping[str, float], z: np.ndarray, end: float) -> list[str]:
+    out = []
+    n, m = (sum(name.startswith(f"backbone.{key}_") for name in values) for key in ("station", "radius"))
+    if n != m:
+        return [f"backbone.station has {n} numbers and backbone.radius {m}; a radius for each station is needed"]
+    at = each(values, "backbone.station", n)
+    if not np.all(np.diff(at) > 0.0):
+        out.append("backbone.station does not rise; write stations from base to tip")
+    elif at[0] > MISMATCH * z[-1] or at[-1] < (1.0 - MISMATCH) * z[-1]:
+        out.append(
+            f"backbone.station runs from {1e3 * at[0]:g} to {1e3 * at[-1]:g} mm; the body, from 0 to the sum of the pitches, "
+            f"{1e3 * z[-1]:g} mm, must lie between"
+        )
+    if values["tendons.radius"] + values["tendons.slope"] * end <= 0.0:
+        out.append("tendons.radius + tendons.slope s falls to zero before the tendons' end")
+    return out
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Rows that share kind and shape."""
+
+    only: frozenset[str] = frozenset()
+    shape: tuple[str, ...] = ()
+
+    def row(self, name: str, units: str, meaning: str, low: float, high: float, **more: object) -> Row:
+        """`units`: the SI unit and, after a space, the one people write."""
+        si, _, usual = units.partition(" ")
+        return replace(Row(name, si, usual or si, meaning, low, high, only=self.only, shape=self.shape), **more)  # type: ignore[arg-type]
+
+
+_all, _wire, _cast = _Rows(), _Rows(WIRE), _Rows(CAST)
+_disk, _tendon, _station = _Rows(shape=("disk",)), _Rows(shape=("tendon",)), _Rows(CAST, ("station",))
+_glued = _Rows(LISTED, ("marker",))
+ROWS = (
+    _wire.row(
+        "backbone.length",
+        "m mm",
+        "length from base plate to last disk; only checked, against the sum of `disks.pitch`",
+        1e-3,
+        10.0,
+        stated=True,
+    ),
+    _wire.row("backbone.radius", "m mm", "radius of the wire, in the middle of its length", 1e-5, 0.1),
+    _wire.row("backbone.mass", "kg g", "mass of the whole wire", 1e-6, 10.0),
+    _all.row("backbone.youngs_modulus", "Pa GPa", "Young's modulus E of the backbone (of a cast body at small strain)", 1e3, 2e12),
+    _wire.row("backbone.poisson_ratio", "1", "Poisson's ratio nu; enters the stiffness in twist, G = E / (2 (1 + nu))", -0.99, 0.5),
+    _wire.row(
+        "backbone.radius_taper",
+        "1",
+        "(radius at the base - radius at the tip) / radius; above zero: thinner towards the tip",
+        -1.0,
+        1.0,
+        default=0.0,
+    ),
+    _station.row(
+        "backbone.station",
+        "m mm",
+        "places from the base along the body, rising, between which its radius is linear",
+        0.0,
+        10.0,
+        for_all=False,
+    ),
+    _station.row("backbone.radius", "m mm", "outer radius of the body at each station", 1e-5, 1.0, for_all=False),
+    _cast.row("backbone.density", "kg/m^3", "density of the cast material", 10.0, 3e4),
+    _cast.row("backbone.stiffening", "1", "law of the elastomer: from 0, Hooke's, to 1, neo-Hookean", 0.0, 1.0, default=0.0),
+    _wire.row("disks.mass", "kg g", "mass of all disks together, spread evenly over them", 1e-6, 100.0),
+    _wire.row("disks.radius", "m mm", "outer radius of the disks; enters rotary inertia and pictures", 1e-4, 1.0),
+    _disk.row(
+        "disks.pitch", "m mm", "distance of each disk from the one before, base to tip; the first from the base plate", 1e-4, 1.0
+    ),
+    _all.row(
+        "tendons.radius", "m mm", "distance of the holes' centres from the backbone's axis (of a cast body at the base)", 1e-4, 1.0
+    ),
+    _cast.row(
+        "tendons.slope",
+        "1",
+        "change of that distance per length; below zero: closer to the axis towards the tip",
+        -1.0,
+        1.0,
+        default=0.0,
+    ),
+    _tendon.row(
+        "tendons.angle",
+        "rad deg",
+        "angle of each tendon's holes about +z, from +x towards +y",
+        -2 * FULL_TURN,
+        2 * FULL_TURN,
+        for_all=False,
+    ),
+    _Rows(ON_DISKS, ("disk",)).row(
+        "markers.axial_offset",
+        "m mm",
+        "how far beyond the disk's centre its marker sits, along the disk's axis, towards the tip",
+        -0.5,
+        0.5,
+        default=0.0,
+    ),
+    *(
+        _glued.row(
+            f"markers.offset_{a}",
+            "m mm",
+            f"where each marker sits from its disk's centre on the straight robot, along {a} of the base frame",
+            -1.0,
+            1.0,
+            default=0.0,
+        )
+        for a in "xyz"
+    ),
+    *(
+        _all.row(
+            f"frame.turn_{a}",
+            "rad deg",
+            f"{a} component of the rotation vector R from base to markers' frame: reported = R x + shift",
+            -2 * FULL_TURN,
+            2 * FULL_TURN,
+            default=0.0,
+        )
+        for a in "xyz"
+    ),
+    *(
+        _all.row(f"frame.shift_{a}", "m mm", f"{a} component of the shift from base to markers' frame", -10.0, 10.0, default=0.0)
+        for a in "xyz"
+    ),
+    _all.row("damping.time", "s ms", "damping over stiffness (Rayleigh); counts in fast recordings only", 0.0, 10.0),
+    *SPRINGS,
+)
+
+
+def logged(structure: Continuum) -> list[tuple[str, str, str, float]]:
+    """Tensions in, marker positions out."""
+    pull = [(f"tendon_{i}_tension", "input", "N", 0.01) for i in range(1, structure.tendons + 1)]
+    marker, n = ("disk", structure.disks) if structure.markers == "disk" else ("marker", len(structure.markers))
+    return pull + [(f"{marker}_{k}_{a}", "output", "mm", 0.2) for k in range(1, n + 1) for a in "xyz"]
+
+
+PICTURE = """\
+            base plate                                   tip
+    z = 0       |  pitch_1    disk 1   pitch_2    disk 2 ...
+                |-----------o|-----------------o|       hole of tendon 1, at tendons.radius from the axis
+    x ^         |            |                  |       and tendons.angle about z
+      |         |============|==================|=====  backbone
+      o----> z  |            |                  |
+     y towards you: angles run from +x towards +y. The straight robot lies along +z.
+     Gravity is a vector in this frame: a robot that hangs has [0, 0, 9.81].
+     Tension is positive; displacement is positive where a tendon is pulled in at the base.
+"""
+
+SCHEMA = Schema(
+    structure=Continuum,
+    rows=ROWS,
+    accuracy=Row("accuracy", "m", "mm", "what the description is believed to be good for: no smaller effect is claimed", 1e-9, 0.1),
+    objections=objections,
+    logged=logged,
+    picture=PICTURE,
+)
