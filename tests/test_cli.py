@@ -171,6 +171,7 @@ def test_the_seed_asked_for_is_the_seed_used(command: str, monkeypatch: pytest.M
 
     monkeypatch.setattr(diagnosis, "diagnose", stop)
     monkeypatch.setattr(diagnosis, "calibration", stop)
+    monkeypatch.setattr(cli, "_leave", sys.exit)  # which ends the interpreter at once, and the tests with it
     monkeypatch.setattr(sys, "argv", ["twin", command, str(SAMPLE), "--seed", "41", "--jobs", "3", "--out", str(tmp_path / "out")])
     with pytest.raises(SystemExit):
         cli.main()

@@ -62,11 +62,11 @@ class Bench:
         return shape.tension + 0.01 * self.noise.normal(size=n), shape.displacement + 2e-5 * self.noise.normal(size=n)
 
     def heat(self, voltage: np.ndarray, dt: float) -> None:
-        self.robot.step(voltage / self.robot.held.spring.resistance, dt)
+        self.robot.step(voltage / self.robot.held.spring["resistance"], dt)
 
     def blow(self, twin: Twin) -> None:
         """The air around the springs becomes another twin's."""
-        self.robot.held = self.robot.held._replace(spring=springs(twin))
+        self.robot.held = self.robot.held._replace(spring=springs(twin).records)
 
 
 def controller(kind: str, payload: float = 0.0) -> TipController:
