@@ -13,17 +13,17 @@ from twin.twin import Twin, is_dynamic, readings, report, simulate
 
 UNIT = {  # group of outputs -> unit it is shown in, factor from SI
     "marker": ("mm", 1e3), "displacement": ("mm", 1e3), "tension": ("N", 1.0), "temperature": ("K", 1.0),
-    "resistance": ("ohm", 1.0), "angle": ("deg", 180.0 / np.pi), "torque": ("N*m", 1.0),
+    "resistance": ("ohm", 1.0), "sensor": ("ohm", 1.0), "angle": ("deg", 180.0 / np.pi), "torque": ("N*m", 1.0),
 }  # fmt: skip
 KIND = {  # group of outputs -> kind in reports
     "marker": "position", "displacement": "tendon_displacement", "tension": "tendon_tension", "temperature": "sma_temperature",
-    "resistance": "sma_resistance", "angle": "joint_angle", "torque": "joint_torque",
+    "resistance": "sma_resistance", "sensor": "sensor_resistance", "angle": "joint_angle", "torque": "joint_torque",
 }  # fmt: skip
 
 POINTS = ("marker",)  # groups whose channels are the x, y and z of points
 ACCURATE = ("marker", "angle")  # groups that a robot's declared accuracy speaks of
 TYPICAL = {  # group of outputs -> noise (SI) of a usual sensor, where nothing is known yet
-    "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "angle": 2e-3, "torque": 1e-3,
+    "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "sensor": 0.5, "angle": 2e-3, "torque": 1e-3,
 }  # fmt: skip
 
 

@@ -41,6 +41,38 @@ class HingeChain(Body):
     bows: bool = True
     stiffening: float = 0.0
 
+    def bend_unequally(self, along: float, across: float) -> None:
+        """Bending stiffnesses EI (1 + e) and EI (1 - e), e cos 2 alpha = `along`, e sin 2 alpha = `across`: the hinges are turned to
+        the principal axes."""
+        e, alpha = math.hypot(along, across), 0.5 * math.atan2(across, along)
+        # Of the two equivalent descriptions (e, alpha) and (-e, alpha - 90 deg), the one that turns the hinges less.
+        if abs(alpha) > math.pi / 4:
+            e, alpha = -e, alpha - math.copysign(math.pi / 2, alpha)
+        c, s = math.cos(alpha), math.sin(alpha)
+        for at in self.joints:
+            for name, axis, sign in ((at.bend_x, [c, s, 0], 1.0), (at.bend_y, [-s, c, 0], -1.0)):
+                joint = self.spec.joint(name)
+                joint.axis = axis
+                joint.stiffness = joint.stiffness * (1.0 + sign * e)
+                joint.damping = joint.damping * (1.0 + sign * e)
+
+    def grade(self, slope: float) -> None:
+        """All stiffnesses times 1 + slope (s/L - 1/2), s the distance from the base."""
+        for at in self.joints:
+            factor = 1.0 + slope * (at.arclength - 0.5)
+            for name in (at.bend_x, at.bend_y, at.twist, *((at.slide,) if at.slide else ())):
+                joint = self.spec.joint(name)
+                joint.stiffness = joint.stiffness * factor
+                joint.damping = joint.damping * factor
+
+    def reroute(self, tendon: int, angle: float, further: float) -> None:
+        """Move all holes of a tendon (from 0) about the backbone by `angle` (rad) and away from it by `further` (m)."""
+        for name in self.tendons[tendon]:
+            site = self.spec.site(name)
+            x, y, z = site.pos
+            radius, azimuth = math.hypot(x, y) + further, math.atan2(y, x) + angle
+            site.pos = [radius * math.cos(azimuth), radius * math.sin(azimuth), z]
+
     def first_mode(self) -> float:
         """As a cantilever with all its mass spread: f = 1.875^2 / (2 pi L^2) sqrt(EI / (m/L)) (Euler-Bernoulli)."""
         model = self.spec.compile()

@@ -38,7 +38,7 @@ class BackboneCreep(Effect):
     shape = ("time", "time_2")
     richer = ("amplitude_2", "time_2")
     guesses = ({"amplitude": 0.06, "time": 3.0}, {"amplitude": 0.06, "time": 15.0}, {"amplitude": 0.06, "time": 80.0})
-    needs = frozenset({"backbone"})
+    needs = frozenset({"viscosity"})
     moves_with = "time held under load"
 
     def deform(self) -> Creep:

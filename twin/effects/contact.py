@@ -32,7 +32,7 @@ class Contact(Effect):
         Parameter("distance", 0.05, "m", 2e-3, 0.2, "from the straight robot's axis", scale=1e-3),
     )
     shape = ("azimuth", "distance")
-    needs = frozenset({"backbone"})
+    needs = frozenset({"surface"})
     moves_with = "position: only where the robot reaches beyond a line"
 
     @classmethod

@@ -18,13 +18,8 @@ class StiffnessGradient(Effect):
     id = "stiffness_gradient"
     parameters = (Parameter("gradient", 0.0, "1", -1.6, 1.6, "relative change of EI from base to tip", scale=0.05),)
     guesses = ({"gradient": 0.1},)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"length"})
     moves_with = "the place along the body"
 
     def edit(self, body) -> None:
-        for at in body.joints:
-            factor = 1.0 + self["gradient"] * (at.arclength - 0.5)
-            for name in (at.bend_x, at.bend_y, at.twist, *((at.slide,) if at.slide else ())):
-                joint = body.spec.joint(name)
-                joint.stiffness = joint.stiffness * factor
-                joint.damping = joint.damping * factor
+        body.grade(self["gradient"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from twin.effects.effect import Effect
 from twin.quantities import Parameter
 
@@ -22,16 +20,11 @@ class TendonRouting(Effect):
         Parameter("angle", 0.0, "rad", -0.8, 0.8, "the holes' azimuth against the description", std=0.15, scale=0.03),
         Parameter("radius", 0.0, "m", -4e-3, 4e-3, "the holes' distance against the description", std=5e-4, scale=2e-4),
     )
-    needs = frozenset({"backbone"})
+    needs = frozenset({"holes"})
     moves_with = "the pull of one tendon"
 
     def edit(self, body) -> None:
-        for i, holes in enumerate(body.tendons, 1):
+        for i in range(1, self.n_tendon + 1):
             angle, further = self[f"angle_{i}"], self[f"radius_{i}"]
-            if angle == further == 0.0:
-                continue
-            for name in holes:
-                site = body.spec.site(name)
-                x, y, z = site.pos
-                radius, azimuth = math.hypot(x, y) + further, math.atan2(y, x) + angle
-                site.pos = [radius * math.cos(azimuth), radius * math.sin(azimuth), z]
+            if angle or further:
+                body.reroute(i - 1, angle, further)

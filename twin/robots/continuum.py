@@ -74,7 +74,9 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Hinge
     return HingeChain(
         spec=spec,
         n_tendon=n_tendon,
-        parts=frozenset({"weight", "elasticity", "backbone", "markers", "load cells"}),
+        parts=frozenset(
+            {"weight", "elasticity", "backbone", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity"}
+        ),
         drives=tendon_ports(n_tendon, values.get("springs.resistance", 1.0)),
         senses=tendon_senses(n_tendon) | marker_senses([*markers, "tip"]),
         frame=Frame.of(values),

@@ -1,0 +1,36 @@
+"""Sensor gain: a strain sensor reads a constant factor too much or too little."""
+
+from __future__ import annotations
+
+from twin.effects.effect import Effect, Signals
+from twin.quantities import Parameter
+
+
+class SensorGain(Effect):
+    """Resistance of sensor i = scale_i R0 (1 + gain_i a)^2, a = sqrt(R / R0) - 1 its apparent strain, R0 at no strain.
+
+    A built finger's R0 and kappa are its own: what they may be is in its description, and only what lies beyond is a gain.
+
+    Source: linear calibration of the amplifier (`scale`) and of the cord's gauge factor (`gain`).
+
+    >>> import numpy as np
+    >>> z, one = np.zeros, np.full((1, 1), 1000.0)
+    >>> s = Signals(z(1), z(1), z((1, 1)), z((1, 1)), z((1, 0, 3)), z(1), others={"sensor": 1.21 * one, "sensor_rest": one})
+    >>> round(float(SensorGain(gain_1=2.0, n_tendon=1).sense(s).others["sensor"][0, 0]), 1)
+    1440.0
+    """
+
+    id = "sensor_gain"
+    per_tendon = (
+        Parameter("gain", 1.0, "1", 0.05, 20.0, "gauge factor over the described one", std=0.5, scale=0.03),
+        Parameter("scale", 1.0, "1", 0.05, 20.0, "calibration of the amplifier", std=0.5, scale=0.03),
+    )
+    needs = frozenset({"strain sensors"})
+    moves_with = "the strain itself"
+
+    def sense(self, true: Signals) -> Signals:
+        if "sensor" not in true.others:
+            return true
+        R, rest = true.others["sensor"], true.others["sensor_rest"]
+        apparent = (R / rest) ** 0.5 - 1.0
+        return true.with_(others={**true.others, "sensor": self.each("scale") * rest * (1.0 + self.each("gain") * apparent) ** 2})

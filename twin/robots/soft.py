@@ -1,0 +1,100 @@
+"""A tapered silicone finger bent by tendons and felt by strain-sensing cords."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from twin.body import Sense, marker_senses, tendon_ports
+from twin.quantities import each
+from twin.robots.soft_schema import SCHEMA, Soft
+from twin.sensors import Cords
+from twin.soft import Cone, SoftBody, SoftStatics, lattice, straight
+
+__all__ = ["SCHEMA", "build", "dynamics", "statics"]
+
+SILICONE, CORD, SENSOR, SPOT = [0.93, 0.9, 0.82, 0.45], [0.85, 0.6, 0.15, 1.0], [0.15, 0.15, 0.18, 1.0], [0.9, 0.2, 0.2, 1.0]
+DISCS = 24  # of the picture
+
+
+def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftBody:
+    """The finger of `structure` and `values` (SI, by parameter name) that SCHEMA allows."""
+    shape = Soft.model_validate(dict(structure))
+    cone = Cone(values["body.length"], values["body.radius_base"], values["body.radius_tip"], values["body.clamp"])
+    paths = _lines(values, "tendons", shape.tendons, shape.tendon_points)
+    cord_paths = _lines(values, "sensors", shape.sensors, shape.sensor_points)
+    seen = _on_skin(cone, each(values, "markers.azimuth", shape.markers), each(values, "markers.height", shape.markers))
+    markers = [f"marker_{m}" for m in range(1, shape.markers + 1)]
+    cells = lattice(cone, shape.cells).quadrature[1]
+    nt, ns = shape.tendons, shape.sensors
+    kinds = {"tension": "tension", "displacement": "displacement"}
+    return SoftBody(
+        spec=_picture(cone, paths, cord_paths, seen),
+        n_tendon=nt,
+        parts=frozenset(
+            {"weight", "elasticity", "markers", "load cells", "strain sensors", "planes", "length", "holes", "surface", "viscosity"}
+        ),
+        drives=tuple(ports[:2] for ports in tendon_ports(nt)),
+        senses={
+            **{f"tendon_{i}_{kind}": Sense(group, i - 1) for i in range(1, nt + 1) for kind, group in kinds.items()},
+            **{f"sensor_{i}_resistance": Sense("sensor", i - 1) for i in range(1, ns + 1)},
+            **marker_senses([*markers, "tip"]),
+        },
+        tendons=tuple(tuple(f"tendon_{i}_{p}" for p in range(shape.tendon_points)) for i in range(1, nt + 1)),
+        markers=(*markers, "tip"),
+        cone=cone,
+        cells=shape.cells,
+        paths=paths,
+        anchor=values["tendons.anchor"],
+        cord_paths=cord_paths,
+        cords=Cords(*(np.array(each(values, f"sensors.{name}", ns)) for name in ("resistance", "stretch", "compression"))),
+        seen=seen,
+        turn=values["mounting.angle"],
+        youngs_modulus=values["silicone.youngs_modulus"],
+        poisson=values["silicone.poisson_ratio"],
+        density=values["silicone.density"],
+        shear=np.ones(cells.shape),
+        bulk=np.ones(shape.cells),
+    )
+
+
+def _lines(values: Mapping[str, float], kind: str, n: int, points: int) -> np.ndarray:
+    heights = values[f"{kind}.start"], values[f"{kind}.end"]
+    radii = values[f"{kind}.radius_start"], values[f"{kind}.radius_end"]
+    return np.stack([straight(azimuth, heights, radii, points) for azimuth in each(values, f"{kind}.azimuth", n)])
+
+
+def _on_skin(cone: Cone, azimuth: np.ndarray, height: np.ndarray) -> np.ndarray:
+    radius = cone.radius(height)
+    return np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
+
+
+def _picture(cone: Cone, paths: np.ndarray, cord_paths: np.ndarray, seen: np.ndarray) -> mujoco.MjSpec:
+    """The finger at rest: its skin as discs, its tendons and cords as lines, its markers as spots."""
+    spec = mujoco.MjSpec()
+    world = spec.worldbody
+    thick = 0.5 * cone.length / DISCS
+    for z in (np.arange(DISCS) + 0.5) * cone.length / DISCS:
+        world.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[float(cone.radius(z)), thick, 0], pos=[0, 0, z], rgba=SILICONE,
+            contype=0, conaffinity=0,
+        )  # fmt: skip
+    for kind, lines, colour in (("tendon", paths, CORD), ("sensor", cord_paths, SENSOR)):
+        for i, points in enumerate(lines, 1):
+            line = spec.add_tendon(name=f"{kind}_{i}", rgba=colour, width=5e-4)
+            for p, point in enumerate(points):
+                world.add_site(name=f"{kind}_{i}_{p}", pos=point, size=[3e-4, 0, 0], rgba=colour)
+                line.wrap_site(f"{kind}_{i}_{p}")
+    for m, point in enumerate(seen, 1):
+        world.add_site(name=f"marker_{m}", pos=point, size=[1.2e-3, 0, 0], rgba=SPOT)
+    world.add_site(name="tip", pos=[0, 0, cone.length], size=[1e-3, 0, 0])
+    return spec
+
+
+def statics(body: SoftBody) -> SoftStatics:
+    return SoftStatics(body)
+
+
+dynamics = None  # what is logged of it is quasi-static

@@ -1,0 +1,113 @@
+"""The numbers a silicone finger is described by, in the order of its signal: body, silicone, tendons, sensors, mounting, markers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from twin.robots.schema import Row, Schema, Structure
+
+TURN = 2.0 * math.pi
+Count = Annotated[int, Field(ge=1, le=24)]
+Points = Annotated[int, Field(ge=3, le=200)]
+
+
+class Soft(Structure):
+    """[structure] of family "soft"."""
+
+    cells: Annotated[int, Field(ge=2, le=12)] = Field(5, description="layers of 27-node cells from clamp to tip; 5 bend to 0.2 mm")
+    tendons: Count = Field(description="how many tendons")
+    tendon_points: Points = Field(21, description="points of the body that each tendon runs straight between, equally spaced")
+    sensors: Count = Field(description="how many strain-sensing cords")
+    sensor_points: Points = Field(29, description="points of the body that each cord runs straight between")
+    markers: Annotated[int, Field(ge=1, le=200)] = Field(description="how many markers on the skin")
+
+    def counts(self) -> dict[str, int]:
+        return {"tendon": self.tendons, "sensor": self.sensors, "marker": self.markers}
+
+
+def objections(structure: Soft, values: Mapping[str, float]) -> list[str]:
+    """What is wrong between numbers that are each in order."""
+    out = []
+    length, clamp = values["body.length"], values["body.clamp"]
+    if not clamp < length:
+        out.append(f"body.clamp is {1e3 * clamp:g} mm and body.length {1e3 * length:g} mm; some of the body must be free")
+    base, tip = values["body.radius_base"], values["body.radius_tip"]
+    for kind in ("tendons", "sensors"):
+        start, end = values[f"{kind}.start"], values[f"{kind}.end"]
+        if not start < end <= length:
+            out.append(f"{kind} run from {1e3 * start:g} to {1e3 * end:g} mm; a rising way within the body ({1e3 * length:g} mm) is needed")
+        for height, name in ((start, "radius_start"), (end, "radius_end")):
+            skin = base + (tip - base) * height / length
+            if values[f"{kind}.{name}"] > skin:
+                out.append(f"{kind}.{name} is {1e3 * values[f'{kind}.{name}']:g} mm; the skin is at {1e3 * skin:.3g} mm there")
+    if not clamp < values["tendons.anchor"] < length:
+        out.append(f"tendons.anchor is {1e3 * values['tendons.anchor']:g} mm; a height between clamp and tip is needed")
+    return out
+
+
+def logged(structure: Soft) -> list[tuple[str, str, str, float]]:
+    """Displacements in; resistances and markers out."""
+    return [
+        *((f"tendon_{i}_displacement", "input", "mm", 0.01) for i in range(1, structure.tendons + 1)),
+        *((f"sensor_{i}_resistance", "output", "ohm", 0.3) for i in range(1, structure.sensors + 1)),
+        *((f"marker_{m}_{a}", "output", "mm", 0.2) for m in range(1, structure.markers + 1) for a in "xyz"),
+    ]
+
+
+ROWS = (
+    Row("body.length", "m", "mm", "length of the cone, from its base face to the tip", 5e-3, 1.0),
+    Row("body.radius_base", "m", "mm", "radius at the base face", 1e-3, 0.2),
+    Row("body.radius_tip", "m", "mm", "radius at the tip", 1e-3, 0.2),
+    Row("body.clamp", "m", "mm", "height up to which all material is held rigidly", 1e-4, 0.9),
+    Row("silicone.youngs_modulus", "Pa", "kPa", "Young's modulus E at small strain (neo-Hookean)", 1e3, 1e8),
+    Row("silicone.poisson_ratio", "1", "1", "Poisson's ratio nu; silicone hardly changes its volume", 0.4, 0.498),
+    Row("silicone.density", "kg/m^3", "kg/m^3", "density", 500.0, 3000.0),
+    Row("tendons.azimuth", "rad", "deg", "angle of each tendon about the axis, from x towards y", -TURN, TURN, ("tendon",), for_all=False),
+    Row("tendons.start", "m", "mm", "height of the tendons' first point", 0.0, 1.0),
+    Row("tendons.end", "m", "mm", "height of their last", 1e-3, 1.0),
+    Row("tendons.radius_start", "m", "mm", "distance from the axis of the first point", 1e-4, 0.2),
+    Row("tendons.radius_end", "m", "mm", "distance from the axis of the last", 1e-4, 0.2),
+    Row("tendons.anchor", "m", "mm", "height from which to the tip a tendon's end pulls at the silicone", 1e-3, 1.0),
+    Row("sensors.azimuth", "rad", "deg", "angle of each cord about the axis", -TURN, TURN, ("sensor",), for_all=False),
+    Row("sensors.start", "m", "mm", "height of the cords' first point", 0.0, 1.0),
+    Row("sensors.end", "m", "mm", "height of their last", 1e-3, 1.0),
+    Row("sensors.radius_start", "m", "mm", "distance from the axis of the first point", 1e-4, 0.2),
+    Row("sensors.radius_end", "m", "mm", "distance from the axis of the last", 1e-4, 0.2),
+    Row("sensors.resistance", "ohm", "ohm", "R0 of each cord, at no strain", 1e-2, 1e8, ("sensor",)),
+    Row("sensors.stretch", "1", "1", "kappa of each cord when stretched: R = R0 (1 + kappa strain)^2", 0.05, 20.0, ("sensor",)),
+    Row("sensors.compression", "1", "1", "kappa of each cord when compressed", 0.05, 20.0, ("sensor",)),
+    Row(
+        "mounting.angle",
+        "rad",
+        "deg",
+        "by which the finger is turned about z against the base frame, counter-clockwise seen from +z",
+        -TURN,
+        TURN,
+        default=0.0,
+    ),
+    Row("markers.azimuth", "rad", "deg", "angle of each marker on the skin about the axis", -TURN, TURN, ("marker",), for_all=False),
+    Row("markers.height", "m", "mm", "height of each marker on the skin", 0.0, 1.0, ("marker",), for_all=False),
+)
+
+PICTURE = """\
+     clamp |  tendon (azimuth 0)  x x x x x x x x x x   anchor
+     ======|---------------------------------------------.
+           |  sensor cord   - - - - - - - - -             |
+     o-----|----------------------------------------------|---> z
+           |                                              |
+     ======|----------------------------------------------'
+     x up; azimuth 90 deg is y, out of the page. Origin in the centre of the base face.
+"""
+
+SCHEMA = Schema(
+    structure=Soft,
+    rows=ROWS,
+    accuracy=Row("accuracy", "m", "mm", "what the description is believed to be good for: no smaller effect is claimed", 1e-9, 0.1),
+    objections=objections,
+    logged=logged,
+    picture=PICTURE,
+)

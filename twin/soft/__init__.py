@@ -1,0 +1,13 @@
+"""Static equilibria of silicone bodies pulled by tendons.
+
+lattice.py   cells, quadrature, weights of material points     wall.py     a wall that the skin presses
+silicone.py  forces of the silicone and their tangent           creep.py    stress that relaxes
+cables.py    tendons, with friction                             finger.py   one equilibrium by Newton's method
+body.py      the finger as effects may edit it                  statics.py  a trial, sample by sample
+"""
+
+from twin.soft.body import SoftBody, skin_points, straight
+from twin.soft.lattice import Cone, lattice
+from twin.soft.statics import SoftPath, SoftStatics
+
+__all__ = ["Cone", "SoftBody", "SoftPath", "SoftStatics", "lattice", "skin_points", "straight"]

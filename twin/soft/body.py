@@ -1,0 +1,79 @@
+"""A finger of silicone: a cone with tendons and strain-sensing cords through it, clamped at its base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.body import Body
+from twin.sensors import Cords
+from twin.soft.lattice import Cone, Lattice, lattice
+
+RINGS, AROUND = 19, 24  # points of the skin that a wall may press
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoftBody(Body):
+    """The finger as its effects may edit it: arrays are changed in place before it is solved.
+
+    `paths` (t, p, 3) and `cord_paths` (s, p, 3) m: points that tendons and cords run straight between, at rest; `seen` (m, 3) m:
+    markers at rest. All in the finger's own frame, which is turned about z by `turn` (rad) against the base frame. A tendon's last
+    point pulls at the silicone from `anchor` (m) to the tip. `shear` (c, q) and `bulk` (c,) are the moduli over those of the
+    described silicone, of E `youngs_modulus` (Pa), nu `poisson` and `density` (kg/m^3).
+    """
+
+    cone: Cone
+    cells: int
+    paths: np.ndarray
+    anchor: float
+    cord_paths: np.ndarray
+    cords: Cords
+    seen: np.ndarray
+    turn: float
+    youngs_modulus: float
+    poisson: float
+    density: float
+    shear: np.ndarray
+    bulk: np.ndarray
+
+    @property
+    def lattice(self) -> Lattice:
+        return lattice(self.cone, self.cells)
+
+    def bend_unequally(self, along: float, across: float) -> None:
+        """Bending stiffnesses EI (1 + e) and EI (1 - e) about the principal axes, e cos 2 alpha = `along` and e sin 2 alpha =
+        `across`: a modulus that goes as 1 + 2 e cos 2 (azimuth - alpha), since cos^2 weighs half of it."""
+        azimuth = self._azimuth()
+        self.shear[:] *= np.maximum(1.0 - 2.0 * (along * np.cos(2 * azimuth) + across * np.sin(2 * azimuth)), 0.05)
+
+    def grade(self, slope: float) -> None:
+        """A modulus that goes as 1 + slope (s - 1/2), s the height from clamp to tip."""
+        z = (self.lattice.quadrature[0][..., 2] - self.cone.clamp) / (self.cone.length - self.cone.clamp)
+        self.shear[:] *= np.maximum(1.0 + slope * (z - 0.5), 0.05)
+        self.bulk[:] *= np.maximum(1.0 + slope * (z.mean(axis=1) - 0.5), 0.05)
+
+    def reroute(self, tendon: int, angle: float, further: float) -> None:
+        """Move a tendon (from 0) about the axis by `angle` (rad) and away from it by `further` (m)."""
+        x, y = self.paths[tendon, :, 0], self.paths[tendon, :, 1]
+        radius, azimuth = np.hypot(x, y) + further, np.arctan2(y, x) + angle
+        self.paths[tendon, :, 0], self.paths[tendon, :, 1] = radius * np.cos(azimuth), radius * np.sin(azimuth)
+
+    def _azimuth(self) -> np.ndarray:
+        points = self.lattice.quadrature[0]
+        return np.arctan2(points[..., 1], points[..., 0])
+
+
+def straight(azimuth: float, heights: tuple[float, float], radii: tuple[float, float], n: int) -> np.ndarray:
+    """(n, 3) equally spaced points of a line at one azimuth (rad), from one height and radius (m) to another."""
+    radius = np.linspace(*radii, n)
+    return np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.linspace(*heights, n)])
+
+
+def skin_points(cone: Cone, rings: int = RINGS, around: int = AROUND) -> np.ndarray:
+    """(rings * around, 3) m on the free part of the cone's surface, ring by ring, the last at the tip."""
+    z = np.linspace(cone.clamp, cone.length, rings + 1)[1:]
+    t = 2.0 * np.pi * np.arange(around) / around
+    Z, T = (v.ravel() for v in np.meshgrid(z, t, indexing="ij"))
+    R = cone.radius(Z)
+    return np.stack([R * np.cos(T), R * np.sin(T), Z], axis=1)
