@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from twin.soft.cables import Cables, Pulled, Slip, follow, geometric, sticking, unpulled
+from twin.soft.neighbour import Room
 from twin.soft.silicone import LEAST, Cells, Tangent, forces, stiffness
 from twin.soft.wall import Skin, press
 
@@ -82,6 +83,10 @@ class Solid:
         follow(self.cables, u, Slip(np.zeros_like(self.pulled.slip.state), np.full_like(self.pulled.slip.beyond, 1e9)), 0.0, 1.0, self.pulled)
         shape.slip = Slip(np.zeros_like(self.pulled.slip.state), self.pulled.slip.beyond.copy())
         return shape
+
+    def room(self) -> Room:
+        """The same room, as compiled code takes it."""
+        return Room(self._f, self._p, self._whole, np.empty((1, 1)), self.pulled)
 
     def settle(self, shape: Shape, pull: Pull, burden: Burden, *, close: float = CLOSE, once: bool = False) -> bool:
         """Bring `shape` to equilibrium; with `once` by the one step its factors give. False, and `shape` as it was, where it is lost."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.linalg import lapack
 from threadpoolctl import ThreadpoolController
 
 from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
@@ -15,8 +16,9 @@ from twin.sensors import resistance
 from twin.soft.body import AROUND, SoftBody, skin_points
 from twin.soft.cables import Cables
 from twin.soft.creep import relax_for
-from twin.soft.finger import CLOSE, Burden, Pull, Shape, Solid
+from twin.soft.finger import CLOSE, Burden, Pull, Solid
 from twin.soft.lattice import ACROSS
+from twin.soft.neighbour import Kept, Parts, Way, along
 from twin.soft.silicone import Cells
 from twin.soft.wall import Skin
 
@@ -25,10 +27,8 @@ SMALLEST = 1e-3  # of a step between two samples
 
 @dataclass(frozen=True, kw_only=True)
 class SoftPath(Path):
-    """`q` (n, nq) are the displacements of the free nodes, m; `LU` the factors of their tangents with their `pivots` (n, nq).
-    `others`: "strain" (n, s) of the cords, "sensor" (n, s) ohm and "sensor_rest", at no strain."""
-
-    pivots: np.ndarray = field(default_factory=lambda: np.empty((0, 0), np.int32), repr=False)
+    """`q` (n, nq) are the displacements of the free nodes, m; `LU` (n, nq, nq) the inverses of their tangents, m/N, in single
+    precision. `others`: "strain" (n, s) of the cords, "sensor" (n, s) ohm and "sensor_rest", at no strain."""
 
 
 class SoftStatics:
@@ -75,22 +75,12 @@ class SoftStatics:
         """
         if problem.route.stiffening > 0.0 or problem.heating is not None:
             raise SolveError("tendons that stiffen and SMA springs are not solved for a silicone body; remove that effect or drive")
-        n, nt = problem.command.shape
         trial = _Trial(self, problem)
-        nf = self.solid.cables.weights.shape[2]
-        u, tension, path = np.empty((n, nf, 3)), np.empty((n, nt)), np.empty((n, nt))
-        status = np.full(n, NOT_FOUND)
-        LU = np.empty((n if problem.keep else 0, 3 * nf, 3 * nf), np.float32)
-        pivots = np.empty((len(LU), 3 * nf), np.int32)
-        for i in range(n):
-            status[i] = DIRECT if trial.go(i) else NOT_FOUND
-            u[i], tension[i] = trial.shape.u, trial.shape.tension * trial.scale[i]
-            path[i] = self.solid.pulled.length
-            if problem.keep and trial.shape.LU is not None:
-                LU[i], pivots[i] = trial.shape.LU
+        trial.run()
+        u, length = trial.u.reshape(len(trial.u), -1, 3), trial.length
         return SoftPath(
-            tension=tension, path=path - trial.hanging + self.straight_path, markers=self._markers(u), status=status,
-            q=u.reshape(n, -1), others=self._sensed(u), LU=LU, pivots=pivots,
+            tension=trial.tension, path=length - trial.hanging + self.straight_path, markers=self._markers(u), status=trial.status,
+            q=trial.u, others=self._sensed(u), LU=trial.inverse,
         )  # fmt: skip
 
     def _markers(self, u: np.ndarray) -> np.ndarray:
@@ -142,25 +132,58 @@ class _Trial:
         self.found = self.solid.settle(self.shape, slack, self._burden(0))
         if self.found:
             self.hanging = self.solid.pulled.length.copy()
-            self.shape.slip = self.shape.slip._replace(state=np.zeros_like(self.shape.slip.state))
-        self.at = np.where(self.held, 0.0, 0.0 * problem.command[0])
+            self.shape.slip.state[:] = 0.0
+        self.at = np.zeros(nt)
+        nq = self.shape.u.size
+        self.u, self.tension, self.length = np.empty((n, nq)), np.empty((n, nt)), np.empty((n, nt))
+        self.inverse = np.empty((n if problem.keep else 0, nq, nq), np.float32)
+        self.status = np.full(n, NOT_FOUND)
 
-    def go(self, i: int) -> bool:
-        """To sample i. False, and the shape as it was, where no equilibrium was found."""
-        problem, near = self.problem, self.problem.near
-        if not self.found:
-            return False
-        if near is not None and len(near.LU) == len(problem.command) and isinstance(near, SoftPath):
-            start = self.shape.copy()
-            start.u, start.tension = near.q[i].reshape(-1, 3).copy(), near.tension[i] / self.scale[i]
-            start.LU = (near.LU[i].astype(float), near.pivots[i])
-            if self.solid.settle(start, self._pull(i, problem.command[i]), self._burden(i), close=self.close, once=problem.once):
-                self._arrive(i, start)
-                return True
-        return self._march(i)
+    def run(self) -> None:
+        """All samples in order."""
+        i, n = 0, len(self.u)
+        while i < n:
+            if self.found and self._neighboured():
+                i = self._along(i)
+            if i < n:
+                self._put(i, self.found and self._march(i))
+                i += 1
+
+    def _neighboured(self) -> bool:
+        near = self.problem.near
+        return near is not None and len(near.LU) == len(self.u) and not self.problem.keep
+
+    def _along(self, start: int) -> int:
+        """By the neighbour's tangents, as far as that goes."""
+        near, shape, route, n = self.problem.near, self.shape, self.problem.route, len(self.u)
+        assert near is not None
+        command = self.problem.command
+        way = Way(
+            np.maximum(command, 0.0), self.hanging - command, self.held, np.outer(self.scale, np.full(len(self.held), route.stretch)),
+            self.force, self.wall, self.scale, float(route.mu), float(route.presliding), np.array(self.problem.time, float),
+            self.amplitude, self.time, self.close, self.problem.once,
+        )  # fmt: skip
+        parts = Parts(self.solid.cells, self.solid.cables, self.solid.skin, self.solid.clamped)
+        end = along(
+            parts, way, Kept(near.q, near.tension, near.LU), start, shape.slip, self.taken,
+            (self.u, self.tension, self.length), self.solid.room(),
+        )  # fmt: skip
+        self.status[start:end] = DIRECT
+        if end > start:
+            shape.u, shape.tension = self.u[end - 1].reshape(-1, 3).copy(), self.tension[end - 1] / self.scale[end - 1]
+            shape.LU, self.at = None, command[end - 1]
+        return min(end, n)
+
+    def _put(self, i: int, found: bool) -> None:
+        self.status[i] = DIRECT if found else NOT_FOUND
+        self.u[i], self.tension[i] = self.shape.u.ravel(), self.shape.tension * self.scale[i]
+        self.length[i] = self.solid.pulled.length
+        if self.problem.keep and self.shape.LU is not None:
+            self.inverse[i] = lapack.dgetri(*self.shape.LU)[0]
 
     def _march(self, i: int) -> bool:
-        """From the last command to that of sample i, in ever smaller parts where Newton's method is lost."""
+        """From the last command to that of sample i, in ever smaller parts where Newton's method is lost. False, and the shape as
+        it was, where no equilibrium was found."""
         start, goal, done, part = self.at, self.problem.command[i], 0.0, 1.0
         while done < 1.0:
             trial = self.shape.copy()
@@ -172,15 +195,12 @@ class _Trial:
             part, self.shape.LU = 0.5 * part, None
             if part < SMALLEST:
                 return False
-        self._arrive(i, self.shape)
-        return True
-
-    def _arrive(self, i: int, shape: Shape) -> None:
-        self.shape, self.at = shape, self.problem.command[i]
+        self.at = goal
         time = self.problem.time
         if self.amplitude.size and i + 1 < len(time):
-            whole = np.concatenate([np.zeros((self.solid.clamped, 3)), shape.u])
+            whole = np.concatenate([np.zeros((self.solid.clamped, 3)), self.shape.u])
             relax_for(whole, self.solid.cells, self.amplitude, self.time, time[i + 1] - time[i], self.taken)
+        return True
 
     def _pull(self, i: int, command: np.ndarray) -> Pull:
         route, scale = self.problem.route, self.scale[i]

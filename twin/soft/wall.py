@@ -24,7 +24,7 @@ class Skin(NamedTuple):
 def press(skin, u, wall, r, K, tangent):
     """Take the wall's push (5,): normal, offset (m), stiffness (N/m), from the residual r (n,) or, with `tangent`, add its tangent
     to K (n, n)."""
-    x = skin.rest + np.dot(np.ascontiguousarray(skin.weights), u)
+    x = skin.rest + np.dot(skin.weights, u)
     for m in range(len(x)):
         depth = wall[3] - (x[m, 0] * wall[0] + x[m, 1] * wall[1] + x[m, 2] * wall[2])
         if depth <= 0.0:
