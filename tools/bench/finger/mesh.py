@@ -1,0 +1,113 @@
+"""The finger's cone as body-fitted 27-node hexahedra: a butterfly (O-grid) section swept from the clamp to the tip.
+
+Section: a square core of `core` x `core` cells and 4 `core` cells around it, each arc of 90/core degrees, centred on the
+tendons' azimuths. Nodes go plane by plane from base to tip, so that a layer's unknowns lie close together. Lengths in mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LENGTH, CLAMP, ANCHOR = 100.0, 10.0, 90.0  # mm: the tip, the end of the held part, the start of the tendons' anchor
+CORE = 0.5  # half the core square's diagonal, of the radius
+EDGES = np.array([-1.0, 0.0, 1.0])
+
+
+def radius(z: np.ndarray | float) -> np.ndarray:
+    """Radius (mm) of the cone at height z (mm)."""
+    return 15.0 - 0.0625 * np.asarray(z, float)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    nodes: np.ndarray  # (n, 3) mm
+    cells: np.ndarray  # (m, 27) node numbers, the last local coordinate fastest
+    plane: int  # nodes a plane
+    layers: int
+    core: int
+
+    @property
+    def held(self) -> int:
+        """Nodes on the clamped plane: the first of all."""
+        return self.plane
+
+
+def shape(local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triquadratic shape functions (..., 27) and their derivatives (..., 27, 3) at local points (..., 3)."""
+    x = np.asarray(local)
+    value = np.stack([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2], axis=-1)
+    slope = np.stack([x - 0.5, -2 * x, x + 0.5], axis=-1)
+    parts = [value if d != n else slope for n in range(4) for d in range(3)]
+    products = [
+        np.einsum("...i,...j,...k->...ijk", *(parts[3 * n + d][..., d, :] for d in range(3))).reshape(*x.shape[:-1], 27)
+        for n in range(4)
+    ]
+    return products[3], np.stack(products[:3], axis=-1)
+
+
+def section(core: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (p, 2) of the unit section and cells (c, 9). Arc nodes are moved out so that every chord curve's second moment is the disc's."""
+    grid = np.linspace(-1, 1, 2 * core + 1)
+    side = CORE / np.sqrt(2)
+    points = [(side * x, side * y) for x in grid for y in grid]
+    n = len(grid)
+    cells = [[(2 * i + a) * n + 2 * j + b for a in range(3) for b in range(3)] for i in range(core) for j in range(core)]
+    # Around the core, counter-clockwise from its corner at -45 degrees.
+    last = n - 1
+    rim = [last * n + j for j in range(last)] + [i * n + last for i in range(last, 0, -1)]
+    rim += [j for j in range(last, 0, -1)] + [i * n for i in range(last)]
+    arcs = 8 * core
+    ring = [rim]
+    angle = 2 * np.pi * (np.arange(arcs) - core) / arcs
+    outside = _bulge(np.pi / (4 * core)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for share in (0.5, 1.0):
+        ring.append(list(range(len(points), len(points) + arcs)))
+        inner = np.array([points[r] for r in rim])
+        points.extend(map(tuple, inner + share * (outside - inner)))
+    cells += [[ring[a][(2 * s + b) % arcs] for a in range(3) for b in range(3)] for s in range(4 * core)]
+    return np.array(points), np.array(cells)
+
+
+def _bulge(half: float) -> float:
+    """Radius at which three nodes of an arc of half-angle `half` bound the unit disc's second moment of area, parabolas in between."""
+    s, w = np.polynomial.legendre.leggauss(8)
+    x = np.cos(half) + (1 - np.cos(half)) * (1 - s * s)
+    y = np.sin(half) * s
+    dx, dy = -2 * s * (1 - np.cos(half)), np.sin(half)
+    moment = np.sum(w * (x * dy - y * dx) * (x * x + y * y)) / 4  # polar, of the sector under the parabola
+    return float((half / 2 / moment) ** 0.25)  # of the unit sector: its angle / 4
+
+
+def cone(layers: int = 9, core: int = 1) -> Mesh:
+    """Mesh of z = 10..100 mm; `layers` a multiple of 9, so that the anchor begins at a cell's border."""
+    flat, quads = section(core)
+    heights = np.linspace(CLAMP, LENGTH, 2 * layers + 1)
+    plane = len(flat)
+    nodes = np.concatenate([np.column_stack([radius(z) * flat, np.full(plane, z)]) for z in heights])
+    cells = [[q + (2 * k + c) * plane for q in quad for c in range(3)] for k in range(layers) for quad in quads]
+    return Mesh(nodes, np.array(cells), plane, layers, core)
+
+
+def locate(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cell and shape-function values (k, 27) of material points (k, 3) mm with z >= 10; the nearest cell serves just outside."""
+    per = 5 if mesh.core == 1 else mesh.core**2 + 4 * mesh.core
+    k = np.clip(((points[:, 2] - CLAMP) / (LENGTH - CLAMP) * mesh.layers).astype(int), 0, mesh.layers - 1)
+    owner, values, least = np.zeros(len(points), int), np.zeros((len(points), 27)), np.full(len(points), np.inf)
+    for c in range(per):
+        cell = k * per + c
+        corner = mesh.nodes[mesh.cells[cell]]
+        x = np.zeros_like(points)
+        for _ in range(12):  # Newton from the cell's centre; the map is nearly affine
+            n, d = shape(x)
+            gap = points - np.einsum("ka,kai->ki", n, corner)
+            x = np.clip(x + np.linalg.solve(np.einsum("kai,kaj->kij", corner, d), gap[..., None])[..., 0], -1.5, 1.5)
+        value = shape(x)[0]
+        met = np.abs(points - np.einsum("ka,kai->ki", value, corner)).max(axis=1) < 1e-9
+        out = np.where(met, np.abs(x).max(axis=1), np.inf)
+        better = out < least - 1e-9
+        owner[better], values[better], least[better] = cell[better], value[better], out[better]
+    if least.max() > 1.2:
+        raise ValueError(f"a point lies outside the finger: {points[least.argmax()]} mm")
+    return owner, values
