@@ -124,10 +124,14 @@ def assemble(
             A[..., i, :, i, :] += overstress
     A *= w[..., None, None, None, None]
     cells, q = J.shape
-    left = np.matmul(body.slope, A.transpose(0, 1, 3, 2, 4, 5).reshape(cells, q, 3, 27))  # m q a (i k L)
-    left = left.reshape(cells, q, 27, 3, 3, 3).transpose(0, 2, 3, 4, 1, 5).reshape(cells, 243, 3 * q)
-    right = body.slope.transpose(0, 1, 3, 2).reshape(cells, 3 * q, 27)
-    K = np.matmul(left, right).reshape(cells, 27, 3, 3, 27).transpose(0, 1, 2, 4, 3).reshape(cells, 81, 81)
+    left = np.ascontiguousarray(body.slope.transpose(0, 2, 1, 3)).reshape(cells, 27, 3 * q)
+    right = np.ascontiguousarray(np.swapaxes(body.slope, 2, 3))
+    K = np.empty((cells, 27, 3, 27, 3))
+    for i in range(3):
+        for k in range(i + 1):
+            K[:, :, i, :, k] = np.matmul(left, np.matmul(A[:, :, i, :, k], right).reshape(cells, 3 * q, 27))
+            K[:, :, k, :, i] = np.swapaxes(K[:, :, i, :, k], 1, 2)
+    K = K.reshape(cells, 81, 81)
 
     cofactor = np.matmul(body.slope, np.swapaxes(col(J * w) * T, -1, -2)).reshape(cells, q, 81)
     G = np.matmul(np.swapaxes(cofactor, 1, 2), body.linear)  # m 81 4

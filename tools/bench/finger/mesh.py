@@ -7,10 +7,13 @@ tendons' azimuths. Nodes go plane by plane from base to tip, so that a layer's u
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 LENGTH, CLAMP, ANCHOR = 100.0, 10.0, 90.0  # mm: the tip, the end of the held part, the start of the tendons' anchor
+# Finer at the clamp, whose edge the strain is singular at; one border where the anchor begins.
+BORDERS = (10.0, 14.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 CORE = 0.5  # half the core square's diagonal, of the radius
 EDGES = np.array([-1.0, 0.0, 1.0])
 
@@ -25,8 +28,12 @@ class Mesh:
     nodes: np.ndarray  # (n, 3) mm
     cells: np.ndarray  # (m, 27) node numbers, the last local coordinate fastest
     plane: int  # nodes a plane
-    layers: int
+    borders: np.ndarray  # (layers + 1,) mm, heights at which layers of cells meet
     core: int
+
+    @property
+    def layers(self) -> int:
+        return len(self.borders) - 1
 
     @property
     def held(self) -> int:
@@ -80,20 +87,21 @@ def _bulge(half: float) -> float:
     return float((half / 2 / moment) ** 0.25)  # of the unit sector: its angle / 4
 
 
-def cone(layers: int = 9, core: int = 1) -> Mesh:
-    """Mesh of z = 10..100 mm; `layers` a multiple of 9, so that the anchor begins at a cell's border."""
+def cone(core: int = 1, finer: int = 1) -> Mesh:
+    """Mesh of z = 10..100 mm, every layer of BORDERS cut into `finer`."""
     flat, quads = section(core)
-    heights = np.linspace(CLAMP, LENGTH, 2 * layers + 1)
+    borders = np.append(np.concatenate([np.linspace(a, b, finer + 1)[:-1] for a, b in pairwise(BORDERS)]), LENGTH)
+    heights = np.append(np.column_stack([borders[:-1], (borders[:-1] + borders[1:]) / 2]).ravel(), LENGTH)
     plane = len(flat)
     nodes = np.concatenate([np.column_stack([radius(z) * flat, np.full(plane, z)]) for z in heights])
-    cells = [[q + (2 * k + c) * plane for q in quad for c in range(3)] for k in range(layers) for quad in quads]
-    return Mesh(nodes, np.array(cells), plane, layers, core)
+    cells = [[q + (2 * k + c) * plane for q in quad for c in range(3)] for k in range(len(borders) - 1) for quad in quads]
+    return Mesh(nodes, np.array(cells), plane, borders, core)
 
 
 def locate(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cell and shape-function values (k, 27) of material points (k, 3) mm with z >= 10; the nearest cell serves just outside."""
     per = 5 if mesh.core == 1 else mesh.core**2 + 4 * mesh.core
-    k = np.clip(((points[:, 2] - CLAMP) / (LENGTH - CLAMP) * mesh.layers).astype(int), 0, mesh.layers - 1)
+    k = np.clip(np.searchsorted(mesh.borders, points[:, 2], side="right") - 1, 0, mesh.layers - 1)
     owner, values, least = np.zeros(len(points), int), np.zeros((len(points), 27)), np.full(len(points), np.inf)
     for c in range(per):
         cell = k * per + c

@@ -73,9 +73,9 @@ class Finger:
     creep: tuple[float, float] | None = None  # share of the shear modulus that relaxes, its time (s)
 
     @classmethod
-    def of(cls, modulus: float = 0.125, poisson: float = 0.49, layers: int = 9, core: int = 1) -> Finger:
+    def of(cls, modulus: float = 0.125, poisson: float = 0.49, core: int = 1, finer: int = 1) -> Finger:
         """Homogeneous finger of Young's `modulus` (MPa)."""
-        body = Body.of(cone(layers, core), modulus, poisson)
+        body = Body.of(cone(core, finer), modulus, poisson)
         return cls(body, Cables.of(body), Cords.of(body), Skin.of(body.mesh))
 
     def __post_init__(self) -> None:
