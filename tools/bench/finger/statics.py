@@ -1,6 +1,6 @@
 """Newton's method for the finger at rest: silicone, weight, cables that pull only, pads, given forces; mm, N, MPa, s.
 
-Driven by displacement, a tendon of base tension T and length L obeys T >= 0, L <= limit, T (L - limit) = 0 (semi-smooth Newton);
+Driven by displacement, a tendon of base tension T and length L obeys T >= 0, L <= limit, T (L - limit) = 0: every Newton step solves this for its linearised lengths;
 driven by tension, T is given. Steps that do not converge are halved.
 """
 
@@ -16,7 +16,6 @@ from tools.bench.finger.cables import Cables, Cords
 from tools.bench.finger.mesh import cone
 from tools.bench.finger.skin import Pad, Skin
 
-GRIP = 1.0  # N/mm, weighs length against tension where a cable goes taut or slack
 ITERATIONS = 25
 HALVINGS = 8
 FORCE, LENGTH = 2e-5, 1e-4  # N and mm: what is left of forces, and of steps and lengths; noise is 0.2 mm
@@ -152,32 +151,29 @@ class Finger:
             if element is None:
                 return None
             length, direction = self.cables.pieces(u)
-            over = length.sum(axis=1) - np.where(driven, load.limit, 0.0)
-            taut = driven & (tension + GRIP * over > 0)
-            pulls = taut | (~driven & (tension > 0))
+            over = np.where(driven, length.sum(axis=1) - np.where(driven, load.limit, 0.0), 0.0)
+            pulls = tension > 0
             psi = self.cables.contacts(state.length, state.contacts, length, pulls)
             shares = self.cables.shares(direction, psi)
-            gap, plain, K = self._gather(element, u, outside, np.where(pulls, tension, 0.0)[:, None] * shares, length, direction)
-            G = self._along(direction, np.ones_like(length))[:, taut]
-            slack = driven & ~taut
-            off = max(np.abs(over[taut]).max(initial=0.0), np.abs(tension[slack]).max(initial=0.0))
+            gap, plain, K = self._gather(element, u, outside, tension[:, None] * shares, length, direction)
+            off = max(over.max(initial=0.0), np.abs(over[driven & pulls]).max(initial=0.0))
             if iteration and step < 50 * LENGTH and np.abs(plain).max() < FORCE and off < LENGTH and _quiet(element, self.body):
-                return self._kept(State(u, pressure, np.where(pulls, tension, 0.0), load, length, psi), share, left)
-            solved = _solve(K, np.column_stack([-gap, self._along(direction, shares)[:, taut]]))
+                return self._kept(State(u, pressure, tension, load, length, psi), share, left)
+            solved = _solve(K, np.column_stack([gap, self._along(direction, shares)]))
             if solved is None:
                 return None
-            du = solved[:, 0]
-            change = np.where(slack, -tension, 0.0)
-            if taut.any():
-                change[taut] = np.linalg.solve(G.T @ solved[:, 1:], over[taut] + G.T @ du)
-                du = du - solved[:, 1:] @ change[taut]
+            answer = self._along(direction, np.ones_like(length)).T @ solved
+            give = answer[:, 1:][np.ix_(driven, driven)]
+            change = np.zeros(4)
+            change[driven] = _pulling(give, (over - answer[:, 0])[driven] + give @ tension[driven]) - tension[driven]
+            du = -solved[:, 0] - solved[:, 1:] @ change
             step = np.abs(du).max()
             if not np.isfinite(step) or step > 60.0:
                 return None
             part = min(1.0, 8.0 / max(step, 1e-12))
             full = np.concatenate([np.zeros(3 * self.body.mesh.held), du])
             pressure = pressure + part * element.pressure_step(full[self._dof + 3 * self.body.mesh.held])
-            u, tension = u + part * full.reshape(-1, 3), tension + part * change
+            u, tension = u + part * full.reshape(-1, 3), np.maximum(tension + part * change, 0.0)
         return None
 
     def _gather(
@@ -229,6 +225,20 @@ class Finger:
         stress = self.body.isochoric(self.body.gradient(state.u))
         own = (share - 1.0 + self.creep[0]) * stress
         return replace(state, stress=stress, overstress=own if left is None else own + left)
+
+
+def _pulling(give: np.ndarray, over: np.ndarray) -> np.ndarray:
+    """Tensions T >= 0 with over - give T <= 0 and T (over - give T) = 0: which of the few cables pull, by trying all sets."""
+    count = len(over)
+    best, least = np.zeros(count), np.inf
+    for chosen in range(2**count):
+        on = np.array([chosen >> n & 1 for n in range(count)], bool)
+        T = np.zeros(count)
+        T[on] = np.linalg.solve(give[np.ix_(on, on)], over[on])
+        wrong = max((over - give @ T).max(initial=0.0), (-T).max(initial=0.0))
+        if wrong < least:
+            best, least = np.maximum(T, 0.0), wrong
+    return best
 
 
 def _quiet(element: Element, body: Body) -> bool:
