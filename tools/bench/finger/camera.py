@@ -15,6 +15,7 @@ from tools.bench.finger.cables import interpolation
 from tools.bench.finger.mesh import LENGTH, radius
 
 LOOKS = np.array([-np.sqrt(0.5), -np.sqrt(0.5), 0.0])
+GRAZING = 0.01  # cosine below which a surface is not seen: the tip's face of the hanging finger
 STEP = 0.05  # mm, the difference by which normals are taken
 
 
@@ -48,14 +49,15 @@ class Points:
         """Positions (k, 3) mm in the base frame and whether the camera sees them (k,)."""
         moved = (self.weights @ u).reshape(3, -1, 3)
         first, second = self.step + moved[1:] - moved[0]
-        return (self.start + moved[0]) @ turn.T, np.cross(first, second) @ turn.T @ LOOKS < 0
+        facing = -np.cross(first, second) / STEP**2 @ turn.T @ LOOKS
+        return (self.start + moved[0]) @ turn.T, facing > GRAZING
 
 
 def scatter(rng: np.random.Generator, body: Body, count: int = 4000) -> list[Points]:
     """Points of the whole skin, evenly by area: the mantle and the tip's face."""
     slant = np.sqrt(1 + 0.0625**2)
     mantle, face = np.pi * (15 + 8.75) * 100 * slant, np.pi * 8.75**2
-    on_tip = int(round(count * face / (face + mantle)))
+    on_tip = round(count * face / (face + mantle))
     # Area between base and z grows with r(z)^2.
     z = (15.0 - np.sqrt(15.0**2 - rng.uniform(size=count - on_tip) * (15.0**2 - 8.75**2))) / 0.0625
     return [

@@ -91,5 +91,3 @@ def _write_truth(path: Path, seed: int, finger: Finger, built: Built, effects: S
         "newton_failures": sum(log.failures for log in logs),
     }
     path.write_text(json.dumps(truth, indent=1) + "\n")
-
-

@@ -23,8 +23,9 @@ class Hand:
     @classmethod
     def draw(cls, rng: np.random.Generator, skin: Skin, duration: float, strength: float = 1.0) -> Hand:
         """Pushes of 2.5 to 6 s one after another and overlapping, over in the last half second."""
-        begin = np.arange(REST_SHORT + 1.0, duration - 3.0, 2.2) + rng.uniform(-0.4, 0.4, len(np.arange(REST_SHORT + 1.0, duration - 3.0, 2.2)))
+        begin = np.arange(REST_SHORT + 1.0, duration - 3.0, 2.2)
         count = len(begin)
+        begin = begin + rng.uniform(-0.4, 0.4, count)
         end = np.minimum(begin + rng.uniform(2.5, 6.0, count), duration - 0.5)
         height, azimuth = rng.uniform(45.0, 98.0, count), rng.uniform(0, 2 * np.pi, count)
         centre = np.column_stack([radius(height) * np.cos(azimuth), radius(height) * np.sin(azimuth), height])
@@ -38,7 +39,7 @@ class Hand:
 
     def at(self, time: float, skin: Skin, count: int) -> np.ndarray | None:
         """Nodal forces (count, 3) N; None where the hand is off."""
-        share = np.array([float(bump(np.array(time), b, e) * ease(np.array(time), b, b + 0.5)) for b, e in zip(self.begin, self.end, strict=True)])
+        share = bump(time, self.begin, self.end) * ease(time, self.begin, self.begin + 0.5)
         if not share.any():
             return None
         return skin.load(np.einsum("k,ks,ki->si", share, self.traction, self.peak), count)

@@ -15,7 +15,7 @@ LENGTH, CLAMP, ANCHOR = 100.0, 10.0, 90.0  # mm: the tip, the end of the held pa
 # Finer at the clamp, whose edge the strain is singular at; one border where the anchor begins.
 BORDERS = (10.0, 14.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 CORE = 0.5  # half the core square's diagonal, of the radius
-EDGES = np.array([-1.0, 0.0, 1.0])
+MARGIN = 0.3  # mm that a parabola of the section may lie inside the cone
 
 
 def radius(z: np.ndarray | float) -> np.ndarray:
@@ -55,7 +55,7 @@ def shape(local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def section(core: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (p, 2) of the unit section and cells (c, 9). Arc nodes are moved out so that every chord curve's second moment is the disc's."""
+    """Nodes (p, 2) of the unit section and cells (c, 9). Arc nodes lie so far out that the section keeps the disc's stiffness."""
     grid = np.linspace(-1, 1, 2 * core + 1)
     side = CORE / np.sqrt(2)
     points = [(side * x, side * y) for x in grid for y in grid]
@@ -64,7 +64,7 @@ def section(core: int) -> tuple[np.ndarray, np.ndarray]:
     # Around the core, counter-clockwise from its corner at -45 degrees.
     last = n - 1
     rim = [last * n + j for j in range(last)] + [i * n + last for i in range(last, 0, -1)]
-    rim += [j for j in range(last, 0, -1)] + [i * n for i in range(last)]
+    rim += list(range(last, 0, -1)) + [i * n for i in range(last)]
     arcs = 8 * core
     ring = [rim]
     angle = 2 * np.pi * (np.arange(arcs) - core) / arcs
@@ -78,7 +78,7 @@ def section(core: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bulge(half: float) -> float:
-    """Radius at which three nodes of an arc of half-angle `half` bound the unit disc's second moment of area, parabolas in between."""
+    """Radius of the three nodes of an arc of half-angle `half`: the parabola through them bounds the arc's second moment."""
     s, w = np.polynomial.legendre.leggauss(8)
     x = np.cos(half) + (1 - np.cos(half)) * (1 - s * s)
     y = np.sin(half) * s
@@ -100,22 +100,31 @@ def cone(core: int = 1, finer: int = 1) -> Mesh:
 
 def locate(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cell and shape-function values (k, 27) of material points (k, 3) mm with z >= 10; the nearest cell serves just outside."""
-    per = 5 if mesh.core == 1 else mesh.core**2 + 4 * mesh.core
+    per = len(mesh.cells) // mesh.layers
     k = np.clip(np.searchsorted(mesh.borders, points[:, 2], side="right") - 1, 0, mesh.layers - 1)
     owner, values, least = np.zeros(len(points), int), np.zeros((len(points), 27)), np.full(len(points), np.inf)
     for c in range(per):
-        cell = k * per + c
-        corner = mesh.nodes[mesh.cells[cell]]
-        x = np.zeros_like(points)
-        for _ in range(12):  # Newton from the cell's centre; the map is nearly affine
-            n, d = shape(x)
-            gap = points - np.einsum("ka,kai->ki", n, corner)
-            x = np.clip(x + np.linalg.solve(np.einsum("kai,kaj->kij", corner, d), gap[..., None])[..., 0], -1.5, 1.5)
-        value = shape(x)[0]
-        met = np.abs(points - np.einsum("ka,kai->ki", value, corner)).max(axis=1) < 1e-9
-        out = np.where(met, np.abs(x).max(axis=1), np.inf)
-        better = out < least - 1e-9
-        owner[better], values[better], least[better] = cell[better], value[better], out[better]
+        corner = mesh.nodes[mesh.cells[k * per + c]]
+        near = np.flatnonzero(
+            ((points > corner.min(axis=1) - MARGIN) & (points < corner.max(axis=1) + MARGIN)).all(axis=1) & (least > 1.0)
+        )
+        value, out = _invert(corner[near], points[near])
+        better = out < least[near] - 1e-9
+        chosen = near[better]
+        owner[chosen], values[chosen], least[chosen] = (k * per + c)[chosen], value[better], out[better]
     if least.max() > 1.2:
         raise ValueError(f"a point lies outside the finger: {points[least.argmax()]} mm")
     return owner, values
+
+
+def _invert(corner: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape-function values (k, 27) at points (k, 3) mm of cells (k, 27, 3), and the largest local coordinate; inf where not found."""
+    x = np.zeros_like(points)
+    for _ in range(12):  # Newton from the cell's centre; the map is nearly affine
+        value, slope = shape(x)
+        gap = points - np.einsum("ka,kai->ki", value, corner)
+        met = np.abs(gap).max(axis=1, initial=0.0) < 1e-9
+        if met.all():
+            break
+        x = np.clip(x + np.linalg.solve(np.einsum("kai,kaj->kij", corner, slope), gap[..., None])[..., 0], -1.5, 1.5)
+    return value, np.where(met, np.abs(x).max(axis=1, initial=0.0), np.inf)

@@ -28,12 +28,15 @@ class Trial:
     heldout: bool = False
 
 
-def ease(t: np.ndarray, begin: float, end: float) -> np.ndarray:
+Times = np.ndarray | float
+
+
+def ease(t: Times, begin: Times, end: Times) -> np.ndarray:
     """From 0 to 1 between two times, a half cosine."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip((t - begin) / (end - begin), 0.0, 1.0))
 
 
-def bump(t: np.ndarray, begin: float, end: float) -> np.ndarray:
+def bump(t: Times, begin: Times, end: Times) -> np.ndarray:
     """0, 1 in the middle, 0: sine squared."""
     return np.sin(np.pi * np.clip((t - begin) / (end - begin), 0.0, 1.0)) ** 2
 
@@ -127,6 +130,4 @@ def shape_day(rng: np.random.Generator) -> list[Trial]:
         paid_out("test_2", 18.0),
         wander(rng, "test_3", 16.0, 10, REST_SHORT, rng.uniform(5.0, 7.0)),
     ]
-    return clocked(
-        trials, lambda t: {"frames": 0.5, "cloud": t.name.startswith("align"), "hand": t.hand or t.name == "test_3"}
-    )
+    return clocked(trials, lambda t: {"frames": 0.5, "cloud": t.name.startswith("align"), "hand": t.hand or t.name == "test_3"})

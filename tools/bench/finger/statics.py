@@ -1,7 +1,7 @@
 """Newton's method for the finger at rest: silicone, weight, cables that pull only, pads, given forces; mm, N, MPa, s.
 
-Driven by displacement, a tendon of base tension T and length L obeys T >= 0, L <= limit, T (L - limit) = 0: every Newton step solves this for its linearised lengths;
-driven by tension, T is given. Steps that do not converge are halved.
+Driven by displacement, a tendon of base tension T and length L obeys T >= 0, L <= limit, T (L - limit) = 0: every Newton
+step solves this for its linearised lengths. Driven by tension, T is given. Steps that do not converge are halved.
 """
 
 from __future__ import annotations
@@ -40,13 +40,16 @@ class Load:
 
     def between(self, other: Load, part: float) -> Load:
         """The load at `part` of the way to `other`."""
-        mixed = [None if a is None and b is None else (1 - part) * (0.0 if a is None else a) + part * (0.0 if b is None else b)
-                 for a, b in ((self.force, other.force),)]
-        both = np.isfinite(self.limit) & np.isfinite(other.limit)
-        limit = np.where(both, (1 - part) * np.where(both, self.limit, 0) + part * np.where(both, other.limit, 0), other.limit)
-        gravity = tuple((1 - part) * a + part * b for a, b in zip(self.gravity, other.gravity, strict=True))
-        return Load(limit, (1 - part) * self.tension + part * other.tension, gravity, mixed[0],
-                    (1 - part) * self.swelling + part * other.swelling)
+
+        def mix(a: np.ndarray | float | None, b: np.ndarray | float | None) -> np.ndarray | float:
+            return (1 - part) * (0.0 if a is None else a) + part * (0.0 if b is None else b)
+
+        driven = np.isfinite(self.limit) & np.isfinite(other.limit)
+        limit = other.limit.copy()
+        limit[driven] = mix(self.limit[driven], other.limit[driven])
+        gravity = tuple(map(mix, self.gravity, other.gravity))
+        force = None if self.force is None and other.force is None else mix(self.force, other.force)
+        return Load(limit, mix(self.tension, other.tension), gravity, force, mix(self.swelling, other.swelling))
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,7 @@ class Finger:
         u, pressure = guess.u.copy(), guess.pressure.copy()
         driven = np.isfinite(load.limit)
         tension = np.where(driven, guess.tension, load.tension)
-        outside = self._mass[:, None] * np.array(load.gravity) * 1.0
+        outside = self._mass[:, None] * np.array(load.gravity)
         if load.force is not None:
             outside = outside + load.force
         psi = self.cables.contacts(state.length, state.contacts, self.cables.pieces(u)[0], tension > 0)
@@ -210,7 +213,7 @@ class Finger:
                 block = np.einsum("a,b,ij->aibj", d[on], d[on], turn[k]).reshape(3 * len(on), -1)
                 self._add(places, entries, (3 * on[:, None] + np.arange(3)).reshape(1, -1) - 3 * held, block[None])
         K = np.bincount(np.concatenate(places), np.concatenate(entries), self._band * self._free).reshape(self._band, self._free)
-        rest = around.reshape(-1)[3 * held :] + (self._along(direction, pull)).sum(axis=1)
+        rest = around.reshape(-1)[3 * held :] + self._along(direction, pull).sum(axis=1)
         condensed, plain = (
             np.bincount(self._dof[self._dof >= 0], f[self._dof >= 0], self._free) + rest for f in (element.force, element.plain)
         )
@@ -226,7 +229,8 @@ class Finger:
         """Generalised force (free, 4) with which pieces of tension `pull` (4, 20) resist stretching."""
         held = self.body.mesh.held
         T = pull[..., None] * direction
-        return np.stack([(np.diff(w, axis=0).T @ t).reshape(-1)[3 * held :] for w, t in zip(self.cables.weights, T, strict=True)], axis=1)
+        forces = [np.diff(w, axis=0).T @ t for w, t in zip(self.cables.weights, T, strict=True)]
+        return np.stack([f.reshape(-1)[3 * held :] for f in forces], axis=1)
 
     def _kept(self, state: State, share: float, left: np.ndarray | None) -> State:
         if self.creep is None:

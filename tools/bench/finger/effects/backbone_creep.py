@@ -1,4 +1,7 @@
-"""Delayed strain of the silicone: a share of the shear modulus relaxes with one time; the recursion is in `tools/bench/finger/statics.py`."""
+"""Delayed strain of the silicone: a share of the shear modulus relaxes with one time (standard linear solid).
+
+The recursion is in `tools/bench/finger/statics.py`; its state lives on the day's clock and relaxes in the pauses.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,6 @@ import numpy as np
 from tools.bench.finger.effects.effect import Effect
 from tools.bench.finger.sensors import Built
 
-
 OUTSIDE = 0.2  # by which the larger or the smaller effective kappa lies outside its tolerance
 
 

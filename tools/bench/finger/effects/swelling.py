@@ -1,4 +1,7 @@
-"""Out of catalogue: the silicone takes up solvent and swells all day, alike everywhere; its volume goes with 1 + most (1 - exp(-t / time))."""
+"""Out of catalogue: the silicone takes up solvent and swells all day, alike everywhere.
+
+The unstressed volume goes with 1 + most (1 - exp(-t / time)).
+"""
 
 from __future__ import annotations
 
