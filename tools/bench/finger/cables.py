@@ -83,9 +83,26 @@ class Cables:
 
     def shares(self, direction: np.ndarray, psi: np.ndarray) -> np.ndarray:
         """Tension of every piece over the base tension (4, 20)."""
-        cosine = np.clip(np.einsum("tki,tki->tk", direction[:, 1:], direction[:, :-1]), -1.0, 1.0)
-        loss = self.mu * np.arccos(cosine) * psi
+        loss = self.mu * self._turns(direction) * psi
         return np.exp(-np.concatenate([np.zeros((4, 1)), np.cumsum(loss, axis=1)], axis=1))
+
+    def grip(self, state: tuple[np.ndarray, np.ndarray], length: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Derivative (4, 20, 20) of the shares by the pieces' lengths through the slip, from a `state` of lengths and psi; 1/mm.
+
+        How the turns change is left out: it is smooth and small, and Newton's method finds it.
+        """
+        before, psi = state
+        slip = -np.cumsum((length - before)[:, :0:-1], axis=1)[:, ::-1]
+        slope = (1 - np.sign(slip) * psi) * np.exp(-np.abs(slip) / self.stroke) / self.stroke
+        reach = np.tri(20, 19, -1)  # piece k lies beyond contact j, in tension as in slip
+        gain = self.mu * self._turns(direction) * slope
+        shares = self.shares(direction, self.contacts(before, psi, length, np.ones(4, bool)))
+        return shares[:, :, None] * np.einsum("kj,tj,mj->tkm", reach, gain, reach)
+
+    def _turns(self, direction: np.ndarray) -> np.ndarray:
+        """Angles (4, 19) between one piece and the next."""
+        cosine = np.einsum("tki,tki->tk", direction[:, 1:], direction[:, :-1])
+        return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
 @dataclass

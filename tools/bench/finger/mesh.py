@@ -118,7 +118,7 @@ def locate(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _invert(corner: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape-function values (k, 27) at points (k, 3) mm of cells (k, 27, 3), and the largest local coordinate; inf where not found."""
+    """Shape-function values (k, 27) at points (k, 3) mm of cells (k, 27, 3); the largest local coordinate, inf where not found."""
     x = np.zeros_like(points)
     for _ in range(12):  # Newton from the cell's centre; the map is nearly affine
         value, slope = shape(x)

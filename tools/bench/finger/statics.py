@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import LinAlgError, solve_banded, solveh_banded
+from scipy.linalg import LinAlgError, block_diag, solve_banded, solveh_banded
 
 from tools.bench.finger.body import DENSITY, Body, Element, assemble
 from tools.bench.finger.cables import Cables, Cords
@@ -18,9 +18,6 @@ from tools.bench.finger.skin import Pad, Skin
 
 ITERATIONS = 25
 HALVINGS = 8
-# The contacts' state is held while Newton's method runs and taken again from the slip it finds, so often: to hold it in the
-# tangent would cost its symmetry. What is left acts within one step of a reversal.
-SLIP_PASSES = 2
 FORCE, LENGTH = 2e-5, 1e-4  # N and mm: what is left of forces, and of steps and lengths; noise is 0.2 mm
 
 
@@ -92,7 +89,9 @@ class Finger:
         self._lower = (row >= column) & (column >= 0)
         self._dof = dof
         self._place = ((row - column) * self._free + column)[self._lower]
-        self._support = [[np.flatnonzero(np.abs(d) > 1e-12) for d in np.diff(w, axis=0)] for w in self.cables.weights]
+        steps = np.diff(self.cables.weights, axis=1)
+        self._stretch = np.ascontiguousarray(steps[:, :, mesh.held :])
+        self._support = [[np.flatnonzero(np.abs(d) > 1e-12) for d in tendon] for tendon in steps]
         spans = [3 * (int(np.ptp(on)) + 1) for tendon in self._support for on in tendon if len(on)]
         self._band = max(int((row - column)[self._lower].max()) + 1, *spans)
 
@@ -152,8 +151,6 @@ class Finger:
         outside = self._mass[:, None] * np.array(load.gravity)
         if load.force is not None:
             outside = outside + load.force
-        psi = self.cables.contacts(state.length, state.contacts, self.cables.pieces(u)[0], tension > 0)
-        passes = SLIP_PASSES if self.cables.mu else 0
         step = np.inf
         for _ in range(ITERATIONS):
             element = assemble(self.body, u, pressure, load.swelling, share, left)
@@ -162,23 +159,19 @@ class Finger:
             length, direction = self.cables.pieces(u)
             over = np.where(driven, length.sum(axis=1) - np.where(driven, load.limit, 0.0), 0.0)
             pulls = tension > 0
+            psi = self.cables.contacts(state.length, state.contacts, length, pulls)
             shares = self.cables.shares(direction, psi)
             gap, plain, K = self._gather(element, u, outside, tension[:, None] * shares, length, direction)
             off = max(over.max(initial=0.0), np.abs(over[driven & pulls]).max(initial=0.0))
             if step < 50 * LENGTH and np.abs(plain).max() < FORCE and off < LENGTH and _quiet(element, self.body):
-                psi = self.cables.contacts(state.length, state.contacts, length, pulls)
-                if passes:
-                    passes, step = passes - 1, np.inf
-                    continue
                 return self._kept(State(u, pressure, tension, load, length, psi), share, left)
-            solved = _solve(K, np.column_stack([gap, self._along(direction, shares)]))
-            if solved is None:
+            grip = None
+            if self.cables.mu and pulls.any():
+                grip = tension[:, None, None] * self.cables.grip((state.length, state.contacts), length, direction)
+            found = self._direction(K, gap, direction, shares, grip, (driven, tension, over))
+            if found is None:
                 return None
-            answer = self._along(direction, np.ones_like(length)).T @ solved
-            give = answer[:, 1:][np.ix_(driven, driven)]
-            change = np.zeros(4)
-            change[driven] = _pulling(give, (over - answer[:, 0])[driven] + give @ tension[driven]) - tension[driven]
-            du = -solved[:, 0] - solved[:, 1:] @ change
+            du, change = found
             step = np.abs(du).max()
             if not np.isfinite(step) or step > 60.0:
                 return None
@@ -187,6 +180,32 @@ class Finger:
             pressure = pressure + part * element.pressure_step(full[self._dof + 3 * self.body.mesh.held])
             u, tension = u + part * full.reshape(-1, 3), np.maximum(tension + part * change, 0.0)
         return None
+
+    def _direction(
+        self, K: np.ndarray, gap: np.ndarray, direction: np.ndarray, shares: np.ndarray, grip: np.ndarray | None, drives: tuple
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Newton's step of the free unknowns and the base tensions; `drives`: who is driven, tensions, lengths over the limit.
+
+        Lengths y and tensions t of all pieces answer as y = y0 - C t with C = G' K^-1 G, t = shares dT + grip y. Without friction
+        a tendon's pieces are alike and stand together.
+        """
+        driven, tension, over = drives
+        G = np.einsum("tkn,tki->nitk", self._stretch, direction).reshape(len(gap), 4, 20)
+        G = G.sum(axis=2) if grip is None else G.reshape(len(gap), 80)
+        solved = _solve(K, np.column_stack([gap, G]))
+        if solved is None:
+            return None
+        y0, C = -G.T @ solved[:, 0], G.T @ solved[:, 1:]
+        pull, held = np.eye(4), np.zeros((4, 4))
+        if grip is not None:
+            pull, held = block_diag(*shares[:, :, None]), block_diag(*grip)
+        answer = np.linalg.solve(np.eye(len(y0)) + C @ held, np.column_stack([y0, C @ pull]))
+        total = answer.reshape(4, -1, 5).sum(axis=1)
+        give = total[:, 1:][np.ix_(driven, driven)]
+        change = np.zeros(4)
+        change[driven] = _pulling(give, (over + total[:, 0])[driven] + give @ tension[driven]) - tension[driven]
+        moved = pull @ change + held @ (answer[:, 0] - answer[:, 1:] @ change)
+        return -solved[:, 0] - solved[:, 1:] @ moved, change
 
     def _gather(
         self, element: Element, u: np.ndarray, outside: np.ndarray, pull: np.ndarray, length: np.ndarray, direction: np.ndarray
@@ -213,7 +232,7 @@ class Finger:
                 block = np.einsum("a,b,ij->aibj", d[on], d[on], turn[k]).reshape(3 * len(on), -1)
                 self._add(places, entries, (3 * on[:, None] + np.arange(3)).reshape(1, -1) - 3 * held, block[None])
         K = np.bincount(np.concatenate(places), np.concatenate(entries), self._band * self._free).reshape(self._band, self._free)
-        rest = around.reshape(-1)[3 * held :] + self._along(direction, pull).sum(axis=1)
+        rest = around.reshape(-1)[3 * held :] + self._along(direction, pull)
         condensed, plain = (
             np.bincount(self._dof[self._dof >= 0], f[self._dof >= 0], self._free) + rest for f in (element.force, element.plain)
         )
@@ -226,11 +245,8 @@ class Finger:
         entries.append(block[lower])
 
     def _along(self, direction: np.ndarray, pull: np.ndarray) -> np.ndarray:
-        """Generalised force (free, 4) with which pieces of tension `pull` (4, 20) resist stretching."""
-        held = self.body.mesh.held
-        T = pull[..., None] * direction
-        forces = [np.diff(w, axis=0).T @ t for w, t in zip(self.cables.weights, T, strict=True)]
-        return np.stack([f.reshape(-1)[3 * held :] for f in forces], axis=1)
+        """Generalised force (free,) with which pieces of tension `pull` (4, 20) resist stretching."""
+        return np.einsum("tkn,tki->ni", self._stretch, pull[..., None] * direction).reshape(-1)
 
     def _kept(self, state: State, share: float, left: np.ndarray | None) -> State:
         if self.creep is None:
