@@ -17,6 +17,7 @@ from tools.bench.finger.effects.sensor_gain import SensorGain
 from tools.bench.finger.effects.sensor_hysteresis import SensorHysteresis
 from tools.bench.finger.effects.tendon_backlash import TendonBacklash
 from tools.bench.finger.equilibria import equilibrium
+from tools.bench.finger.hand import Hand
 from tools.bench.finger.mesh import cone, radius
 from tools.bench.finger.motions import Trial, bench_day, shape_day
 from tools.bench.finger.sensors import Built
@@ -166,6 +167,17 @@ def test_friction_loses_tension_by_the_capstan_law(finger):
     assert back.tension[0] < 0.97 * pulled(finger, up[:10])[-1].tension[0]
 
 
+def test_friction_does_not_depend_on_the_step():
+    # Rate-independent: the same way in steps twice as long. 5e-5 of strain is a sixth of the sensors' noise (0.3 ohm of 1 kohm).
+    ends = []
+    for stride in (0.8, 0.4):
+        rough = Finger.of()
+        rough.cables.mu, rough.cables.stroke = 0.5, 0.1
+        path = [*np.arange(stride, 4.9, stride), *(4.8 - np.arange(stride, 1.7, stride))]
+        ends.append(rough.cords.strain(pulled(rough, path)[-1].u))
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=5e-5)
+
+
 def test_creep_relaxes_the_tension_like_a_standard_linear_solid():
     # Nearly incompressible: all the stress relaxes like the shear modulus, as long as shortening alone drives. 1 %: the bulk
     # modulus stays, and the shape under a fixed shortening shifts a little.
@@ -177,6 +189,16 @@ def test_creep_relaxes_the_tension_like_a_standard_linear_solid():
         state = soft.step(state, state.load, 0.5)
         time += 0.5
         assert state.tension[0] / first == pytest.approx(1 - 0.2 * (1 - np.exp(-time / 5.0)), rel=0.01)
+
+
+def test_a_hand_pushes_with_what_it_says_and_lets_go(finger):
+    hand = Hand.draw(np.random.default_rng(3), finger.skin, 16.0)
+    count = len(finger.body.mesh.nodes)
+    assert hand.at(0.0, finger.skin, count) is None
+    assert hand.at(15.9, finger.skin, count) is None
+    middle = (hand.begin[0] + hand.end[0]) / 2
+    alone = replace(hand, peak=hand.peak * (np.arange(len(hand.peak)) == 0)[:, None])
+    np.testing.assert_allclose(alone.at(middle, finger.skin, count).sum(axis=0), hand.peak[0], rtol=1e-9)
 
 
 def test_pad_presses_back(finger):

@@ -38,7 +38,7 @@ def ease(t: Times, begin: Times, end: Times) -> np.ndarray:
 
 def bump(t: Times, begin: Times, end: Times) -> np.ndarray:
     """0, 1 in the middle, 0: sine squared."""
-    return np.sin(np.pi * np.clip((t - begin) / (end - begin), 0.0, 1.0)) ** 2
+    return 0.5 - 0.5 * np.cos(2 * np.pi * np.clip((t - begin) / (end - begin), 0.0, 1.0))
 
 
 def rows(duration: float, rate: float) -> np.ndarray:
