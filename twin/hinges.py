@@ -27,7 +27,7 @@ class JointSet:
 
 @dataclass(frozen=True, kw_only=True)
 class HingeChain(Body):
-    """A body of joint sets, two a disk interval.
+    """A body of joint sets, two a piece of backbone, of which a disk interval has one or more.
 
     `disks` lists the sites of the disk centres, base to tip; `tip` is where payload and tip force act. `bows`: tendons are straight
     between disks and the backbone bows away from them; else they run in channels of the body. `stiffening`: of a body that
@@ -51,6 +51,6 @@ class HingeChain(Body):
 
 
 def hinge_pairs(body: HingeChain) -> Iterator[tuple[str, str]]:
-    """Hinges about the same axis in the two joint sets of each disk interval."""
+    """Hinges about the same axis in the two joint sets of each piece of backbone."""
     for one, other in zip(body.joints[::2], body.joints[1::2], strict=True):
         yield from ((one.bend_x, other.bend_x), (one.bend_y, other.bend_y), (one.twist, other.twist))

@@ -12,7 +12,9 @@ class StiffnessAsymmetry(Effect):
     """Principal bending stiffnesses EI (1 + e) and EI (1 - e), the stiff axis turned by alpha from x.
 
     The parameters are e cos 2 alpha (`along`) and e sin 2 alpha (`across`), which are smooth at e = 0 where alpha means nothing.
-    The hinges are turned to the principal axes.
+    The hinges are turned to the principal axes. Of a body described by EI_x and EI_y the stiffness about x and y becomes
+
+        EI_x (1 + along),    EI_y (1 - along),    between them sqrt(EI_x EI_y) across.
 
     Source: Kirchhoff rod with K_bt = diag(EI_x, EI_y, GJ). A seam, a flat or a second wire in the body.
 
@@ -33,14 +35,18 @@ class StiffnessAsymmetry(Effect):
         along, across = self["along"], self["across"]
         if along == across == 0.0:
             return
-        e, alpha = math.hypot(along, across), 0.5 * math.atan2(across, along)
-        # Of the two equivalent descriptions (e, alpha) and (-e, alpha - 90 deg), the one that turns the hinges less.
-        if abs(alpha) > math.pi / 4:
-            e, alpha = -e, alpha - math.copysign(math.pi / 2, alpha)
-        c, s = math.cos(alpha), math.sin(alpha)
         for at in body.joints:
-            for name, axis, sign in ((at.bend_x, [c, s, 0], 1.0), (at.bend_y, [-s, c, 0], -1.0)):
+            x, y = body.spec.joint(at.bend_x).stiffness[0], body.spec.joint(at.bend_y).stiffness[0]
+            about_x, about_y, between = x * (1.0 + along), y * (1.0 - along), math.sqrt(x * y) * across
+            mean, half = 0.5 * (about_x + about_y), 0.5 * (about_x - about_y)
+            e, alpha = math.hypot(half, between) / mean, 0.5 * math.atan2(between, half)
+            # Of the two equivalent descriptions (e, alpha) and (-e, alpha - 90 deg), the one that turns the hinges less.
+            if abs(alpha) > math.pi / 4:
+                e, alpha = -e, alpha - math.copysign(math.pi / 2, alpha)
+            c, s = math.cos(alpha), math.sin(alpha)
+            for name, axis, own, sign in ((at.bend_x, [c, s, 0], x, 1.0), (at.bend_y, [-s, c, 0], y, -1.0)):
                 joint = body.spec.joint(name)
                 joint.axis = axis
-                joint.stiffness = joint.stiffness * (1.0 + sign * e)
-                joint.damping = joint.damping * (1.0 + sign * e)
+                factor = mean * (1.0 + sign * e) / own
+                joint.stiffness = joint.stiffness * factor
+                joint.damping = joint.damping * factor
