@@ -6,10 +6,10 @@ masses m at x, a dead force F at the tip, and disks at a distance `gap` from a w
     E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
 
 `balance` returns r = dE/dq with T_d the tensions that friction leaves, and J = dr/dq. A segment's length depends only on
-the hinges between its two holes (none in a thick disk), so its geometric stiffness is a small block; gravity's Hessian follows from one vector a
-hinge, n_i = a_i x M_i (C_i - p_i) (M_i, C_i mass and centre of everything distal of hinge i at p_i with axis a_i), since turning
-hinge j <= i turns n_i with it (a slide moves along its a_i and turns nothing); friction adds an unsymmetric rank-one block a
-segment.
+the hinges between its two holes (none in a thick disk), so its geometric stiffness is a small block; gravity's Hessian follows
+from one vector a hinge, n_i = a_i x M_i (C_i - p_i) (M_i, C_i mass and centre of everything distal of hinge i at p_i with axis
+a_i), since turning hinge j <= i turns n_i with it (a slide moves along its a_i and turns nothing); friction adds an unsymmetric
+rank-one block a segment.
 """
 
 from __future__ import annotations

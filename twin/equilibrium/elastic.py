@@ -9,10 +9,11 @@ under 4 N), so the energy is written in phi:
     K -> K (1 - (P h^2 / EI)^2 / 720)
 
 The second term couples the two sets of a piece of backbone. Sets at 1/6 and 5/6 carry a curvature that changes linearly along the
-piece with a first moment of 1/9 instead of 1/12; stiffening the antisymmetric bending by 4/3 restores it. The tendons that reach so
-far press the rod together with P; a bowed piece of length h keeps u cot u = 1 - u^2/3 - u^4/45 ... of its stiffness, u^2 = P h^2 / (4 EI)
-(beam-column theory). Two sets at 1/6 and 5/6 have the second term by their place; the third is the factor on K. Where tendons run
-in channels of the body it cannot bow away from them: neither term applies, and sets may also stretch (hyperelastic.py).
+piece with a first moment of 1/9 instead of 1/12; stiffening the antisymmetric bending by 4/3 restores it. The tendons that reach
+so far press the rod together with P; a bowed piece of length h keeps u cot u = 1 - u^2/3 - u^4/45 ... of its stiffness, u^2 = P
+h^2 / (4 EI) (beam-column theory). Two sets at 1/6 and 5/6 have the second term by their place; the third is the factor on K.
+Where tendons run in channels of the body it cannot bow away from them: neither term applies, and sets may also stretch
+(hyperelastic.py).
 """
 
 from __future__ import annotations

@@ -210,8 +210,8 @@ def solve(at, state, factors, tol):
 
 @inner
 def commit(at, state, bowing):
-    """Advance slip states and distal lengths to the geometry in MuJoCo's data, `bowing` (n_tendon,) m as before the step: it changes
-    by 1e-3 of what the path does."""
+    """Advance slip states and distal lengths to the geometry in MuJoCo's data, `bowing` (n_tendon,) m as before the step: it
+    changes by 1e-3 of what the path does."""
     chain, z, s = at.chain, state.z, state.s
     for t in range(z.shape[0]):
         distal = 0.0

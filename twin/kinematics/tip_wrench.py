@@ -29,8 +29,8 @@ TOLERANCE = 1e-8  # of the integration, m and rad
 def tip_wrench(robot: Robot, tension: np.ndarray, loads: Loads, values: Values | None = None) -> np.ndarray:
     """Backbone positions (n_disk, 3) m at the disks under base tensions (n_tendon,) N.
 
-    Raises DataError for a robot that is no round wire with straight tendons to its tip, SolveError where shooting finds no moment at
-    the base.
+    Raises DataError for a robot that is no round wire with straight tendons to its tip, SolveError where shooting finds no
+    moment at the base.
     """
     v = {p.name: p.value for p in robot.parameters} | dict(values or {})
     shape = Continuum.model_validate(dict(robot.structure))

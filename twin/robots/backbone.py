@@ -74,7 +74,7 @@ class Wire:
                 ends.append((float(a + 0.5 * f * h), float(a + 0.5 * (f + 1) * h)))
                 disk.append(k if i == n - 1 and f == 1 else None)
         heads = [*place[1:], self._length]
-        return [Piece(at, *span, at, head, k) for at, span, head, k in zip(place, ends, heads, disk, strict=True)]
+        return [Piece(at, a, b, at, head, k) for at, (a, b), head, k in zip(place, ends, heads, disk, strict=True)]
 
     def stiffness(self, piece: Piece) -> Stiffness:
         """EI/h, GJ/h; of a round one with the radius at the set."""
@@ -94,7 +94,6 @@ class Wire:
     def radius(self, s: float) -> float:
         """For pictures and rotary inertia."""
         return self._values["backbone.radius"]
-
 
 
 class Cast:
@@ -136,7 +135,6 @@ class Cast:
 
     def radius(self, s: float) -> float:
         return float(np.interp(s, self._at, self._radii))
-
 
 
 BODIES: Mapping[str, type[Backbone]] = {"wire": Wire, "cast": Cast}

@@ -30,6 +30,7 @@ __all__ = ["SCHEMA", "build", "dynamics", "statics"]
 ALUMINIUM = [0.72, 0.74, 0.78, 1.0]
 NITI = [0.35, 0.38, 0.44, 1.0]
 TIMESTEP = 1e-3  # s
+LEAST_INERTIA = 1e-14  # kg m^2: MuJoCo takes none below 1e-15; a millionth of a small disk's
 THINNEST = 1.5e-3  # m, of a disk's picture
 
 
@@ -180,9 +181,9 @@ def _add_mass(body: mujoco.MjsBody, piece: Piece, disk: _Disk | None, backbone: 
         )  # fmt: skip
     mass = sum(p[0] for p in parts)
     centre = sum(p[0] * p[1] for p in parts) / mass
-    across = sum(p[2] + p[0] * (p[1] - centre) ** 2 for p in parts)
+    across = max(LEAST_INERTIA, sum(p[2] + p[0] * (p[1] - centre) ** 2 for p in parts))
     body.mass, body.ipos, body.explicitinertial = mass, [0, 0, centre], True
-    body.inertia = [across, across, sum(p[3] for p in parts)]
+    body.inertia = [across, across, max(LEAST_INERTIA, sum(p[3] for p in parts))]
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0], fromto=[0, 0, -piece.place if first else start, 0, 0, end],
         rgba=NITI, contype=0, conaffinity=0, mass=0,

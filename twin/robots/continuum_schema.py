@@ -41,8 +41,8 @@ class Continuum(Structure):
     )
     pieces: Annotated[int, Field(ge=1, le=20)] | list[Annotated[int, Field(ge=1, le=20)]] = Field(
         1,
-        description="of the wire: how many pieces each disk interval is divided into, or a list of one a disk. A piece has two joint "
-        "sets, and is good for a bend of half a radian; long intervals need more",
+        description="of the wire: how many pieces each disk interval is divided into, or a list of one a disk. A piece has two "
+        "joint sets; where one bends by half a radian the tip is off by 0.2 % of the length",
     )
     markers: Literal["disk"] | list[Disk] = Field(
         "disk",
@@ -187,13 +187,19 @@ ROWS = (
         stated=True,
     ),
     _wire.row(
-        "backbone.radius", "m mm", "radius of the wire, in the middle of its length (other sections: of pictures and inertia)", 1e-5, 0.1
+        "backbone.radius",
+        "m mm",
+        "radius of the wire, in the middle of its length (other sections: of pictures and inertia)",
+        1e-5,
+        0.1,
     ),
     _wire.row("backbone.mass", "kg g", "mass of the whole wire", 1e-6, 10.0),
     _Rows(ROUND | CAST).row(
         "backbone.youngs_modulus", "Pa GPa", "Young's modulus E of the backbone (of a cast body at small strain)", 1e3, 2e12
     ),
-    _round.row("backbone.poisson_ratio", "1", "Poisson's ratio nu; enters the stiffness in twist, G = E / (2 (1 + nu))", -0.99, 0.5),
+    _round.row(
+        "backbone.poisson_ratio", "1", "Poisson's ratio nu; enters the stiffness in twist, G = E / (2 (1 + nu))", -0.99, 0.5
+    ),
     _round.row(
         "backbone.radius_taper",
         "1",
@@ -203,7 +209,12 @@ ROWS = (
         default=0.0,
     ),
     *(
-        _other.row(f"backbone.bending_{a}", "N*m^2 N*mm^2", f"bending stiffness EI about {a}: against bends in the plane of z and {b}", *ROD)
+        _other.row(
+            f"backbone.bending_{a}",
+            "N*m^2 N*mm^2",
+            f"bending stiffness EI about {a}: against bends in the plane of z and {b}",
+            *ROD,
+        )
         for a, b in ("xy", "yx")
     ),
     _other.row("backbone.twisting", "N*m^2 N*mm^2", "stiffness GJ in twist", *ROD),
