@@ -19,6 +19,7 @@ from tests.other_continua import (
     HANGING,
     HELICAL,
     LENGTH,
+    NOWHERE,
     OUTWARD,
     SEGMENTS,
     SIDEWAYS,
@@ -32,8 +33,11 @@ from tests.other_continua import (
 from tools.bench.rod import Rod, follow
 from tools.bench.rod import solve as rod_solve
 from twin.body import Problem
+from twin.compiled import jit
 from twin.effects import Drive, Loads, Route
 from twin.equilibrium import Equilibrium
+from twin.equilibrium.lengths import pulls
+from twin.equilibrium.newton import place
 from twin.errors import DataError
 from twin.kinematics import LoadedRobot, inverse
 from twin.kinematics.tip_wrench import tip_wrench
@@ -168,6 +172,39 @@ def test_beyond_a_tendons_end_it_stays_straight(tmp_path: Path) -> None:
     steps = np.diff(found[3:], axis=0) / 0.015
     np.testing.assert_allclose(steps, np.tile(steps[0], (4, 1)), rtol=0, atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(steps, axis=1), 1.0, rtol=0, atol=1e-9)
+
+
+def test_tendons_press_what_they_reach_only(tmp_path: Path) -> None:
+    """Two opposite tendons press the first, short interval; the second, long one, which a third bends, they do not soften."""
+    tension, angles = [1.0, 1.0, 0.5], [0.0, 180.0, 90.0]
+    numbers = {"disks__pitch": ([10.0, 60.0], "mm"), "markers__axial_offset": (0.0, "mm"), "tendons__angle": (angles, "deg")}
+    rod = Rod(
+        pitch=np.array([0.01, 0.06]), disk_mass=np.ones(2), hole_radius=np.full((3, 3), 8e-3), stiffness_profile=np.ones(2),
+        hole_angle=np.tile(np.radians(angles), (3, 1)), precurvature=np.zeros((2, 3)), marker_offset=np.zeros(2),
+    )  # fmt: skip
+    short = rod_solve(rod, [tension, [0.0, 0.0, 0.5]], gravity=NOWHERE, nodes=10).disks
+    mine = robot(tmp_path, {"disks": 2, "tendons_end": [1, 1, 2]}, ("backbone.length",), **numbers)
+    found = disks(Equilibrium(mine.build()), tension)
+    # m: were it pressed by all, it would bend by (P h^2 / EI)^2 / 720, 5 %, more: of 6 mm at its tip 0.3 mm
+    assert off(found, short) < CLOSE
+    assert 4e-3 < found[1, 1] < 8e-3
+
+
+@jit
+def seen_pulls(at, z, path_gradient, pull):
+    pulls(at, z, path_gradient, pull)
+
+
+def test_no_joint_beyond_its_end_changes_a_tendon(tmp_path: Path) -> None:
+    e = Equilibrium(robot(tmp_path, SEGMENTS, **SIX).build())
+    under = e.statics(Problem(np.zeros(1), np.ones((1, 6)), Loads(HANGING)))
+    place(under, np.random.default_rng(0).normal(0, 0.1, e.model.nv))
+    A, B = np.full((6, e.model.nv), np.nan), np.full((6, e.model.nv), np.nan)
+    seen_pulls(under, np.zeros((6, 8)), A, B)
+    assert np.array_equal(A, B)
+    assert not A[:3, 24:].any()  # 24 hinges in the first four intervals
+    assert np.all(A[:3, :24] != 0.0)
+    assert np.all(A[3:] != 0.0)
 
 
 @pytest.mark.parametrize("name", ["segments", "tentacle"])
