@@ -239,7 +239,7 @@ ROWS = (
     _on_wire.row(
         "disks.thickness",
         "m mm",
-        "thickness of each disk, its centre where the pitches say; the wire bends between disks only, tendons run straight through them",
+        "thickness of each disk, its centre where the pitches say; the wire bends between disks only, tendons pass them straight",
         0.0,
         1.0,
         default=0.0,
