@@ -142,7 +142,7 @@ def _what(field: FieldInfo) -> str:
         ("str", "text"),
     ):
         if found in text:
-            words.append(word)
+            words.append("whole number or list" if word == "list" and not text.startswith("list") else word)
             break
     if "Literal" in text:
         choices: Any = field.annotation

@@ -18,7 +18,7 @@ from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.compiled import assign, dot, jit
 from twin.effects import Loads
 from twin.equilibrium import ChainPath, Equilibrium
-from twin.equilibrium.chain import State, laid, lay, lever, pass_on
+from twin.equilibrium.chain import State, laid, lay, lever, pass_on, shorter
 from twin.equilibrium.elastic import COUPLING, bendings, springs
 from twin.equilibrium.engine import mj_step
 from twin.equilibrium.newton import place
@@ -40,7 +40,7 @@ class Motion(NamedTuple):
     velocity: np.ndarray  # (nv,)
     ctrl: np.ndarray
     applied: np.ndarray  # (nv,)
-    motor: np.ndarray  # (n_tendon, n_disk) actuators
+    motor: np.ndarray  # (n_tendon, n_piece) actuators
     fixed: np.ndarray  # (nv,) rest shape without creep
     time: np.ndarray  # (n,) s
     tension: np.ndarray  # (n, n_tendon) N
@@ -57,13 +57,14 @@ class Seen(NamedTuple):
 @jit
 def route_tension(at, state, motion):
     """Segment tensions to ctrl for the state's base tensions at the present geometry; its slip advances."""
-    nt, nd = motion.motor.shape
-    tendon, now = laid(nd), np.empty(nd)
+    nt, most = motion.motor.shape
+    room, now = laid(most), np.zeros(most)
     for t in range(nt):
+        tendon = shorter(room, at.chain.pieces[t])
         lay(at.chain, t, tendon, now)
         pass_on(state.T[t], at.law, tendon, state.z[t], state.s[t], now, state.z[t])
-        assign(state.s[t], now)
-        for d in range(nd):
+        for d in range(tendon.T.size):
+            state.s[t, d] = now[d]
             motion.ctrl[motion.motor[t, d]] = tendon.T[d]
 
 
@@ -71,7 +72,7 @@ def route_tension(at, state, motion):
 def apply(at, state, motion, r):
     """To qfrc_applied: the tip's force, and what the hinges' springs lack of the true elastic moment."""
     chain, fixed, tip = at.chain, motion.fixed, at.chain.disk[-1]
-    springs(chain.qpos, at.rest, chain, state.T.sum(), r, np.empty((0, 0)))
+    springs(chain.qpos, at.rest, chain, state.T, np.empty(state.T.size), r, np.empty((0, 0)))
     for k in range(r.size):
         p = chain.partner[k]
         native = chain.stiffness[k] * (chain.qpos[k] - at.rest[k]) + chain.coupling[k] * (
@@ -83,15 +84,15 @@ def apply(at, state, motion, r):
 @jit
 def look(at, state, motion, i, seen):
     """What is seen at sample i, the motion carried on straight for the rest of a step."""
-    chain, nd = at.chain, motion.motor.shape[1]
-    tendon, distal, r = laid(nd), np.empty(nd), np.empty(state.q.size)
+    chain, most = at.chain, motion.motor.shape[1]
+    room, distal, bowing, r = laid(most), np.empty(most), np.empty(state.T.size), np.empty(state.q.size)
     for k in range(chain.marker.size):
         for a in range(3):
             seen.markers[i, k, a] = chain.site[chain.marker[k], a]
-    bowing = springs(chain.qpos, at.rest, chain, motion.tension[i].sum(), r, np.empty((0, 0)))
+    springs(chain.qpos, at.rest, chain, motion.tension[i], bowing, r, np.empty((0, 0)))
     for t in range(state.T.size):
-        lay(chain, t, tendon, distal)
-        seen.path[i, t] = distal[0] + bowing
+        lay(chain, t, shorter(room, chain.pieces[t]), distal)
+        seen.path[i, t] = distal[0] + bowing[t]
     assign(seen.q[i], chain.qpos)
 
 
@@ -158,8 +159,9 @@ class Dynamics:
         model.qpos_spring[:] = fixed + delayed.sum(axis=0)
         data.qpos[:] = start.q[0]
         mujoco.mj_forward(model, data)
-        nd = start.slip.shape[1]
-        motor = np.array([[model.actuator(f"tendon_{t}_segment_{d}").id for d in range(1, nd + 1)] for t in range(1, nt + 1)])
+        motor = np.zeros(start.slip.shape, np.int64)
+        for t, d in ((t, d) for t, n in enumerate(moving.chain.pieces) for d in range(n)):
+            motor[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id
         tension = np.maximum(problem.command, 0.0, order="C")
         motion = Motion(
             float(step), data.qvel, data.ctrl, data.qfrc_applied, motor, fixed, np.array(problem.time, float), tension

@@ -23,7 +23,8 @@ KIND = {  # group of outputs -> kind in reports
 POINTS = ("marker",)  # groups whose channels are the x, y and z of points
 ACCURATE = ("marker", "angle")  # groups that a robot's declared accuracy speaks of
 TYPICAL = {  # group of outputs -> noise (SI) of a usual sensor, where nothing is known yet
-    "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "sensor": 0.5, "angle": 2e-3, "torque": 1e-3,
+    "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "sensor": 0.5,
+    "angle": 2e-3, "torque": 1e-3,
 }  # fmt: skip
 
 

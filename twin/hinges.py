@@ -27,7 +27,7 @@ class JointSet:
 
 @dataclass(frozen=True, kw_only=True)
 class HingeChain(Body):
-    """A body of joint sets, two a disk interval.
+    """A body of joint sets, two a piece of backbone, of which a disk interval has one or more.
 
     `disks` lists the sites of the disk centres, base to tip; `tip` is where payload and tip force act. `bows`: tendons are straight
     between disks and the backbone bows away from them; else they run in channels of the body. `stiffening`: of a body that
@@ -42,19 +42,23 @@ class HingeChain(Body):
     stiffening: float = 0.0
 
     def bend_unequally(self, along: float, across: float) -> None:
-        """Bending stiffnesses EI (1 + e) and EI (1 - e), e cos 2 alpha = `along`, e sin 2 alpha = `across`: the hinges are turned to
-        the principal axes."""
-        e, alpha = math.hypot(along, across), 0.5 * math.atan2(across, along)
-        # Of the two equivalent descriptions (e, alpha) and (-e, alpha - 90 deg), the one that turns the hinges less.
-        if abs(alpha) > math.pi / 4:
-            e, alpha = -e, alpha - math.copysign(math.pi / 2, alpha)
-        c, s = math.cos(alpha), math.sin(alpha)
+        """Of EI_x and EI_y make EI_x (1 + along), EI_y (1 - along) and sqrt(EI_x EI_y) across between them: the hinges are turned
+        to the principal axes."""
         for at in self.joints:
-            for name, axis, sign in ((at.bend_x, [c, s, 0], 1.0), (at.bend_y, [-s, c, 0], -1.0)):
+            x, y = self.spec.joint(at.bend_x).stiffness[0], self.spec.joint(at.bend_y).stiffness[0]
+            about_x, about_y, between = x * (1.0 + along), y * (1.0 - along), math.sqrt(x * y) * across
+            mean, half = 0.5 * (about_x + about_y), 0.5 * (about_x - about_y)
+            e, alpha = math.hypot(half, between) / mean, 0.5 * math.atan2(between, half)
+            # Of the two equivalent descriptions (e, alpha) and (-e, alpha - 90 deg), the one that turns the hinges less.
+            if abs(alpha) > math.pi / 4:
+                e, alpha = -e, alpha - math.copysign(math.pi / 2, alpha)
+            c, s = math.cos(alpha), math.sin(alpha)
+            for name, axis, own, sign in ((at.bend_x, [c, s, 0], x, 1.0), (at.bend_y, [-s, c, 0], y, -1.0)):
                 joint = self.spec.joint(name)
                 joint.axis = axis
-                joint.stiffness = joint.stiffness * (1.0 + sign * e)
-                joint.damping = joint.damping * (1.0 + sign * e)
+                factor = mean * (1.0 + sign * e) / own
+                joint.stiffness = joint.stiffness * factor
+                joint.damping = joint.damping * factor
 
     def grade(self, slope: float) -> None:
         """All stiffnesses times 1 + slope (s/L - 1/2), s the distance from the base."""
@@ -83,6 +87,6 @@ class HingeChain(Body):
 
 
 def hinge_pairs(body: HingeChain) -> Iterator[tuple[str, str]]:
-    """Hinges about the same axis in the two joint sets of each disk interval."""
+    """Hinges about the same axis in the two joint sets of each piece of backbone."""
     for one, other in zip(body.joints[::2], body.joints[1::2], strict=True):
         yield from ((one.bend_x, other.bend_x), (one.bend_y, other.bend_y), (one.twist, other.twist))

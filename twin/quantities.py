@@ -77,6 +77,11 @@ def check_bounds(parameter: Parameter, value: float) -> None:
         )
 
 
-def each(values: Values, name: str, n: int) -> np.ndarray:
-    """The n numbers (n,) of a parameter that is described one by one, as name_1, name_2, ..., or by one number for all, as name."""
-    return np.array([values[f"{name}_{k}"] if f"{name}_{k}" in values else values[name] for k in range(1, n + 1)])
+def each(values: Values, name: str, *counts: int) -> np.ndarray:
+    """The numbers (n,), or (n, m), ..., of a parameter that is described one by one, as name_1, name_2, ... (name_1_1, ... of a
+    list of lists), or by one number for all, as name."""
+    out = np.empty(counts)
+    for index in np.ndindex(*counts):
+        own = "_".join([name, *(str(k + 1) for k in index)])
+        out[index] = values[own] if own in values else values[name]
+    return out

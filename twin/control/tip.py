@@ -118,8 +118,7 @@ class TipController:
         predicted = self.robot.shape().displacement
         for share, sister in zip(self.shape.x, self.shape.sisters, strict=True):
             predicted = predicted + share * (sister.shape().displacement - self.robot.shape().displacement)
-        holes = self.robot.solver.chain.site[self.robot.solver.chain.hole[:, 0], :2]
-        more = np.linalg.lstsq(holes, displacement - predicted, rcond=None)[0]  # rad, towards x and y
+        more = np.linalg.lstsq(self.robot.levers[0], displacement - predicted, rcond=None)[0]  # rad, towards x and y
         length = float(np.hypot(*tip[:2]))
         bend = 2.0 * np.arctan2(length, tip[2]) * (tip[:2] / length if length > 0.0 else np.zeros(2))
         return bent(bend + more, self.length) - bent(bend, self.length)

@@ -10,6 +10,9 @@ class StiffnessAsymmetry(Effect):
     """Principal bending stiffnesses EI (1 + e) and EI (1 - e), the stiff axis turned by alpha from x.
 
     The parameters are e cos 2 alpha (`along`) and e sin 2 alpha (`across`), which are smooth at e = 0 where alpha means nothing.
+    Of a body described by EI_x and EI_y the stiffness about x and y becomes
+
+        EI_x (1 + along),    EI_y (1 - along),    between them sqrt(EI_x EI_y) across.
 
     Source: Kirchhoff rod with K_bt = diag(EI_x, EI_y, GJ). A seam, a flat or a second wire in the body.
 

@@ -31,7 +31,7 @@ __all__ = ["ChainPath", "Equilibrium", "is_compiled"]
 
 @dataclass(frozen=True, kw_only=True)
 class ChainPath(Path):
-    """The equilibria of a chain, with slip states and distal tendon lengths (n_tendon, n_disk) at the end. `others` holds the
+    """The equilibria of a chain, with slip states and distal tendon lengths (n_tendon, n_piece) at the end. `others` holds the
     temperature (n, n_tendon) K of its springs."""
 
     slip: np.ndarray
@@ -45,7 +45,10 @@ class Equilibrium:
         self.model = model = body.spec.compile()
         self.data = data = mujoco.MjData(model)
         site = np.vectorize(lambda name: model.site(name).id, otypes=[np.int64])
-        hole, disk = site(np.array(body.tendons)), site(np.array(body.disks))
+        pieces = np.array([len(tendon) - 1 for tendon in body.tendons], np.int64)
+        longest = int(pieces.max())
+        hole = site(np.array([[*tendon, *tendon[-1:] * (longest + 1 - len(tendon))] for tendon in body.tendons]))
+        disk = site(np.array(body.disks))
         stiffness = model.jnt_stiffness.reshape(model.nv, -1)[:, 0].copy()
         dof = {model.joint(i).name: model.joint(i).dofadr[0] for i in range(model.njnt)}
         partner, coupling, slender = np.arange(model.nv), np.zeros(model.nv), np.zeros(model.nv)
@@ -84,9 +87,11 @@ class Equilibrium:
             body=moved_by,
             mass=model.body_subtreemass[moved_by].copy(),
             hole=hole,
+            pieces=pieces,
+            first=hinges[model.site_bodyid[hole[pieces.argmax()]]],
             disk=disk,
+            below=hinges[model.site_bodyid[disk]],
             marker=site(np.array(body.markers)),
-            first=np.concatenate([[0], hinges[model.site_bodyid[disk]]]),
         )
         self.spring = model.qpos_spring.copy()
         mujoco.mj_kinematics(model, data)

@@ -6,10 +6,10 @@ masses m at x, a dead force F at the tip, and disks at a distance `gap` from a w
     E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
 
 `balance` returns r = dE/dq with T_d the tensions that friction leaves, and J = dr/dq. A segment's length depends only on
-the hinges of its own disk interval, so its geometric stiffness is a small block; gravity's Hessian follows from one vector a
-hinge, n_i = a_i x M_i (C_i - p_i) (M_i, C_i mass and centre of everything distal of hinge i at p_i with axis a_i), since turning
-hinge j <= i turns n_i with it (a slide moves along its a_i and turns nothing); friction adds an unsymmetric rank-one block a
-segment.
+the hinges between its two holes (none in a thick disk), so its geometric stiffness is a small block; gravity's Hessian follows
+from one vector a hinge, n_i = a_i x M_i (C_i - p_i) (M_i, C_i mass and centre of everything distal of hinge i at p_i with axis
+a_i), since turning hinge j <= i turns n_i with it (a slide moves along its a_i and turns nothing); friction adds an unsymmetric
+rank-one block a segment.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Chain(NamedTuple):
     unit: np.ndarray  # (nv,) what counts as one: 1 rad; the length of body a slide stretches, m
     hinge: np.ndarray  # (nv,) 1 for a hinge, 0 for a slide
     twists: np.ndarray  # (nv,) whether a hinge twists
-    slender: np.ndarray  # (nv,) h^2 / EI of the disk interval, 1/N; 0 for twist
-    partner: np.ndarray  # (nv,) the hinge about the same axis in the other set of the disk interval
+    slender: np.ndarray  # (nv,) h^2 / EI of the piece of backbone, 1/N; 0 for twist
+    partner: np.ndarray  # (nv,) the hinge about the same axis in the other set of the piece
     coupling: np.ndarray  # (nv,) N m/rad
     bends: np.ndarray  # (n_set,) first of the three hinges of each set
     slide: np.ndarray  # (n_set,) slide of each set, or empty
@@ -44,10 +44,12 @@ class Chain(NamedTuple):
     hand: np.ndarray  # (n_set,) 1 where a set's hinges are right-handed, else -1
     body: np.ndarray  # (nv,) the body each joint moves
     mass: np.ndarray  # (nv,) of everything distal of the joint, kg
-    hole: np.ndarray  # (n_tendon, n_hole) sites, base to where the tendons end
+    hole: np.ndarray  # (n_tendon, n_hole) sites, base to where the tendon ends, then that one again
+    pieces: np.ndarray  # (n_tendon,) how many pieces each tendon has, from hole to hole
+    first: np.ndarray  # (n_hole,) how many joints move each hole: piece d lies on joints first[d] to first[d + 1], if any
     disk: np.ndarray  # (n_disk,) sites
+    below: np.ndarray  # (n_disk,) how many joints move each disk
     marker: np.ndarray  # (n_marker,) sites
-    first: np.ndarray  # (n_disk + 1,) first joint of each disk interval
 
 
 class Law(NamedTuple):
@@ -80,23 +82,29 @@ class State(NamedTuple):
 
     T: np.ndarray  # (n_tendon,) base tensions, N
     q: np.ndarray  # (nv,) rad; m of slides
-    z: np.ndarray  # (n_tendon, n_disk) slip states when last at rest
-    s: np.ndarray  # (n_tendon, n_disk) distal tendon lengths then, m; [:, 0], which no hole needs, is dE/dT
+    z: np.ndarray  # (n_tendon, n_piece) slip states when last at rest
+    s: np.ndarray  # (n_tendon, n_piece) distal tendon lengths then, m; [:, 0], which no hole needs, is dE/dT; 0 beyond the end
 
 
 class Laid(NamedTuple):
     """A tendon as it lies, by piece: direction, length (m), the angle it turns at the piece's start (rad), tension (N)."""
 
-    u: np.ndarray  # (n_disk, 3)
-    length: np.ndarray  # (n_disk,)
-    theta: np.ndarray  # (n_disk,)
-    T: np.ndarray  # (n_disk,)
+    u: np.ndarray  # (n_piece, 3)
+    length: np.ndarray  # (n_piece,)
+    theta: np.ndarray  # (n_piece,)
+    T: np.ndarray  # (n_piece,)
 
 
 @inner
 def laid(nd):
     """Room for a tendon of nd pieces."""
     return Laid(np.empty((nd, 3)), np.empty(nd), np.empty(nd), np.empty(nd))
+
+
+@inner
+def shorter(room, nd):
+    """The room for one of nd pieces, in the room for a longer one."""
+    return Laid(room.u[:nd], room.length[:nd], room.theta[:nd], room.T[:nd])
 
 
 @jit
@@ -180,7 +188,7 @@ def wall_force(chain, wall, r, J):
         if gap >= 0.0:
             continue
         f = -stiffness * gap
-        n = chain.first[k + 1]
+        n = chain.below[k]
         X = np.empty((n, 3))
         for i in range(n):
             put(X[i], lever(chain, i, x))
@@ -197,7 +205,7 @@ def wall_force(chain, wall, r, J):
 
 @inner
 def lay(chain, t, tendon, distal):
-    """Lays tendon t: all of `tendon` but its tensions, and what lies beyond the start of each piece, distal (n_disk,) m."""
+    """Lays tendon t: all of `tendon` but its tensions, and what lies beyond the start of each piece, distal (n_piece,) m."""
     u, length, theta = tendon.u, tendon.length, tendon.theta
     nd = length.size
     for d in range(nd):
@@ -229,26 +237,27 @@ def pass_on(tension, law, tendon, z0, s0, s, z):
 @jit
 def balance(at, state, z, s, r, J):
     """Residual r (nv,) in N m and, unless J is empty, its derivative J (nv, nv), of the `state` whose angles are in MuJoCo's data
-    already; returns what the bowing of the pressed backbone takes from each tendon's path (m, negative).
+    already; returns what the bowing of the pressed backbone takes from each tendon's path (n_tendon,) m, negative.
 
-    (z, s) (n_tendon, n_disk) is what slip states and distal lengths become there.
+    (z, s) (n_tendon, n_piece) is what slip states and distal lengths become there.
     """
     chain, law, tension = at.chain, at.law, state.T
-    nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
-    nv, tangent = state.q.size, J.size > 0
-    pressure = 0.0
-    for t in range(nt):
-        pressure += tension[t]
-    bowing = springs(state.q, at.rest, chain, pressure, r, J)
+    nt, nv, tangent = chain.hole.shape[0], state.q.size, J.size > 0
+    bowing = np.zeros(nt)
+    springs(state.q, at.rest, chain, tension, bowing, r, J)
     _add_weight(chain, at.load, r, J)
     if law.wall[4] > 0.0:
         wall_force(chain, law.wall, r, J)
-    tendon, X, dl = laid(nd), np.empty((nv, 3)), np.zeros(nv)
-    u, T = tendon.u, tendon.T
+    room, X, dl = laid(chain.hole.shape[1] - 1), np.empty((nv, 3)), np.zeros(nv)
     for t in range(nt):
+        nd = chain.pieces[t]
+        tendon = shorter(room, nd)
+        u, T = tendon.u, tendon.T
         lay(chain, t, tendon, s[t])
-        s[t, 0] += bowing
+        s[t, 0] += bowing[t]
         pass_on(tension[t], law, tendon, state.z[t], state.s[t], s[t], z[t])
+        for d in range(nd, s.shape[1]):
+            s[t, d] = z[t, d] = 0.0
         for d in range(nd):
             b = chain.site[chain.hole[t, d + 1]]
             for i in range(chain.first[d], chain.first[d + 1]):
@@ -272,7 +281,8 @@ def balance(at, state, z, s, r, J):
 @inner
 def _add_friction(chain, law, tendon, z, X, dl, J):
     """What J gains as the tension that friction leaves changes with the angles: a rank-one block a piece of the tendon."""
-    nv, u, length = dl.size, tendon.u, tendon.length
+    u, length = tendon.u, tendon.length
+    nv = chain.first[length.size]  # joints beyond the tendon's end do not change it
     dlog = np.zeros(nv)  # derivative of sum_{j<=d} z_j turn(theta_j)
     for d in range(1, length.size):
         p, v, theta = u[d - 1], u[d], tendon.theta[d]

@@ -4,15 +4,16 @@ Three successive hinges q turn a set by R = exp(e1 q1) exp(e2 q2) exp(e3 q3); th
 vector phi = log R. Springs on q would make bending in a diagonal plane too stiff by phi^2/12 (0.2 % at 9 degrees, 0.5 mm at the tip
 under 4 N), so the energy is written in phi:
 
-    E = sum_sets 1/2 (phi - phi0)' K (phi - phi0) + sum_intervals 1/2 (D - D0)' K/6 (D - D0),   D = phi_1 - phi_2
+    E = sum_sets 1/2 (phi - phi0)' K (phi - phi0) + sum_pieces 1/2 (D - D0)' K/6 (D - D0),   D = phi_1 - phi_2
 
     K -> K (1 - (P h^2 / EI)^2 / 720)
 
-The second term couples the two sets of a disk interval. Sets at 1/6 and 5/6 carry a curvature that changes linearly along the
-interval with a first moment of 1/9 instead of 1/12; stiffening the antisymmetric bending by 4/3 restores it. The tendons press the
-rod together with P; a bowed interval of length h keeps u cot u = 1 - u^2/3 - u^4/45 ... of its stiffness, u^2 = P h^2 / (4 EI)
-(beam-column theory). Two sets at 1/6 and 5/6 have the second term by their place; the third is the factor on K. Where tendons run
-in channels of the body it cannot bow away from them: neither term applies, and sets may also stretch (hyperelastic.py).
+The second term couples the two sets of a piece of backbone. Sets at 1/6 and 5/6 carry a curvature that changes linearly along the
+piece with a first moment of 1/9 instead of 1/12; stiffening the antisymmetric bending by 4/3 restores it. The tendons that reach
+so far press the rod together with P; a bowed piece of length h keeps u cot u = 1 - u^2/3 - u^4/45 ... of its stiffness, u^2 = P
+h^2 / (4 EI) (beam-column theory). Two sets at 1/6 and 5/6 have the second term by their place; the third is the factor on K.
+Where tendons run in channels of the body it cannot bow away from them: neither term applies, and sets may also stretch
+(hyperelastic.py).
 """
 
 from __future__ import annotations
@@ -81,21 +82,35 @@ def bendings(q, chain, phi, D):
 
 
 @inner
-def springs(q, rest, chain, pressure, r, J):
-    """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv); returns dE/dP (m), which bowing takes from all tendons'
-    lengths. `rest` is phi0 (nv,), `pressure` P the sum of the tendons' tensions (N).
+def press(chain, tension, P):
+    """P (nv,) N at each joint: the tensions of the tendons that reach beyond it."""
+    for i in range(P.size):
+        P[i] = 0.0
+    for t in range(tension.size):
+        for i in range(chain.first[chain.pieces[t]]):
+            P[i] += tension[t]
+
+
+@inner
+def springs(q, rest, chain, tension, bowing, r, J):
+    """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv); to bowing (n_tendon,) dE/dT (m), what bowing takes from
+    each tendon's length. `rest` is phi0 (nv,), `tension` (n_tendon,) N at the base.
     """
     nv, hand, partner, coupling, stiffness = q.size, chain.hand, chain.partner, chain.coupling, chain.stiffness
     bent = Bent(np.empty(nv), np.empty((hand.size, 3, 3)), np.empty(nv), np.empty(nv))
-    phi, D, K, m = bent.phi, bent.D, bent.K, bent.m
+    phi, D, K, m, bowed = bent.phi, bent.D, bent.K, bent.m, np.empty(nv)
     bendings(q, chain, phi, D)
-    bowing = 0.0
+    press(chain, tension, K)
     for i in range(nv):
-        p = partner[i]
-        softer = stiffness[i] * pressure * chain.slender[i] ** 2 / BEAM_COLUMN
-        K[i] = stiffness[i] - softer * pressure
-        bowing -= softer * (phi[i] - rest[i]) ** 2
+        p, P = partner[i], K[i]
+        softer = stiffness[i] * P * chain.slender[i] ** 2 / BEAM_COLUMN
+        K[i] = stiffness[i] - softer * P
+        bowed[i] = softer * (phi[i] - rest[i]) ** 2
         m[i] = K[i] * (phi[i] - rest[i]) + coupling[i] * (phi[i] - rest[i] - phi[p] + rest[p])
+    for t in range(tension.size):
+        bowing[t] = 0.0
+        for i in range(chain.first[chain.pieces[t]]):
+            bowing[t] -= bowed[i]
     if J.size:
         for i in range(nv):
             for k in range(nv):
@@ -107,7 +122,7 @@ def springs(q, rest, chain, pressure, r, J):
         for b in range(3):
             r[o + b] = D[j, 0, b] * m[o] + D[j, 1, b] * m[o + 1] + D[j, 2, b] * m[o + 2]
     if J.size == 0:
-        return bowing
+        return
     phi1, D1, moved = np.empty(3), np.empty((3, 3)), np.empty(3)
     for j in range(hand.size):
         o = chain.bends[j]
@@ -126,8 +141,7 @@ def springs(q, rest, chain, pressure, r, J):
             p = partner[o + c]
             if p == o + c:  # a set without a partner
                 continue
-            other = j ^ 1
+            other = j ^ 1  # of its piece
             for a in range(3):
                 for b in range(3):
                     J[o + a, chain.bends[other] + b] -= D[j, c, a] * coupling[o + c] * D[other, p - chain.bends[other], b]
-    return bowing

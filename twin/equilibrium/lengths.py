@@ -100,8 +100,8 @@ def remember(held, s, tension):
 def pulls(at, z, path_gradient, pull):
     """dpath/dq and dr/dT, (n_tendon, nv) each, at the geometry in MuJoCo's data and committed slip states z."""
     chain, law = at.chain, at.law
-    nt, nd = chain.hole.shape[0], chain.hole.shape[1] - 1
-    for t in range(nt):
+    for t in range(chain.hole.shape[0]):
+        nd = chain.pieces[t]
         wrapped, share = 0.0, 1.0
         before = (0.0, 0.0, 0.0)
         for d in range(nd):
@@ -116,6 +116,8 @@ def pulls(at, z, path_gradient, pull):
             for i in range(chain.first[d], chain.first[d + 1]):
                 path_gradient[t, i] = dot(u, lever(chain, i, b))
                 pull[t, i] = share * path_gradient[t, i]
+        for i in range(chain.first[nd], path_gradient.shape[1]):
+            path_gradient[t, i] = pull[t, i] = 0.0
 
 
 @inner

@@ -210,18 +210,18 @@ def solve(at, state, factors, tol):
 
 @inner
 def commit(at, state, bowing):
-    """Advance slip states and distal lengths to the geometry in MuJoCo's data, `bowing` (m) as before the step: it changes by 1e-3
-    of what the path does."""
+    """Advance slip states and distal lengths to the geometry in MuJoCo's data, `bowing` (n_tendon,) m as before the step: it
+    changes by 1e-3 of what the path does."""
     chain, z, s = at.chain, state.z, state.s
     for t in range(z.shape[0]):
         distal = 0.0
-        for d in range(z.shape[1] - 1, -1, -1):
+        for d in range(chain.pieces[t] - 1, -1, -1):
             a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
             v = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
             distal += np.sqrt(dot(v, v))
             z[t, d] = slip_state(z[t, d], s[t, d] - distal, at.law.presliding)
             s[t, d] = distal
-        s[t, 0] += bowing
+        s[t, 0] += bowing[t]
 
 
 @inner

@@ -92,7 +92,7 @@ class Now(NamedTuple):
     factors: Factors
     held: Held
     sought: Sought
-    straight: np.ndarray  # (n_tendon, n_disk) distal lengths, m
+    straight: np.ndarray  # (n_tendon, n_piece) distal lengths, m
     last: np.ndarray  # (nv,)
     second: np.ndarray  # (nv,) the one before
     T1: np.ndarray  # (n_tendon,)

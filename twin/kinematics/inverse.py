@@ -127,4 +127,6 @@ def _reason(robot: LoadedRobot, tip: np.ndarray, tension: np.ndarray, distance: 
     full = [f"tendon {i + 1}" for i in np.flatnonzero(tension > 0.999 * limit)]
     if full:
         return f"{' and '.join(full)} would need more than the {limit:g} N allowed; {1e3 * distance:.2f} mm are left"
+    if np.ptp(robot.solver.chain.pieces) > 0:
+        return f"no tensions were found that bring the tip nearer than {1e3 * distance:.2f} mm"
     return f"tips lie on a surface, which passes {1e3 * distance:.2f} mm from this point"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
 
+import mujoco
 import numpy as np
 
 from twin.bench import ROOM
@@ -122,16 +123,34 @@ class LoadedRobot:
         return out * self.softness
 
     @cached_property
+    def levers(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lever arms (n_tendon, 2) m towards x and y: by which a bend that is the same all along the robot shortens each tendon,
+        int r ds / L, and by which each tendon's pull moves the tip, 2 int (L - s) r ds / L^2, r(s) its place on the straight robot.
+
+        Those of a straight tendon that runs to the tip are its hole's place; those of a helical one are not.
+        """
+        c, L = self.solver, self.length
+        data = mujoco.MjData(c.model)
+        mujoco.mj_kinematics(c.model, data)
+        holes = data.site_xpos[c.chain.hole]  # (n_tendon, n_hole, 3); a shorter tendon's last one stands again: pieces of no length
+        s, r = holes[..., 2], holes[..., :2]
+        ds, middle = np.diff(s)[..., None], 0.5 * (s[:, 1:] + s[:, :-1])[..., None]
+        mean, bent = 0.5 * (r[:, 1:] + r[:, :-1]), (r[:, 1:] - r[:, :-1]) * np.diff(s)[..., None] / 12.0
+        shortens = (mean * ds).sum(axis=1) / L
+        moves = 2.0 * ((mean * (L - middle) - bent) * ds).sum(axis=1) / L**2
+        return shortens, moves
+
+    @cached_property
     def directions(self) -> np.ndarray:
-        """Where each tendon's hole lies at the base (n_tendon,), rad from +x towards +y in [0, 2 pi): it bends the robot there."""
-        holes = self.solver.chain.site[self.solver.chain.hole[:, 0]]
-        return np.mod(np.arctan2(holes[:, 1], holes[:, 0]) + 1e-9, 2 * np.pi)
+        """Where each tendon moves the tip (n_tendon,), rad from +x towards +y in [0, 2 pi)."""
+        moves = self.levers[1]
+        return np.mod(np.arctan2(moves[:, 1], moves[:, 0]) + 1e-9, 2 * np.pi)
 
     @cached_property
     def pull_per_bend(self) -> float:
         """The tension (N/rad) one tendon needs for a bend of constant curvature: EI / (length * lever arm)."""
         chain = self.solver.chain
-        lever = float(np.linalg.norm(chain.site[chain.hole[0, 0], :2]))
+        lever = float(np.linalg.norm(self.levers[1], axis=1).mean())
         # Two hinges a joint set, K = EI / h; the sets are springs in a row.
         bends = chain.stiffness[(chain.hinge > 0.0) & ~chain.twists]
         return 1.0 / float((1.0 / bends[::2]).sum()) / lever

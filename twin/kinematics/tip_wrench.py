@@ -18,9 +18,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from twin.effects import Loads
-from twin.errors import SolveError
+from twin.errors import DataError, SolveError
 from twin.quantities import Values, each
 from twin.robots import Robot
+from twin.robots.continuum_schema import ROUND, Continuum, disk_masses, hole_places
 
 TOLERANCE = 1e-8  # of the integration, m and rad
 
@@ -28,18 +29,22 @@ TOLERANCE = 1e-8  # of the integration, m and rad
 def tip_wrench(robot: Robot, tension: np.ndarray, loads: Loads, values: Values | None = None) -> np.ndarray:
     """Backbone positions (n_disk, 3) m at the disks under base tensions (n_tendon,) N.
 
-    Raises SolveError where shooting finds no moment at the base.
+    Raises DataError for a robot that is no round wire with straight tendons to its tip, SolveError where shooting finds no
+    moment at the base.
     """
     v = {p.name: p.value for p in robot.parameters} | dict(values or {})
-    s = np.cumsum(each(v, "disks.pitch", int(robot.structure["disks"])))  # type: ignore[call-overload]
+    shape = Continuum.model_validate(dict(robot.structure))
+    places = hole_places(shape, v)
+    if not shape.kinds() >= ROUND or min(shape.ends()) < shape.disks or any(np.ptp(x, axis=1).any() for x in places):
+        raise DataError(f"the tip-wrench rod is a round wire with straight tendons to its tip; robot {robot.name!r} is another")
+    s = np.cumsum(each(v, "disks.pitch", shape.disks))
     length = float(s[-1])
     bending = v["backbone.youngs_modulus"] * math.pi * v["backbone.radius"] ** 4 / 4.0
     stiffness = np.array([bending, bending, bending / (1.0 + v["backbone.poisson_ratio"])])
-    angle = each(v, "tendons.angle", robot.n_tendon)
-    pull = np.asarray(tension, float) * v["tendons.radius"]
+    pull, angle = np.asarray(tension, float) * places[0][:, 0], places[1][:, 0]
     moment = np.array([-(pull * np.sin(angle)).sum(), (pull * np.cos(angle)).sum(), 0.0])
     at_tip = loads.payload * loads.gravity + loads.force
-    weight = (v["backbone.mass"] + v["disks.mass"]) * loads.gravity
+    weight = (v["backbone.mass"] + disk_masses(v, shape.disks).sum()) * loads.gravity
 
     def slope(x: float, y: np.ndarray) -> np.ndarray:
         R, m = y[3:12].reshape(3, 3), y[12:]

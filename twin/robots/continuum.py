@@ -1,14 +1,18 @@
 """A slender elastic backbone pulled by tendons through holes, as a chain of MuJoCo joints.
 
-Each interval between two disks has two joint sets (backbone.py says where and how stiff). A set is three hinges with stiffness
-EI/h, EI/h, GJ/h, h half the interval; the order of the two bending hinges alternates from set to set, because three
+Each piece of the backbone between two disks has two joint sets (backbone.py says where and how stiff). A set is three hinges with
+stiffness EI/h, EI/h, GJ/h, h half the piece; the order of the two bending hinges alternates from set to set, because three
 successive rotations in one fixed order bend unequally in 3D. A body that stretches has a slide of stiffness EA/h beside them.
+
+A tendon runs straight from hole to hole and ends where it enters its last disk. A thick disk has its hole from face to face, along
+its axis; the tendon turns at both.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -19,13 +23,15 @@ from twin.equilibrium import Equilibrium
 from twin.hinges import HingeChain, JointSet
 from twin.quantities import each
 from twin.robots.backbone import BODIES, Backbone, Piece
-from twin.robots.continuum_schema import SCHEMA, Continuum
+from twin.robots.continuum_schema import SCHEMA, Continuum, disk_masses, hole_places
 
 __all__ = ["SCHEMA", "build", "dynamics", "statics"]
 
 ALUMINIUM = [0.72, 0.74, 0.78, 1.0]
 NITI = [0.35, 0.38, 0.44, 1.0]
 TIMESTEP = 1e-3  # s
+LEAST_INERTIA = 1e-14  # kg m^2: MuJoCo takes none below 1e-15; a millionth of a small disk's
+THINNEST = 1.5e-3  # m, of a disk's picture
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HingeChain:
@@ -35,15 +41,14 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Hinge
     What `structure` and `values` hold is in continuum_schema.py.
     """
     shape = Continuum.model_validate(dict(structure))
-    n_disk, n_tendon, end = shape.disks, shape.tendons, shape.tendons_end or shape.disks
-    on_disk = None if shape.markers == "disk" else list(shape.markers)
+    n_disk, n_tendon = shape.disks, shape.tendons
     disk_z = np.concatenate([[0.0], np.cumsum(each(values, "disks.pitch", n_disk))])
     length = float(disk_z[-1])
-    backbone = BODIES[shape.body](values, disk_z)
+    backbone = BODIES[shape.body](values, disk_z, shape.divided())
+    disks = _disks(shape, values, disk_z)
     spec = _world()
-    angles = list(each(values, "tendons.angle", n_tendon))
-    tendons = [[f"tendon_{i}_hole_{k}" for k in range(end + 1)] for i in range(1, n_tendon + 1)]
-    _drill(spec.worldbody, backbone.hole_radius(0.0), angles, 0, 0.0)
+    tendons: list[list[str]] = [[] for _ in range(n_tendon)]
+    _drill(spec.worldbody, disks[0], 0.0, tendons)
     plate = 1.3 * (values["disks.radius"] if not backbone.in_channels else backbone.radius(0.0))
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[plate, 1.5e-3, 0], pos=[0, 0, -1.5e-3],
@@ -55,22 +60,28 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Hinge
         z = piece.place
         body = parent.add_body(name=f"link_{j + 1}", pos=[0, 0, z - before])
         joints.append(_joint_set(body, j, piece, length, backbone, values["damping.time"]))
-        disk = j // 2 + 1 if j % 2 else None
-        _add_mass(body, piece, float(disk_z[disk]) if disk else None, backbone, values, n_disk, first=j == 0)
+        disk = disks[piece.disk] if piece.disk is not None else None
+        _add_mass(body, piece, disk if not backbone.in_channels else None, backbone, first=j == 0)
         if disk is not None:
-            at = float(disk_z[disk] - z)
-            if disk <= end:
-                _drill(body, backbone.hole_radius(float(disk_z[disk])), angles, disk, at)
-            body.add_site(name=f"disk_{disk}_centre", pos=[0, 0, at], size=[5e-4, 0, 0])
-            for name, offset in _glued(shape, disk, values):
+            at = disk.z - z
+            _drill(body, disk, at, tendons)
+            body.add_site(name=f"disk_{disk.number}_centre", pos=[0, 0, at], size=[5e-4, 0, 0])
+            for name, offset in _glued(shape, disk.number, values):
                 body.add_site(name=name, pos=[*offset[:2], at + offset[2]], size=[1.2e-3, 0, 0], rgba=[0.9, 0.2, 0.2, 1])
         parent, before = body, z
     for i, sites in enumerate(tendons, 1):
         _thread(spec, i, sites)
-    markers = (
-        [f"disk_{k}" for k in range(1, n_disk + 1)] if on_disk is None else [f"marker_{m}" for m in range(1, len(on_disk) + 1)]
-    )
-    tip = f"disk_{n_disk}" if on_disk is None else f"disk_{n_disk}_centre"
+    return _named(shape, values, spec, tuple(joints), tuple(tuple(s) for s in tendons), length)
+
+
+def _named(
+    shape: Continuum, values: Mapping[str, float], spec: mujoco.MjSpec, joints: tuple[JointSet, ...],
+    tendons: tuple[tuple[str, ...], ...], length: float,
+) -> HingeChain:  # fmt: skip
+    """The body of a finished model, with the names of all that is in it."""
+    n_disk, n_tendon, listed = shape.disks, shape.tendons, shape.markers != "disk"
+    markers = [f"marker_{m}" for m in range(1, len(shape.markers) + 1)] if listed else [f"disk_{k}" for k in range(1, n_disk + 1)]
+    tip = f"disk_{n_disk}_centre"
     return HingeChain(
         spec=spec,
         n_tendon=n_tendon,
@@ -80,15 +91,45 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Hinge
         drives=tendon_ports(n_tendon, values.get("springs.resistance", 1.0)),
         senses=tendon_senses(n_tendon) | marker_senses([*markers, "tip"]),
         frame=Frame.of(values),
-        joints=tuple(joints),
-        tendons=tuple(tuple(s) for s in tendons),
-        markers=(*markers, tip),
+        joints=joints,
+        tendons=tendons,
+        markers=(*markers, tip if listed else f"disk_{n_disk}"),
         disks=tuple(f"disk_{k}_centre" for k in range(1, n_disk + 1)),
-        tip=f"disk_{n_disk}_centre",
+        tip=tip,
         length=length,
-        bows=not backbone.in_channels,
+        bows=shape.body == "wire",
         stiffening=values.get("backbone.stiffening", 0.0),
     )
+
+
+@dataclass(frozen=True)
+class _Disk:
+    """A disk (the base plate is number 0): its centre, mass, outer radius and thickness (SI), and by tendon the place (x, y) of its
+    hole and whether it goes on beyond, None where it ended before."""
+
+    number: int
+    z: float
+    mass: float
+    radius: float
+    thickness: float
+    holes: list[tuple[float, float, bool] | None]
+
+
+def _disks(shape: Continuum, values: Mapping[str, float], disk_z: np.ndarray) -> list[_Disk]:
+    n, wire = shape.disks, shape.body == "wire"
+    mass, thickness = np.zeros(n + 1), np.zeros(n + 1)
+    if wire:
+        mass[1:], thickness[1:] = disk_masses(values, n), each(values, "disks.thickness", n)
+    radius, angle = hole_places(shape, values)
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    ends, rim = shape.ends(), values.get("disks.radius", 0.0)
+    return [
+        _Disk(
+            k, float(disk_z[k]), float(mass[k]), rim, float(thickness[k]),
+            [(float(x[t, k]), float(y[t, k]), k < end) if k <= end else None for t, end in enumerate(ends)],
+        )
+        for k in range(n + 1)
+    ]  # fmt: skip
 
 
 def _glued(shape: Continuum, disk: int, values: Mapping[str, float]) -> list[tuple[str, list[float]]]:
@@ -116,7 +157,7 @@ def _joint_set(body: mujoco.MjsBody, j: int, piece: Piece, length: float, backbo
     kinds = (*hinges, *slide) if j % 2 == 0 else (*slide, *hinges)  # slides in the link between: hinges stay at their holes
     names = {kind: f"{kind}_{j + 1}" for kind in kinds}
     axes = {"bend_x": [1, 0, 0], "bend_y": [0, 1, 0], "twist": [0, 0, 1], "slide": [0, 0, 1]}
-    each = {"bend_x": stiffness.bend, "bend_y": stiffness.bend, "twist": stiffness.twist, "slide": stiffness.stretch}
+    each = {"bend_x": stiffness.bend_x, "bend_y": stiffness.bend_y, "twist": stiffness.twist, "slide": stiffness.stretch}
     for kind, name in names.items():
         shape = mujoco.mjtJoint.mjJNT_SLIDE if kind == "slide" else mujoco.mjtJoint.mjJNT_HINGE
         joint = body.add_joint(name=name, type=shape, axis=axes[kind])
@@ -127,37 +168,41 @@ def _joint_set(body: mujoco.MjsBody, j: int, piece: Piece, length: float, backbo
     )
 
 
-def _add_mass(
-    body: mujoco.MjsBody, piece: Piece, disk_z: float | None, backbone: Backbone, values: Mapping[str, float], n_disk: int,
-    *, first: bool,
-) -> None:  # fmt: skip
+def _add_mass(body: mujoco.MjsBody, piece: Piece, disk: _Disk | None, backbone: Backbone, *, first: bool) -> None:
     """The link's piece of backbone and, where it carries one, its disk, as one inertia about their common centre."""
     start, end = piece.tail - piece.place, piece.head - piece.place
     span, middle = end - start, 0.5 * (start + end)
     own, radius = backbone.mass(piece.tail, piece.head), backbone.radius(0.5 * (piece.tail + piece.head))
     parts = [(own, middle, own * (span**2 / 12.0 + radius**2 / 4.0), 0.5 * own * radius**2)]  # m, z, Ixx, Izz
-    if disk_z is not None and not backbone.in_channels:
-        m, r, at = values["disks.mass"] / n_disk, values["disks.radius"], disk_z - piece.place
-        parts.append((m, at, m * r**2 / 4.0, m * r**2 / 2.0))
+    if disk is not None:
+        m, r, at = disk.mass, disk.radius, disk.z - piece.place
+        parts.append((m, at, m * (r**2 / 4.0 + disk.thickness**2 / 12.0), m * r**2 / 2.0))
         body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[r, 7.5e-4, 0], pos=[0, 0, at],
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[r, 0.5 * max(disk.thickness, THINNEST), 0], pos=[0, 0, at],
             rgba=ALUMINIUM, contype=0, conaffinity=0, mass=0,
         )  # fmt: skip
     mass = sum(p[0] for p in parts)
     centre = sum(p[0] * p[1] for p in parts) / mass
-    across = sum(p[2] + p[0] * (p[1] - centre) ** 2 for p in parts)
+    across = max(LEAST_INERTIA, sum(p[2] + p[0] * (p[1] - centre) ** 2 for p in parts))
     body.mass, body.ipos, body.explicitinertial = mass, [0, 0, centre], True
-    body.inertia = [across, across, sum(p[3] for p in parts)]
+    body.inertia = [across, across, max(LEAST_INERTIA, sum(p[3] for p in parts))]
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0], fromto=[0, 0, -piece.place if first else start, 0, 0, end],
         rgba=NITI, contype=0, conaffinity=0, mass=0,
     )  # fmt: skip
 
 
-def _drill(body: mujoco.MjsBody, radius: float, angles: list[float], disk: int, z: float) -> None:
-    for i, angle in enumerate(angles, 1):
-        at = [radius * math.cos(angle), radius * math.sin(angle), z]
-        body.add_site(name=f"tendon_{i}_hole_{disk}", pos=at, size=[5e-4, 0, 0])
+def _drill(body: mujoco.MjsBody, disk: _Disk, z: float, tendons: list[list[str]]) -> None:
+    """The disk's holes, at height z of its link, as sites, each added to its tendon's: one, in a thick disk one at either face."""
+    half = 0.5 * disk.thickness
+    for i, hole in enumerate(disk.holes, 1):
+        if hole is None:
+            continue
+        x, y, goes_on = hole
+        for suffix, at in (("", -half), ("_far", half)) if half > 0.0 and goes_on else (("", -half),):
+            name = f"tendon_{i}_hole_{disk.number}{suffix}"
+            body.add_site(name=name, pos=[x, y, z + at], size=[5e-4, 0, 0])
+            tendons[i - 1].append(name)
 
 
 def _thread(spec: mujoco.MjSpec, i: int, sites: list[str]) -> None:

@@ -15,9 +15,12 @@ from twin.robots.spring_rows import SPRINGS, spring_objections
 
 Disk = Annotated[int, Field(ge=1, le=200)]
 WIRE, CAST = frozenset({'body = "wire"'}), frozenset({'body = "cast"'})
+ROUND, OTHER = frozenset({'section = "round"'}), frozenset({'section = "other"'})
 ON_DISKS, LISTED = frozenset({'markers = "disk"'}), frozenset({"markers = [disk, ...]"})
+LEAST_FREE = 0.02  # of a pitch: disks that all but touch are no backbone
 MISMATCH = 5e-3  # of the length: how far pitches written with three digits may add up to something else
 FULL_TURN = 2.0 * np.pi
+MOST_SETS = 400  # joint sets of a robot: a tangent of 1,200 by 1,200, factorised in tenths of a second
 
 
 class Continuum(Structure):
@@ -27,9 +30,20 @@ class Continuum(Structure):
         "wire",
         description='"wire": a slender rod through disks that does not stretch; "cast": elastomer around its tendons, which does',
     )
+    section: Literal["round", "other"] = Field(
+        "round",
+        description='of the wire: "round", which bends alike in all directions, or "other", described by its stiffnesses',
+    )
     disks: Disk = Field(description="how many disks (of a cast body: places where the tendons' channels are followed)")
     tendons: Annotated[int, Field(ge=1, le=24)] = Field(description="how many tendons")
-    tendons_end: Disk | None = Field(None, description="the disk at which all tendons end; left out: the last")
+    tendons_end: Disk | list[Disk] | None = Field(
+        None, description="the disk at which all tendons end, or a list of one a tendon (segments); left out: the last"
+    )
+    pieces: Annotated[int, Field(ge=1, le=20)] | list[Annotated[int, Field(ge=1, le=20)]] = Field(
+        1,
+        description="of the wire: how many pieces each disk interval is divided into, or a list of one a disk. A piece has two "
+        "joint sets; where one bends by half a radian the tip is off by 0.2 % of the length",
+    )
     markers: Literal["disk"] | list[Disk] = Field(
         "disk",
         description='"disk": a marker disk_K in the centre of every disk; or a list of disks that carry marker_1, marker_2, ...',
@@ -39,15 +53,49 @@ class Continuum(Structure):
         return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers)}
 
     def kinds(self) -> frozenset[str]:
-        return (WIRE if self.body == "wire" else CAST) | (ON_DISKS if self.markers == "disk" else LISTED)
+        body = CAST if self.body == "cast" else WIRE | (ROUND if self.section == "round" else OTHER)
+        return body | (ON_DISKS if self.markers == "disk" else LISTED)
+
+    def ends(self) -> list[int]:
+        """The disk at which each tendon ends."""
+        if isinstance(self.tendons_end, list):
+            return self.tendons_end
+        return [self.tendons_end or self.disks] * self.tendons
+
+    def divided(self) -> list[int]:
+        """Into how many pieces each disk interval is divided."""
+        return self.pieces if isinstance(self.pieces, list) else [self.pieces] * self.disks
 
     def objections(self) -> list[str]:
         out = []
-        if self.tendons_end is not None and self.tendons_end > self.disks:
-            out.append(f"structure: tendons_end is {self.tendons_end}; a disk from 1 to {self.disks} is needed")
+        if len(self.ends()) != self.tendons or max(self.ends()) > self.disks:
+            one = f"a disk from 1 to {self.disks} is needed, or a list of {self.tendons}, one a tendon"
+            out.append(f"structure: tendons_end is {self.tendons_end}; {one}")
         if self.markers != "disk" and not (self.markers and max(map(int, self.markers)) <= self.disks):
             out.append(f'structure: markers is {self.markers}; "disk" or a list of disks from 1 to {self.disks} is needed')
+        if len(self.divided()) != self.disks or 2 * sum(self.divided()) > MOST_SETS:
+            most = f"not more than {MOST_SETS // 2} pieces together"
+            out.append(f"structure: pieces is {self.pieces}; a number is needed, or a list of {self.disks}, one a disk, {most}")
+        if self.body == "cast":
+            if self.section != "round":
+                out.append('structure: section is "other" and body is "cast"; a cast body is round here, leave section out')
+            if max(self.divided()) > 1:
+                out.append("structure: pieces is of a wire; divide a cast body by more disks, which its channels then follow")
         return out
+
+
+def hole_places(structure: Continuum, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Distance from the axis (m) and angle (rad) of all holes, (n_tendon, n_disk + 1) each, the base plate's first."""
+    n, nt = structure.disks, structure.tendons
+    at = np.concatenate([[0.0], np.cumsum(each(values, "disks.pitch", n))])
+    outward, turn = (np.pad(each(values, f"holes.{key}", nt, n), ((0, 0), (1, 0))) for key in ("outward", "turn"))
+    radius = values["tendons.radius"] + values.get("tendons.slope", 0.0) * at
+    return radius + outward, each(values, "tendons.angle", nt)[:, None] + turn
+
+
+def disk_masses(values: Mapping[str, float], n: int) -> np.ndarray:
+    """Of n disks (n,) kg."""
+    return np.full(n, values["disks.mass"] / n) if "disks.mass" in values else each(values, "disks.mass", n)
 
 
 def objections(structure: Continuum, values: Mapping[str, float]) -> list[str]:
@@ -55,23 +103,43 @@ def objections(structure: Continuum, values: Mapping[str, float]) -> list[str]:
     out = []
     pitch = each(values, "disks.pitch", structure.disks)
     z = np.concatenate([[0.0], np.cumsum(pitch)])
-    end = z[structure.tendons_end or structure.disks]
     stated = values.get("backbone.length")  # checked only: what the robot is built from are the pitches
     if stated is not None and abs(stated - z[-1]) > MISMATCH * z[-1]:
         out.append(f"backbone.length is {1e3 * stated:g} mm and the pitches add up to {1e3 * z[-1]:g} mm; correct one of them")
+    radius = hole_places(structure, values)[0]
+    used = [(radius[t, k], t + 1, k) for t, end in enumerate(structure.ends()) for k in range(end + 1)]
     if structure.body == "wire":
-        hole, rim, wire = values["tendons.radius"], values["disks.radius"], values["backbone.radius"]
-        if not wire < hole <= rim:
-            out.append(
-                f"tendons.radius is {1e3 * hole:g} mm; holes lie between the backbone ({1e3 * wire:g} mm) and the rim of the "
-                f"disks (disks.radius, {1e3 * rim:g} mm)"
-            )
+        out += _wire_objections(structure, values, used, pitch)
     else:
-        out += _cast_objections(values, z, end)
+        out += _cast_objections(values, z, min(used)[0])
     return out + spring_objections(values)
 
 
-def _cast_objections(values: Mapping[str, float], z: np.ndarray, end: float) -> list[str]:
+def _wire_objections(
+    structure: Continuum, values: Mapping[str, float], used: list[tuple[float, int, int]], pitch: np.ndarray
+) -> list[str]:
+    out = []
+    rim, wire = values["disks.radius"], values["backbone.radius"]
+    for hole, t, k in (min(used), max(used)):
+        if not wire < hole <= rim:
+            apart = any(name.startswith("holes.outward_") for name in values)
+            which = f"the hole of tendon {t} at {f'disk {k}' if k else 'the base plate'} lies at" if apart else "tendons.radius is"
+            out.append(
+                f"{which} {1e3 * hole:g} mm; holes lie between the backbone ({1e3 * wire:g} mm) and the rim of the "
+                f"disks (disks.radius, {1e3 * rim:g} mm)"
+            )
+            break
+    thickness = np.concatenate([[0.0], each(values, "disks.thickness", structure.disks)])
+    free = pitch - 0.5 * (thickness[:-1] + thickness[1:])
+    if free.min() < LEAST_FREE * pitch[k := int(free.argmin())]:
+        out.append(
+            f"disks.thickness leaves {1e3 * free[k]:g} mm of the {1e3 * pitch[k]:g} mm before disk {k + 1} free to bend; "
+            "thinner disks or a longer disks.pitch are needed"
+        )
+    return out
+
+
+def _cast_objections(values: Mapping[str, float], z: np.ndarray, nearest: float) -> list[str]:
     out = []
     n, m = (sum(name.startswith(f"backbone.{key}_") for name in values) for key in ("station", "radius"))
     if n != m:
@@ -84,9 +152,12 @@ def _cast_objections(values: Mapping[str, float], z: np.ndarray, end: float) -> 
             f"backbone.station runs from {1e3 * at[0]:g} to {1e3 * at[-1]:g} mm; the body, from 0 to the sum of the pitches, "
             f"{1e3 * z[-1]:g} mm, must lie between"
         )
-    if values["tendons.radius"] + values["tendons.slope"] * end <= 0.0:
-        out.append("tendons.radius + tendons.slope s falls to zero before the tendons' end")
+    if nearest <= 0.0:
+        out.append("tendons.radius + tendons.slope s + holes.outward falls to zero before the tendons' end")
     return out
+
+
+ROD = (1e-10, 1e4)  # N m^2: a carbon fibre to a steel pipe of 10 cm
 
 
 @dataclass(frozen=True)
@@ -102,8 +173,9 @@ class _Rows:
         return replace(Row(name, si, usual or si, meaning, low, high, only=self.only, shape=self.shape), **more)  # type: ignore[arg-type]
 
 
-_all, _wire, _cast = _Rows(), _Rows(WIRE), _Rows(CAST)
+_all, _wire, _cast, _round, _other = _Rows(), _Rows(WIRE), _Rows(CAST), _Rows(ROUND), _Rows(OTHER)
 _disk, _tendon, _station = _Rows(shape=("disk",)), _Rows(shape=("tendon",)), _Rows(CAST, ("station",))
+_on_wire, _hole = _Rows(WIRE, ("disk",)), _Rows(shape=("tendon", "disk"))
 _glued = _Rows(LISTED, ("marker",))
 ROWS = (
     _wire.row(
@@ -114,11 +186,21 @@ ROWS = (
         10.0,
         stated=True,
     ),
-    _wire.row("backbone.radius", "m mm", "radius of the wire, in the middle of its length", 1e-5, 0.1),
-    _wire.row("backbone.mass", "kg g", "mass of the whole wire", 1e-6, 10.0),
-    _all.row("backbone.youngs_modulus", "Pa GPa", "Young's modulus E of the backbone (of a cast body at small strain)", 1e3, 2e12),
-    _wire.row("backbone.poisson_ratio", "1", "Poisson's ratio nu; enters the stiffness in twist, G = E / (2 (1 + nu))", -0.99, 0.5),
     _wire.row(
+        "backbone.radius",
+        "m mm",
+        "radius of the wire, in the middle of its length (other sections: of pictures and inertia)",
+        1e-5,
+        0.1,
+    ),
+    _wire.row("backbone.mass", "kg g", "mass of the whole wire", 1e-6, 10.0),
+    _Rows(ROUND | CAST).row(
+        "backbone.youngs_modulus", "Pa GPa", "Young's modulus E of the backbone (of a cast body at small strain)", 1e3, 2e12
+    ),
+    _round.row(
+        "backbone.poisson_ratio", "1", "Poisson's ratio nu; enters the stiffness in twist, G = E / (2 (1 + nu))", -0.99, 0.5
+    ),
+    _round.row(
         "backbone.radius_taper",
         "1",
         "(radius at the base - radius at the tip) / radius; above zero: thinner towards the tip",
@@ -126,6 +208,16 @@ ROWS = (
         1.0,
         default=0.0,
     ),
+    *(
+        _other.row(
+            f"backbone.bending_{a}",
+            "N*m^2 N*mm^2",
+            f"bending stiffness EI about {a}: against bends in the plane of z and {b}",
+            *ROD,
+        )
+        for a, b in ("xy", "yx")
+    ),
+    _other.row("backbone.twisting", "N*m^2 N*mm^2", "stiffness GJ in twist", *ROD),
     _station.row(
         "backbone.station",
         "m mm",
@@ -137,10 +229,20 @@ ROWS = (
     _station.row("backbone.radius", "m mm", "outer radius of the body at each station", 1e-5, 1.0, for_all=False),
     _cast.row("backbone.density", "kg/m^3", "density of the cast material", 10.0, 3e4),
     _cast.row("backbone.stiffening", "1", "law of the elastomer: from 0, Hooke's, to 1, neo-Hookean", 0.0, 1.0, default=0.0),
-    _wire.row("disks.mass", "kg g", "mass of all disks together, spread evenly over them", 1e-6, 100.0),
+    _on_wire.row(
+        "disks.mass", "kg g", "mass of each disk; one number alone is that of all disks together, spread evenly", 1e-6, 100.0
+    ),
     _wire.row("disks.radius", "m mm", "outer radius of the disks; enters rotary inertia and pictures", 1e-4, 1.0),
     _disk.row(
         "disks.pitch", "m mm", "distance of each disk from the one before, base to tip; the first from the base plate", 1e-4, 1.0
+    ),
+    _on_wire.row(
+        "disks.thickness",
+        "m mm",
+        "thickness of each disk, its centre where the pitches say; the wire bends between disks only, tendons pass them straight",
+        0.0,
+        1.0,
+        default=0.0,
     ),
     _all.row(
         "tendons.radius", "m mm", "distance of the holes' centres from the backbone's axis (of a cast body at the base)", 1e-4, 1.0
@@ -160,6 +262,22 @@ ROWS = (
         -2 * FULL_TURN,
         2 * FULL_TURN,
         for_all=False,
+    ),
+    _hole.row(
+        "holes.turn",
+        "rad deg",
+        "angle of a tendon's hole in a disk beyond `tendons.angle`; a helical tendon's grows from disk to disk",
+        -10 * FULL_TURN,
+        10 * FULL_TURN,
+        default=0.0,
+    ),
+    _hole.row(
+        "holes.outward",
+        "m mm",
+        "how much farther from the axis than `tendons.radius` it is; below zero: closer, as of tendons that converge",
+        -1.0,
+        1.0,
+        default=0.0,
     ),
     _Rows(ON_DISKS, ("disk",)).row(
         "markers.axial_offset",
@@ -216,6 +334,9 @@ PICTURE = """\
       o----> z  |            |                  |
      y towards you: angles run from +x towards +y. The straight robot lies along +z.
      Gravity is a vector in this frame: a robot that hangs has [0, 0, 9.81].
+     A tendon's holes differ from disk to disk by holes.turn and holes.outward: two tendons through four disks, the first a helix
+     of 30 degrees a disk, the second straight, have holes.turn = [[30, 60, 90, 120], [0, 0, 0, 0]] deg.
+     A robot of two segments: tendons_end = [4, 4, 4, 8, 8, 8]; beyond disk 4 only the last three tendons pull.
      Tension is positive; displacement is positive where a tendon is pulled in at the base.
 """
 

@@ -1,4 +1,4 @@
-"""The numbers a silicone finger is described by, in the order of its signal: body, silicone, tendons, sensors, mounting, markers."""
+"""The numbers a silicone finger is described by, in the order of its signal: body, silicone, tendons, sensors, markers."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ def objections(structure: Soft, values: Mapping[str, float]) -> list[str]:
     for kind in ("tendons", "sensors"):
         start, end = values[f"{kind}.start"], values[f"{kind}.end"]
         if not start < end <= length:
-            out.append(f"{kind} run from {1e3 * start:g} to {1e3 * end:g} mm; a rising way within the body ({1e3 * length:g} mm) is needed")
+            out.append(
+                f"{kind} run from {1e3 * start:g} to {1e3 * end:g} mm; a rising way within the body ({1e3 * length:g} mm) is needed"
+            )
         for height, name in ((start, "radius_start"), (end, "radius_end")):
             skin = base + (tip - base) * height / length
             if values[f"{kind}.{name}"] > skin:
@@ -66,7 +68,16 @@ ROWS = (
     Row("silicone.youngs_modulus", "Pa", "kPa", "Young's modulus E at small strain (neo-Hookean)", 1e3, 1e8),
     Row("silicone.poisson_ratio", "1", "1", "Poisson's ratio nu; silicone hardly changes its volume", 0.4, 0.498),
     Row("silicone.density", "kg/m^3", "kg/m^3", "density", 500.0, 3000.0),
-    Row("tendons.azimuth", "rad", "deg", "angle of each tendon about the axis, from x towards y", -TURN, TURN, ("tendon",), for_all=False),
+    Row(
+        "tendons.azimuth",
+        "rad",
+        "deg",
+        "angle of each tendon about the axis, from x towards y",
+        -TURN,
+        TURN,
+        ("tendon",),
+        for_all=False,
+    ),
     Row("tendons.start", "m", "mm", "height of the tendons' first point", 0.0, 1.0),
     Row("tendons.end", "m", "mm", "height of their last", 1e-3, 1.0),
     Row("tendons.radius_start", "m", "mm", "distance from the axis of the first point", 1e-4, 0.2),
@@ -89,7 +100,9 @@ ROWS = (
         TURN,
         default=0.0,
     ),
-    Row("markers.azimuth", "rad", "deg", "angle of each marker on the skin about the axis", -TURN, TURN, ("marker",), for_all=False),
+    Row(
+        "markers.azimuth", "rad", "deg", "angle of each marker on the skin about the axis", -TURN, TURN, ("marker",), for_all=False
+    ),
     Row("markers.height", "m", "mm", "height of each marker on the skin", 0.0, 1.0, ("marker",), for_all=False),
 )
 

@@ -55,7 +55,7 @@ def unpulled(cables: Cables) -> Pulled:
 @jit
 def follow(cables, u, before, mu, presliding, out):
     """Fill `out` for nodal displacements u (n_free, 3) m, slip as it was `before`."""
-    nt, points, free = cables.weights.shape
+    nt, points, _ = cables.weights.shape
     for t in range(nt):
         x = cables.rest[t] + np.dot(cables.weights[t], u)
         out.length[t] = 0.0

@@ -12,13 +12,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import get_lapack_funcs
 
 from twin.soft.cables import Cables, Pulled, Slip, follow, geometric, sticking, unpulled
 from twin.soft.neighbour import Room
 from twin.soft.silicone import LEAST, Cells, Tangent, forces, stiffness
 from twin.soft.wall import Skin, press
 
+getrf, getrs, getri = get_lapack_funcs(("getrf", "getrs", "getri"), dtype=np.float64)
 STEPS = 60
 LONGEST = 6e-3  # m, of a step at any node
 KEPT = 0.3  # a tangent is kept while a step leaves less than this share of the step before it
@@ -80,7 +81,14 @@ class Solid:
         """Undeformed, without tension."""
         u, nt = np.zeros((self.cables.weights.shape[2], 3)), len(self.cables.rest)
         shape = Shape(u, np.zeros(nt), self.pulled.slip)
-        follow(self.cables, u, Slip(np.zeros_like(self.pulled.slip.state), np.full_like(self.pulled.slip.beyond, 1e9)), 0.0, 1.0, self.pulled)
+        follow(
+            self.cables,
+            u,
+            Slip(np.zeros_like(self.pulled.slip.state), np.full_like(self.pulled.slip.beyond, 1e9)),
+            0.0,
+            1.0,
+            self.pulled,
+        )
         shape.slip = Slip(np.zeros_like(self.pulled.slip.state), self.pulled.slip.beyond.copy())
         return shape
 
@@ -89,7 +97,7 @@ class Solid:
         return Room(self._f, self._p, self._whole, np.empty((1, 1)), self.pulled)
 
     def settle(self, shape: Shape, pull: Pull, burden: Burden, *, close: float = CLOSE, once: bool = False) -> bool:
-        """Bring `shape` to equilibrium; with `once` by the one step its factors give. False, and `shape` as it was, where it is lost."""
+        """Bring `shape` to equilibrium; with `once` by the one step its factors give. False, and as it was, where it is lost."""
         u, T, LU = shape.u.copy(), np.where(pull.held, shape.tension, pull.tension), shape.LU
         foreseen: np.ndarray | None = None
         last = np.inf
@@ -135,13 +143,13 @@ class Solid:
             sticking(self.cables, T, self.pulled, pull.mu, pull.presliding, K)
         if burden.wall[4] > 0.0:
             press(self.skin, u, burden.wall, np.empty(len(K)), K, True)
-        LU, pivots, _ = lapack.dgetrf(K)
+        LU, pivots, _ = getrf(K)
         return LU, pivots
 
     def _step(self, r: np.ndarray, T: np.ndarray, pull: Pull, LU: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Changes of nodes (n_free, 3) and tensions (t,) that solve the linear problem, slack tendons found on the way."""
         p = self.pulled
-        solved = lapack.dgetrs(*LU, np.column_stack([-r, p.pull.T]))[0]
+        solved = getrs(*LU, np.column_stack([-r, p.pull.T]))[0]
         du, Z = solved[:, 0], solved[:, 1:]
         gap = p.length - pull.free - pull.stretch * T + p.gradient @ du
         C = p.gradient @ Z + np.diag(pull.stretch)

@@ -45,7 +45,9 @@ def _product(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     return np.einsum("...i,...j,...k->...ijk", a, b, c).reshape(*a.shape[:-1], NODES)
 
 
-def slices(cone: Cone, low: float, high: float, n: tuple[int, int, int] = (RADII, ANGLES, HEIGHTS)) -> tuple[np.ndarray, np.ndarray]:
+def slices(
+    cone: Cone, low: float, high: float, n: tuple[int, int, int] = (RADII, ANGLES, HEIGHTS)
+) -> tuple[np.ndarray, np.ndarray]:
     """Points (m, 3) and weights (m,) (m^3) of the cone between two heights."""
     radii, angles, heights = n
     z, wz = _gauss(heights, low, high)

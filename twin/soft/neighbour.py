@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.compiled import inner, jit
-from twin.soft.cables import Cables, Pulled, Slip, follow
+from twin.soft.cables import Cables, Pulled, follow
 from twin.soft.creep import relax_for
 from twin.soft.silicone import LEAST, Cells, forces
 from twin.soft.wall import Skin, press

@@ -181,7 +181,9 @@ def spread(A, d, w, q, a, block):
     for s in range(6):
         i, k = PAIRS[s]
         for j in range(3):
-            block[s, 3 * q + j, a] = w * (A[3 * i + j, 3 * k] * d[0] + A[3 * i + j, 3 * k + 1] * d[1] + A[3 * i + j, 3 * k + 2] * d[2])
+            block[s, 3 * q + j, a] = w * (
+                A[3 * i + j, 3 * k] * d[0] + A[3 * i + j, 3 * k + 1] * d[1] + A[3 * i + j, 3 * k + 2] * d[2]
+            )
 
 
 @inner

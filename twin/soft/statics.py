@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.linalg import lapack
 from threadpoolctl import ThreadpoolController
 
 from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
@@ -16,7 +15,7 @@ from twin.sensors import resistance
 from twin.soft.body import AROUND, SoftBody, skin_points
 from twin.soft.cables import Cables
 from twin.soft.creep import relax_for
-from twin.soft.finger import CLOSE, Burden, Pull, Solid
+from twin.soft.finger import CLOSE, Burden, Pull, Solid, getri
 from twin.soft.lattice import ACROSS
 from twin.soft.neighbour import Kept, Parts, Way, along
 from twin.soft.silicone import Cells
@@ -38,7 +37,7 @@ class SoftStatics:
         self.body = body
         grid = body.lattice
         gradient, local = grid.gradients
-        points, weight = grid.quadrature
+        weight = grid.quadrature[1]
         basis = np.concatenate([np.ones((*local.shape[:2], 1)), local], axis=-1)
         inverse = np.linalg.inv(np.einsum("eqa,eq,eqb->eab", basis, weight, basis))
         E, nu = body.youngs_modulus, body.poisson
@@ -159,7 +158,7 @@ class _Trial:
         assert near is not None
         command = self.problem.command
         way = Way(
-            np.maximum(command, 0.0), self.hanging - command, self.held, np.outer(self.scale, np.full(len(self.held), route.stretch)),
+            np.maximum(command, 0.0), self.hanging - command, self.held, np.outer(self.scale, 0.0 * self.at + route.stretch),
             self.force, self.wall, self.scale, float(route.mu), float(route.presliding), np.array(self.problem.time, float),
             self.amplitude, self.time, self.close, self.problem.once,
         )  # fmt: skip
@@ -179,7 +178,7 @@ class _Trial:
         self.u[i], self.tension[i] = self.shape.u.ravel(), self.shape.tension * self.scale[i]
         self.length[i] = self.solid.pulled.length
         if self.problem.keep and self.shape.LU is not None:
-            self.inverse[i] = lapack.dgetri(*self.shape.LU)[0]
+            self.inverse[i] = getri(*self.shape.LU)[0]
 
     def _march(self, i: int) -> bool:
         """From the last command to that of sample i, in ever smaller parts where Newton's method is lost. False, and the shape as
