@@ -23,16 +23,9 @@ class Cables(NamedTuple):
     weights: np.ndarray
 
 
-class Slip(NamedTuple):
-    """Slip states (t, p - 2) where the last equilibrium left them, and the lengths (t, p - 2) m then left beyond each point."""
-
-    state: np.ndarray
-    beyond: np.ndarray
-
-
 class Pulled(NamedTuple):
     """Lengths (t,) m; dL/du (t, n) and the force of a unit tension (t, n); tangents (t, p - 1, 3), segments (t, p - 1) m and shares
-    (t, p - 1) of the tension; slip as it would be now."""
+    (t, p - 1) of the tension; slip states (t, p - 2) and lengths (t, p - 2) m beyond each inner point, as they would be now."""
 
     length: np.ndarray
     gradient: np.ndarray
@@ -40,21 +33,21 @@ class Pulled(NamedTuple):
     tangent: np.ndarray
     segment: np.ndarray
     share: np.ndarray
-    slip: Slip
+    slip: np.ndarray
+    beyond: np.ndarray
 
 
 def unpulled(cables: Cables) -> Pulled:
     nt, points, free = cables.weights.shape
-    slip = Slip(np.zeros((nt, points - 2)), np.zeros((nt, points - 2)))
     return Pulled(
         np.zeros(nt), np.zeros((nt, 3 * free)), np.zeros((nt, 3 * free)), np.zeros((nt, points - 1, 3)), np.zeros((nt, points - 1)),
-        np.ones((nt, points - 1)), slip,
+        np.ones((nt, points - 1)), np.zeros((nt, points - 2)), np.zeros((nt, points - 2)),
     )  # fmt: skip
 
 
 @jit
-def follow(cables, u, before, mu, presliding, out):
-    """Fill `out` for nodal displacements u (n_free, 3) m, slip as it was `before`."""
+def follow(cables, u, slip, before, mu, presliding, out):
+    """Fill `out` for nodal displacements u (n_free, 3) m; slip states and lengths beyond each point were `slip` and `before`."""
     nt, points, _ = cables.weights.shape
     for t in range(nt):
         x = cables.rest[t] + np.dot(cables.weights[t], u)
@@ -69,7 +62,7 @@ def follow(cables, u, before, mu, presliding, out):
             out.length[t] += length
             for i in range(3):
                 out.tangent[t, d, i] /= length
-        shares(t, before, mu, presliding, out)
+        shares(t, slip, before, mu, presliding, out)
         push = np.zeros((2, points, 3))
         for d in range(points - 1):
             for i in range(3):
@@ -82,19 +75,19 @@ def follow(cables, u, before, mu, presliding, out):
 
 
 @inner
-def shares(t, before, mu, presliding, out):
+def shares(t, slip, before, mu, presliding, out):
     """What friction leaves of the tension of tendon t in each segment, and its slip."""
     beyond, wrapped = out.length[t], 0.0
     n = out.segment.shape[1]
     out.share[t, 0] = 1.0
     for d in range(1, n):
         beyond -= out.segment[t, d - 1]
-        out.slip.beyond[t, d - 1] = beyond
+        out.beyond[t, d - 1] = beyond
         cosine = 0.0
         for i in range(3):
             cosine += out.tangent[t, d - 1, i] * out.tangent[t, d, i]
-        z = slip_state(before.state[t, d - 1], before.beyond[t, d - 1] - beyond, presliding)
-        out.slip.state[t, d - 1] = z
+        z = slip_state(slip[t, d - 1], before[t, d - 1] - beyond, presliding)
+        out.slip[t, d - 1] = z
         wrapped += z * turn(np.arccos(min(1.0, cosine)))[0]
         out.share[t, d] = np.exp(-mu * wrapped)
 
@@ -137,7 +130,7 @@ def sticking(cables, tension, pulled, mu, presliding, K):
             cosine = 0.0
             for i in range(3):
                 cosine += pulled.tangent[t, d - 1, i] * pulled.tangent[t, d, i]
-            z = pulled.slip.state[t, d - 1]
+            z = pulled.slip[t, d - 1]
             free_to_slide = 0.0 if abs(z) >= 1.0 else mu * tension[t] * turn(np.arccos(min(1.0, cosine)))[0] / presliding
             for a in range(3 * free):
                 tail[d - 1, a] = free_to_slide * gained[a]

@@ -21,15 +21,15 @@ class Skin(NamedTuple):
 
 
 @jit
-def press(skin, u, wall, r, K, tangent):
+def press(skin, u, wall, scale, r, K, tangent):
     """Take the wall's push (5,): normal, offset (m), stiffness (N/m), from the residual r (n,) or, with `tangent`, add its tangent
-    to K (n, n)."""
+    to K (n, n); both over the body's stiffness, `scale`."""
     x = skin.rest + np.dot(skin.weights, u)
     for m in range(len(x)):
         depth = wall[3] - (x[m, 0] * wall[0] + x[m, 1] * wall[1] + x[m, 2] * wall[2])
         if depth <= 0.0:
             continue
-        k = wall[4] * skin.share[m]
+        k = wall[4] * skin.share[m] / scale
         for a in range(skin.weights.shape[1]):
             w = skin.weights[m, a]
             if w == 0.0:
