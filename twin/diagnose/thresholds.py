@@ -62,6 +62,9 @@ AS_GOOD = _row(
     "AS_GOOD", 2.0, "ratio", "of what two changes to the file leave: the data alone do not decide between them", "judgement"
 )  # fmt: skip
 MOST = _row("MOST", 5, "trials", "in which each tendon is pulled, to try a change to the commands on", "judgement")
+SAMPLES = _row(
+    "SAMPLES", 60, "1", "of each trial, to try a change to the commands on: a mistake of meaning shows in all of them", "judgement"
+)  # fmt: skip
 FAR_TURN = _row(
     "FAR_TURN", 20.0, "deg", "a camera nobody has aligned is off by less, which is an effect and no mistake", "judgement"
 )  # fmt: skip

@@ -48,10 +48,10 @@ def suspicions(bench: Bench, twin: Twin, sealed: Sequence[int], nominal: Sequenc
     case = Case(blind(bench, sealed), twin, nominal)
     found = [s for kind in SEEN for s in kind(case)]
     if not any(s.kind in UNREADABLE and s.group == case.group for s in found):
-        found += [s for kind in TRIED for s in kind(case)]
+        found += [s for kind in TRIED for s in kind(case.thinned())]
     for kind in LAST:
         if not any(s.group == case.group for s in found):
-            found += kind(case)
+            found += kind(case.thinned())
     return tuple(s for s in found if s.left <= AS_GOOD * min(o.left for o in found if o.group == s.group))
 
 

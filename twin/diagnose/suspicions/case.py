@@ -13,7 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.bench import Bench, Inputs
-from twin.diagnose.thresholds import ALIVE, FITS, MOST, STUCK
+from twin.diagnose.thresholds import ALIVE, FITS, MOST, SAMPLES, STUCK
+from twin.effects import Loads
 from twin.errors import TwinError
 from twin.evaluate import TYPICAL, headline
 from twin.measurements import Channel
@@ -86,6 +87,23 @@ class Case:
         heaviest = int(np.argmax([self.bench.inputs[k].loads.payload for k in self.trials]))
         return sorted({self.trials[i] for i in (*pulled.argmax(axis=0)[:MOST].tolist(), heaviest)})
 
+    def thinned(self) -> Case:
+        """The case with a few samples of each trial: what explains all of a file otherwise shows in these too."""
+        every = [max(1, -(-len(i.time) // SAMPLES)) for i in self.bench.inputs]
+        inputs = tuple(
+            replace(i, time=i.time[::s], clock=i.clock[::s], command=i.command[::s], temperature=i.temperature[::s],
+                    loads=_thinned(i.loads, s))
+            for i, s in zip(self.bench.inputs, every, strict=True)
+        )  # fmt: skip
+        measured = tuple(y[::s] for y, s in zip(self.bench.measured, every, strict=True))
+        predicted = None if self.predicted is None else tuple(p[::s] for p, s in zip(self.predicted, every, strict=True))
+        return replace(self, bench=replace(self.bench, inputs=inputs, measured=measured), predicted=predicted)
+
+    def floor(self, columns: Sequence[int]) -> float:
+        """RMS of the columns' noise, SI: no change to a file leaves less."""
+        of = [self.bench.outputs[j] for j in columns]
+        return float(np.sqrt(np.mean([(o.channel.noise or TYPICAL[o.group]) ** 2 for o in of])))
+
     def again(self, change: Callable[[Inputs], Inputs], twin: Twin | None = None) -> dict[int, np.ndarray] | None:
         """What would be predicted of the `few` trials, driven and loaded otherwise; None without an equilibrium."""
         few, twin = self.few(), twin or self.twin
@@ -131,6 +149,10 @@ class Case:
         turn, shift = registration(shown[:, flat].reshape(-1, 3), measured[:, flat].reshape(-1, 3))
         out[:, flat] = (shown[:, flat].reshape(-1, 3) @ turn.T + shift).reshape(len(shown), -1)
         return out
+
+
+def _thinned(loads: Loads, step: int) -> Loads:
+    return loads if len(loads.torque) == 1 else replace(loads, torque=loads.torque[::step])
 
 
 def rms(r: np.ndarray) -> float:

@@ -98,6 +98,8 @@ def best(case: Case, kind: str, words: str, change: str, tried: list) -> Iterato
     """The best of the ways (name, change of inputs) in which a file may be meant otherwise, where one explains far more."""
     columns, few = case.columns(case.group), case.few()
     before, found = case.error(columns, case.as_is(), few), []
+    if case.floor(columns) >= FITS * before:
+        return
     for name, meant in tried:
         left = case.better(before, case.error(columns, case.again(meant), few), columns)
         if left is not None:
