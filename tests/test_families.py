@@ -48,7 +48,7 @@ def test_its_ports_are_channels_of_the_contract(name: str) -> None:
         for port in ports:
             assert len(port.pull) == body.n_tendon
             assert Channel(port.channel, "input", units[port.channel.rpartition("_")[2]]).kind
-    units |= {"marker": "m", "temperature": "K", "resistance": "ohm"}
+    units |= {"marker": "m", "temperature": "K", "resistance": "ohm", "sensor": "ohm"}
     for channel, sense in body.senses.items():
         assert Channel(channel, "output", units[sense.group]).kind, channel
     for channel, field in body.loads.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import Robot
 
+CONTACT = "external_contact"  # a trial's condition: a hand deforms the robot
 ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
 
 
@@ -89,7 +90,8 @@ class Bench:
 
 def prepare(recording: Recording, robot: Robot) -> Bench:
     """The bench of a recording. Raises DataError where the inputs do not determine the robot, or no output is predictable."""
-    notices, body = list(recording.notices), robot.build()
+    recording, notices = _undisturbed(recording)
+    body = robot.build()
     driven = _drives(recording, robot, body)
     names = [channel.name for channel, _ in driven]
     notices += [
@@ -121,6 +123,20 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
         measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return Bench(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
+
+
+def _undisturbed(recording: Recording) -> tuple[Recording, list[str]]:
+    """The recording without trials in which something pushed the robot with a force nobody knows. Raises DataError where that is
+    all of them."""
+    free = tuple(t for t in recording.trials if CONTACT not in t.other)
+    if not free:
+        raise DataError(
+            f"{_where(recording)}: every trial has the condition {CONTACT!r}; under a force nobody knows no shape can be predicted: "
+            "record one without"
+        )
+    pushed = [t.name for t in recording.trials if CONTACT in t.other]
+    notes = [f"{name}: {CONTACT}, a force nobody knows; the trial is left out" for name in pushed]
+    return (replace(recording, trials=free) if pushed else recording), [*recording.notices, *notes]
 
 
 def _where(recording: Recording) -> str:
