@@ -30,8 +30,11 @@ NEW = {"backbone_ageing", "transmission_error"}  # identifiers of our own, besid
 laws = pytest.mark.parametrize("law", catalogue().values(), ids=catalogue().keys())
 
 
-def channels(heated: bool) -> tuple[Channel, ...]:
-    """Drive by tensions, or by the currents of springs for the laws that act on those."""
+def channels(heated: bool, felt: bool = False) -> tuple[Channel, ...]:
+    """Drive by tensions, by the currents of springs for laws that act on those, or, of a finger that is felt, by lengths."""
+    if felt:
+        pulls = (Channel(f"tendon_{i}_displacement", "input", "mm", 1e-5) for i in (1, 2, 3, 4))
+        return (*pulls, *(Channel(f"sensor_{i}_resistance", "output", "ohm", 0.3) for i in (1, 2, 3, 4)))
     drive = (
         Channel(f"sma_{i}_current", "input", "A", 3e-3) if heated else Channel(f"tendon_{i}_tension", "input", "N", 0.01)
         for i in (1, 2, 3)
@@ -55,15 +58,34 @@ def cycle(name: str, start: float, peak: float, payload: float, heated: bool = F
     return Trial(name, time, values, {"tip_payload": payload, "ambient_temperature": 300.15}, start=start)
 
 
+def bend(name: str, start: float, peak: float) -> Trial:
+    """The finger pulled by tendon 1 and released, tendon 2 following, the others paid out; m."""
+    n = 41
+    angle = 2 * np.pi * np.arange(n) / (n - 1)
+    pulls = np.stack([0.5 * peak * (1 - np.cos(angle)), 0.25 * peak * (1 - np.sin(angle)), *np.full((2, n), -6e-3)], axis=1)
+    values = {c.name: np.zeros(n) for c in channels(False, True)}
+    return Trial(
+        name, np.linspace(0.0, 20.0, n), values | {f"tendon_{i + 1}_displacement": pulls[:, i] for i in range(4)}, {}, start=start
+    )
+
+
 def recording(*trials: Trial) -> Recording:
-    heated = "sma_1_current" in trials[0].values
-    return Recording("continuum", "conformance", "simulation", np.array([0.0, 0.0, 9.81]), channels(heated), trials)
+    felt, heated = "sensor_1_resistance" in trials[0].values, "sma_1_current" in trials[0].values
+    robot = "finger" if felt else "continuum"
+    return Recording(robot, "conformance", "simulation", np.array([0.0, 0.0, 9.81]), channels(heated, felt), trials)
 
 
 @pytest.fixture
 def two_trials(law: type[Effect]) -> Recording:
+    if is_of_sensors(law):
+        return recording(bend("a.csv", 0.0, 6e-3), bend("b.csv", 160.0, 4e-3))
     heated = is_of_springs(law)
     return recording(cycle("a.csv", 0.0, 3.0, 0.0, heated), cycle("b.csv", 160.0, 2.0, 0.02, heated))
+
+
+def is_of_sensors(law: type[Effect]) -> bool:
+    """Whether it needs strain-sensing cords, which a backbone has not."""
+    return "strain sensors" in law.needs
 
 
 def is_of_springs(law: type[Effect]) -> bool:
@@ -71,7 +93,7 @@ def is_of_springs(law: type[Effect]) -> bool:
 
 
 def predict(effects: tuple[Effect, ...], data: Recording) -> list[np.ndarray]:
-    twin = Twin(load("continuum"), {}, effects)
+    twin = Twin(load(data.robot), {}, effects)
     bench = prepare(data, twin.robot)
     return [readings(bench, report(effects, t.true)) for t in simulate(twin, bench)]
 
@@ -108,7 +130,7 @@ def test_its_parameters_have_units_bounds_and_sources(law: type[Effect]) -> None
 
 @laws
 def test_off_is_the_plain_twin(law: type[Effect], two_trials: Recording) -> None:
-    plain, off = predict((), two_trials), predict((law(n_tendon=3),), two_trials)
+    plain, off = predict((), two_trials), predict((law(n_tendon=load(two_trials.robot).n_tendon),), two_trials)
     for a, b in zip(plain, off, strict=True):
         # 1e-12 m: the same computation; a law that is off may at most reorder a rounding
         np.testing.assert_allclose(b, a, rtol=0, atol=1e-12)
@@ -125,13 +147,13 @@ def test_unknown_parameters_and_broken_bounds_are_refused(law: type[Effect]) -> 
 
 def starts(law: type[Effect], data: Recording) -> list[Effect]:
     """The law as its fits begin, at most four of them."""
-    robot = load("continuum")
-    bench = prepare(data, robot)
+    robot = load(data.robot)
+    bench, n = prepare(data, robot), robot.n_tendon
     predicted = [t.true for t in simulate(Twin(robot), bench)]
-    held = [s.with_(drives=(Drive.DISPLACEMENT,) * 3) for s in predicted]  # some laws are sought only where displacements command
-    found = list(law.starts(predicted, 3)) or list(law.starts(held, 3))
+    held = [s.with_(drives=(Drive.DISPLACEMENT,) * n) for s in predicted]  # some laws are sought only where displacements command
+    found = list(law.starts(predicted, n)) or list(law.starts(held, n))
     assert found, "a law needs somewhere to start a fit"
-    return [law({**s.values}, 3) for s in found[:4]]
+    return [law({**s.values}, n) for s in found[:4]]
 
 
 @laws
@@ -140,7 +162,10 @@ def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: R
     for effect in starts(law, two_trials):
         moved = predict((effect,), two_trials)
         change = max(np.abs(a - b).max() for a, b in zip(plain, moved, strict=True))
-        assert 1e-6 < change < 0.05  # m: more than a micrometre, less than half the robot
+        if is_of_sensors(law):
+            assert 0.05 < change < 300.0  # ohm: more than a cord's last digit, less than a third of it
+        else:
+            assert 1e-6 < change < 0.05  # m: more than a micrometre, less than half the robot
 
 
 @laws
@@ -156,13 +181,15 @@ def test_trials_are_independent_but_for_the_clock(law: type[Effect], two_trials:
 
 @laws
 def test_no_nan_at_the_corners_of_its_bounds(law: type[Effect]) -> None:
-    data = recording(replace(cycle("a.csv", 0.0, 2.0, 0.0, is_of_springs(law))))
-    corners = itertools.product(*[(p.low, p.high) for p in law.declared(3)[:4]])
+    one = bend("a.csv", 0.0, 4e-3) if is_of_sensors(law) else cycle("a.csv", 0.0, 2.0, 0.0, is_of_springs(law))
+    data = recording(one)
+    n = load(data.robot).n_tendon
+    corners = itertools.product(*[(p.low, p.high) for p in law.declared(n)[:4]])
     solved = 0
     for corner in corners:
-        values = {p.name: v for p, v in zip(law.declared(3)[:4], corner, strict=True)}
+        values = {p.name: v for p, v in zip(law.declared(n)[:4], corner, strict=True)}
         try:
-            predicted = predict((law(values, 3),), data)
+            predicted = predict((law(values, n),), data)
         except SolveError:
             continue  # a robot past its limits says so
         assert all(np.isfinite(y).all() for y in predicted)
@@ -175,6 +202,8 @@ def test_a_closed_cycle_takes_energy_and_gives_none(law: type[Effect]) -> None:
     """Work of the motors over a closed loop of tension, the second time round: lost in friction and creep, never gained."""
     if is_of_springs(law):
         pytest.skip("heat drives springs: what a loop of theirs takes is asked in test_sma.py")
+    if is_of_sensors(law):
+        pytest.skip("a sensor does no work")
     once = cycle("a.csv", 0.0, 3.0, 0.0)
     time = np.concatenate([once.time, once.time[-1] + once.time[1:]])
     twice = replace(once, time=time, values={k: np.concatenate([v, v[1:]]) for k, v in once.values.items()})

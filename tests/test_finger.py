@@ -217,7 +217,7 @@ def test_a_wall_holds_the_skin_back() -> None:
 
 
 def test_unequal_planes_bend_unequally() -> None:
-    """Small forces at the tip across the principal axes: deflections as 1 / (1 -+ e), within 10 % (shear and the clamp give too)."""
+    """Small forces at the tip across the principal axes: deflections as 1 / (1 -+ e), within 10 % (shear gives too)."""
     e = 0.2
     deflections = []
     for a, force in ((0, [1e-3, 0.0, 0.0]), (1, [0.0, 1e-3, 0.0])):

@@ -52,7 +52,10 @@ def fitted_alone(bench: Day, effect: str, seed: int = 5) -> tuple[Fit, Fit, Trut
     return base, fuller(study, best, (effect,), ACCEPT).fit, truth
 
 
-@pytest.mark.parametrize("effect", sorted(catalogue()))
+OF_FINGERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis"}  # test_finger_day.py
+
+
+@pytest.mark.parametrize("effect", sorted(set(catalogue()) - OF_FINGERS))
 def test_it_recovers_its_own_parameters(bench: Day, effect: str) -> None:
     base, fitted, truth = fitted_alone(bench, effect)
     values = next(e for e in fitted.model.twin.effects if e.id == effect).values
@@ -76,4 +79,4 @@ def test_the_worn_drive_is_told_from_its_neighbours(bench: Day, seed: int, worn:
 
 
 def test_every_effect_of_the_catalogue_is_compared() -> None:
-    assert set(COMPARED) == set(catalogue())
+    assert set(COMPARED) | OF_FINGERS == set(catalogue())

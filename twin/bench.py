@@ -131,8 +131,8 @@ def _undisturbed(recording: Recording) -> tuple[Recording, list[str]]:
     free = tuple(t for t in recording.trials if CONTACT not in t.other)
     if not free:
         raise DataError(
-            f"{_where(recording)}: every trial has the condition {CONTACT!r}; under a force nobody knows no shape can be predicted: "
-            "record one without"
+            f"{_where(recording)}: every trial has the condition {CONTACT!r}; under a force nobody knows no shape can be "
+            "predicted: record one without"
         )
     pushed = [t.name for t in recording.trials if CONTACT in t.other]
     notes = [f"{name}: {CONTACT}, a force nobody knows; the trial is left out" for name in pushed]

@@ -61,7 +61,8 @@ class Twin:
             inputs.name: _by_channel(bench, readings(bench, report(self.effects, trace.true)))
             for inputs, trace in zip(bench.inputs, traces, strict=True)
         }
-        return bench.recording.with_values([values[t.name] for t in bench.recording.trials], f"simulation: twin of {self.robot.name}")
+        seen = bench.recording
+        return seen.with_values([values[t.name] for t in seen.trials], f"simulation: twin of {self.robot.name}")
 
 
 def _by_channel(bench: Bench, y: np.ndarray) -> dict[str, np.ndarray]:

@@ -114,7 +114,7 @@ def error_words(diagnosis: Diagnosis) -> str:
     where = f"On {count} sealed trial{'s' if count != 1 else ''}" + (", each in turn," if d.folds else "")
     if d.claims:
         verb = "falls" if e.after[group] < e.calibrated[group] else "goes"
-        words = f"{where} the error {verb} from {before} to {after} {unit} (noise floor {floor} {unit})."
+        words = f"{where} the error {verb} from {before} to {after} {unit} (noise floor {floor} {unit}){_besides(d)}."
     else:
         words = f"{where} the error is {after} {unit}, from {nominal} {unit} as described (noise floor {floor} {unit})."
     if worse := [g for g in groups(d) if e.after[g] > e.calibrated[g]]:
@@ -124,6 +124,16 @@ def error_words(diagnosis: Diagnosis) -> str:
     if e.lost:
         words += f" It has no equilibrium for sealed {', '.join(labels(d, e.lost))}, which counts for nothing here."
     return words + _stable(d)
+
+
+def _besides(d: Diagnosis) -> str:
+    """Other kinds of output whose error halves: an effect of sensors does nothing to positions."""
+    e, words = d.errors, ""
+    for group in (g for g in groups(d)[1:] if e.after[g] < 0.5 * e.calibrated[g]):
+        unit, factor = SHOWN[group]
+        before, after = number(factor * e.calibrated[group]), number(factor * e.after[group])
+        words += f", of {KIND[group].replace('_', ' ')} from {before} to {after} {unit}"
+    return words
 
 
 def _stable(d: Diagnosis) -> str:

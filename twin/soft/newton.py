@@ -73,7 +73,7 @@ class Found(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where the body is: u (nq,) m, tensions (t,) N over the stiffness, slip states (t, p - 2) and lengths beyond each point, relaxed
+    """Where the body is: u (nq,) m, tensions (t,) N over the stiffness, slip states (t, p - 2) and lengths beyond, relaxed
     stress (k, c, q, 6) Pa; the inverse of a tangent near it (nq, nq), if `has` (1,)."""
 
     u: np.ndarray
@@ -128,8 +128,7 @@ def along(parts, way, kept, i, state, found, room):
 
 @jit
 def settle(parts, way, i, state, room):
-    """Bring `state` to equilibrium at sample i. Returns the steps it took; 0, and shape, tensions and slip as they were, where it is
-    lost."""
+    """Bring `state` to equilibrium at sample i. Returns the steps it took; 0, and all as it was, where it is lost."""
     u, T, last, fresh, fails = state.u.copy(), state.tension.copy(), 1e9, False, 0
     if room.relaxed.shape[0] > 0:
         room.relaxed[:] = state.taken.sum(axis=0)

@@ -27,7 +27,8 @@ CLOSE = 2e-8  # m: a step after which a shape counts as found; with it goes some
 @dataclass(frozen=True, kw_only=True)
 class SoftPath(Path):
     """`q` (n, nq) are the displacements of the free nodes, m; `LU` (n, nq, nq) the inverses of their tangents, m/N, in single
-    precision. `of` is a hash of what was solved: who asks the same again is answered from here. `others`: "strain" (n, s) of the cords, "sensor" (n, s) ohm and "sensor_rest", at no strain."""
+    precision. `of` is a hash of what was solved: who asks the same again is answered from here. `others`: "strain" (n, s) of the
+    cords, "sensor" (n, s) ohm and "sensor_rest", at no strain."""
 
     of: bytes = b""
 
@@ -197,7 +198,7 @@ class _Trial:
                 i += 1
 
     def _in_parts(self, i: int) -> bool:
-        """From the last command to that of sample i, in ever smaller parts. False, and the shape as it was last, where that fails."""
+        """From the last command to that of sample i, in ever smaller parts. False, and its shape as last found, where that fails."""
         start, goal, done, part = self.at, self.problem.command[i], 0.0, 0.5
         if i and self.status[i - 1]:
             self.state.u[:], self.state.tension[:] = self.found.u[i - 1], self.found.tension[i - 1] / self.scale[i - 1]
@@ -223,9 +224,9 @@ class _Trial:
     def _way(self, rows: slice, command: np.ndarray, held: np.ndarray) -> Way:
         problem, scale = self.problem, self.scale[rows]
         once = problem.once and len(command) == len(self.scale)
+        tension, free = np.ascontiguousarray(np.maximum(command, 0.0)), np.ascontiguousarray(self.hanging - command)
         return Way(
-            np.ascontiguousarray(np.maximum(command, 0.0)), np.ascontiguousarray(self.hanging - command), held, np.outer(scale, np.full(len(held), problem.route.stretch)),
-            self.force, self.wall, scale, float(problem.route.mu), float(problem.route.presliding),
+            tension, free, held, np.outer(scale, np.full(len(held), problem.route.stretch)), self.force, self.wall, scale, float(problem.route.mu), float(problem.route.presliding),
             np.array(problem.time[rows], float), np.array(problem.creep.amplitude, float), np.array(problem.creep.time, float),
             CLOSE * problem.tolerance / TOLERANCE, once,
         )  # fmt: skip
