@@ -21,6 +21,7 @@ from twin.soft.silicone import Cells, Tangent
 from twin.soft.wall import Skin
 
 SMALLEST = 1e-3  # of a step between two samples
+REMEMBERED = 64  # trials, of some 300 kB
 CLOSE = 2e-8  # m: a step after which a shape counts as found; with it goes some 1e-6 N
 
 
@@ -31,6 +32,11 @@ class SoftPath(Path):
     cords, "sensor" (n, s) ohm and "sensor_rest", at no strain."""
 
     of: bytes = b""
+
+
+_SOLVED: dict[
+    tuple[bytes, float], SoftPath
+] = {}  # trials solved from their start, so that what differs only in sensors is not solved again
 
 
 class SoftStatics:
@@ -63,13 +69,22 @@ class SoftStatics:
             if isinstance(near, SoftPath) and near.of == asked != b"":
                 u = near.q.reshape(len(near.q), -1, 3)  # what differs is only how it is seen and sensed
                 return replace(near, markers=self._markers(u), others=self._sensed(u))
+            cold = asked != b"" and near is None and not problem.keep
+            if cold and (found := _SOLVED.get((asked, problem.tolerance))) is not None:
+                u = found.q.reshape(len(found.q), -1, 3)
+                return replace(found, markers=self._markers(u), others=self._sensed(u))
             trial.run()
         u = trial.found.u.reshape(len(trial.found.u), -1, 3)
-        return SoftPath(
+        path = SoftPath(
             tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self._markers(u),
             status=trial.status, q=trial.found.u, others=self._sensed(u), LU=trial.found.inverse,
             of=asked if trial.status.all() else b"",
         )  # fmt: skip
+        if cold and path.of:
+            _SOLVED[asked, problem.tolerance] = path
+            while len(_SOLVED) > REMEMBERED:
+                _SOLVED.pop(next(iter(_SOLVED)), None)
+        return path
 
     def _markers(self, u: np.ndarray) -> np.ndarray:
         """(n, m + 1, 3) m in the base frame: the markers, and the tip."""
@@ -198,7 +213,7 @@ class _Trial:
                 i += 1
 
     def _in_parts(self, i: int) -> bool:
-        """From the last command to that of sample i, in ever smaller parts. False, and its shape as last found, where that fails."""
+        """From the last command to that of sample i, in ever smaller parts. False, with its shape as last found, where not."""
         start, goal, done, part = self.at, self.problem.command[i], 0.0, 0.5
         if i and self.status[i - 1]:
             self.state.u[:], self.state.tension[:] = self.found.u[i - 1], self.found.tension[i - 1] / self.scale[i - 1]
@@ -226,7 +241,8 @@ class _Trial:
         once = problem.once and len(command) == len(self.scale)
         tension, free = np.ascontiguousarray(np.maximum(command, 0.0)), np.ascontiguousarray(self.hanging - command)
         return Way(
-            tension, free, held, np.outer(scale, np.full(len(held), problem.route.stretch)), self.force, self.wall, scale, float(problem.route.mu), float(problem.route.presliding),
+            tension, free, held, np.outer(scale, np.full(len(held), problem.route.stretch)), self.force, self.wall, scale,
+            float(problem.route.mu), float(problem.route.presliding),
             np.array(problem.time[rows], float), np.array(problem.creep.amplitude, float), np.array(problem.creep.time, float),
             CLOSE * problem.tolerance / TOLERANCE, once,
         )  # fmt: skip
