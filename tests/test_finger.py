@@ -15,8 +15,9 @@ from twin.effects import Drive, Loads, Route, Signals, named
 from twin.robots import load
 from twin.sensors import Cords, resistance, strain
 from twin.soft import SoftBody, SoftPath, SoftStatics
+from twin.soft.room import parts_of
 from twin.soft.silicone import Tangent, forces, stiffness
-from twin.soft.statics import parts_of, turned
+from twin.soft.statics import turned
 
 HANGING = np.array([0.0, 0.0, 9.81])
 TENSION, HELD = (Drive.TENSION,) * 4, (Drive.DISPLACEMENT,) * 4

@@ -2,8 +2,9 @@
 
 lattice.py   cells, quadrature, weights of material points     wall.py     a wall that the skin presses
 silicone.py  forces of the silicone and their tangent           creep.py    stress that relaxes
-cables.py    tendons, with friction                             finger.py   one equilibrium by Newton's method
+cables.py    tendons, with friction                             newton.py   equilibria, one after another
 body.py      the finger as effects may edit it                  statics.py  a trial, sample by sample
+room.py      a body's arrays as the compiled solve takes them   solid.py    one equilibrium at a time
 """
 
 from twin.soft.body import SoftBody, skin_points, straight

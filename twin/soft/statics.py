@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -13,12 +14,9 @@ from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
 from twin.effects import Drive
 from twin.errors import SolveError
 from twin.sensors import resistance
-from twin.soft.body import AROUND, SoftBody, skin_points
-from twin.soft.cables import Cables, unpulled
-from twin.soft.lattice import ACROSS
-from twin.soft.newton import Found, Kept, Parts, Room, State, Way, along
-from twin.soft.silicone import Cells, Tangent
-from twin.soft.wall import Skin
+from twin.soft.body import SoftBody
+from twin.soft.newton import Found, Kept, Way, along
+from twin.soft.room import parts_of, room_for, undeformed
 
 SMALLEST = 1e-3  # of a step between two samples
 REMEMBERED = 64  # trials, of some 300 kB
@@ -63,21 +61,21 @@ class SoftStatics:
         """
         if problem.route.stiffening > 0.0 or problem.heating is not None:
             raise SolveError("tendons that stiffen and SMA springs are not solved for a silicone body; remove that effect or drive")
-        with _threads().limit(limits=1):  # with two, systems as small as these take tens of times longer on a busy machine
+        with single_thread():
             trial, near = _Trial(self, problem), problem.near
             asked = trial.asked()
             if isinstance(near, SoftPath) and near.of == asked != b"":
                 u = near.q.reshape(len(near.q), -1, 3)  # what differs is only how it is seen and sensed
-                return replace(near, markers=self._markers(u), others=self._sensed(u))
+                return replace(near, markers=self._markers(u), others=self.sensed(u))
             cold = asked != b"" and near is None and not problem.keep
             if cold and (found := _SOLVED.get((asked, problem.tolerance))) is not None:
                 u = found.q.reshape(len(found.q), -1, 3)
-                return replace(found, markers=self._markers(u), others=self._sensed(u))
+                return replace(found, markers=self._markers(u), others=self.sensed(u))
             trial.run()
         u = trial.found.u.reshape(len(trial.found.u), -1, 3)
         path = SoftPath(
             tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self._markers(u),
-            status=trial.status, q=trial.found.u, others=self._sensed(u), LU=trial.found.inverse,
+            status=trial.status, q=trial.found.u, others=self.sensed(u), LU=trial.found.inverse,
             of=asked if trial.status.all() else b"",
         )  # fmt: skip
         if cold and path.of:
@@ -92,55 +90,27 @@ class SoftStatics:
         own = np.concatenate([self.body.seen + self._seen @ u, tip[:, None]], axis=1)
         return own @ turned(self.body.turn).T
 
-    def _sensed(self, u: np.ndarray) -> dict[str, np.ndarray]:
+    def sensed(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """What the cords feel of nodes' displacements u (n, n_free, 3) m, by group as in `SoftPath.others`."""
         shape = (len(u), *self.body.cord_paths.shape)
         moved = self.body.cord_paths + (self._cords @ u).reshape(shape)
         strain = np.linalg.norm(np.diff(moved, axis=2), axis=3).sum(axis=2) / self._cord_rest - 1.0
         rest = np.broadcast_to(self.body.cords.rest, strain.shape)
         return {"strain": strain, "sensor": resistance(strain, self.body.cords), "sensor_rest": rest}
 
-
-def parts_of(body: SoftBody) -> Parts:
-    """The body as the compiled solve takes it."""
-    grid = body.lattice
-    gradient, local = grid.gradients
-    weight = grid.quadrature[1]
-    basis = np.concatenate([np.ones((*local.shape[:2], 1)), local], axis=-1)
-    inverse = np.linalg.inv(np.einsum("eqa,eq,eqb->eab", basis, weight, basis))
-    E, nu = body.youngs_modulus, body.poisson
-    shear, bulk = body.shear * (E / (2.0 * (1.0 + nu))), body.bulk * (E / (3.0 * (1.0 - 2.0 * nu)))
-    nt, points, _ = body.paths.shape
-    weights = grid.weights(body.paths.reshape(-1, 3)).reshape(nt, points, -1)
-    for t in range(nt):
-        weights[t, -1] = grid.spread(body.paths[t, -1], body.anchor)
-    skin = skin_points(body.cone)
-    return Parts(
-        Cells(grid.members, grid.unknowns, gradient, weight, basis, inverse, shear, bulk),
-        Cables(np.ascontiguousarray(body.paths), weights),
-        Skin(skin, grid.weights(skin), np.full(len(skin), 1.0 / AROUND)),
-        ACROSS**2,
-    )
+    def strain_slope(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Strains (s,) of the cords at nodes' displacements u (n_free, 3) m, and their derivatives (s, 3 n_free) 1/m."""
+        s, points, _ = self.body.cord_paths.shape
+        weights = self._cords.reshape(s, points, -1)
+        piece = np.diff(self.body.cord_paths + weights @ u, axis=1)
+        length = np.linalg.norm(piece, axis=2)
+        slope = np.einsum("spc,spn->snc", piece / length[..., None], np.diff(weights, axis=1)).reshape(s, -1)
+        return length.sum(axis=1) / self._cord_rest - 1.0, slope / self._cord_rest[:, None]
 
 
-def room_for(parts: Parts, creeps: bool) -> Room:
-    """Arrays to work in."""
-    nq, cells = 3 * parts.cables.weights.shape[2], len(parts.cells.members)
-    tangent = Tangent(np.empty((nq, nq)), np.zeros((cells, 4, 81)), np.zeros((cells, 4)))
-    relaxed = np.zeros((*parts.cells.weight.shape, 6)) if creeps else np.empty((0, 0, 6))
-    return Room(
-        np.empty(nq), np.zeros((cells, 4)), np.zeros((parts.clamped + nq // 3, 3)), tangent, unpulled(parts.cables),
-        np.zeros((len(parts.cables.rest), nq)), relaxed, np.zeros(1, bool),
-    )  # fmt: skip
-
-
-def undeformed(parts: Parts, taken: np.ndarray) -> State:
-    """At rest without tension, tendons sticking; `taken` (k, c, q, 6) Pa is the stress that creep has left."""
-    nt, points, free = parts.cables.weights.shape
-    nq, beyond = 3 * free, np.linalg.norm(np.diff(parts.cables.rest, axis=1), axis=2)[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
-    return State(
-        np.zeros(nq), np.zeros(nt), np.zeros((nt, points - 2)), np.ascontiguousarray(beyond), taken,
-        np.zeros((nq, nq), np.float32), np.zeros(1, bool),
-    )  # fmt: skip
+def single_thread() -> AbstractContextManager[object]:
+    """Small systems by one thread each: with two, these take tens of times longer on a busy machine."""
+    return _threads().limit(limits=1)
 
 
 @cache
