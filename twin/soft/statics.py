@@ -79,7 +79,7 @@ class SoftStatics:
         u, length = trial.u.reshape(len(trial.u), -1, 3), trial.length
         return SoftPath(
             tension=trial.tension, path=length - trial.hanging + self.straight_path, markers=self._markers(u), status=trial.status,
-            q=trial.u, others=self._sensed(u), LU=trial.inverse,
+            q=trial.u, others=self.sensed(u), LU=trial.inverse,
         )  # fmt: skip
 
     def _markers(self, u: np.ndarray) -> np.ndarray:
@@ -88,7 +88,8 @@ class SoftStatics:
         own = np.concatenate([self.body.seen + self._seen @ u, tip[:, None]], axis=1)
         return own @ turned(self.body.turn).T
 
-    def _sensed(self, u: np.ndarray) -> dict[str, np.ndarray]:
+    def sensed(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """What the cords feel of nodes' displacements u (n, n_free, 3) m, by group as in `SoftPath.others`."""
         shape = (len(u), *self.body.cord_paths.shape)
         moved = self.body.cord_paths + (self._cords @ u).reshape(shape)
         strain = np.linalg.norm(np.diff(moved, axis=2), axis=3).sum(axis=2) / self._cord_rest - 1.0

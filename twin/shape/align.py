@@ -1,0 +1,218 @@
+"""Alignment of a twin to a built finger from partial clouds, without a label: mounting angle, R0 and kappa of every sensor.
+
+1. Mounting angle: where nothing pushes, tendons of known length give the shape; it is turned until the clouds lie on it.
+2. Shape under a hand: coordinates of the twin's deformation modes, frame by frame, with the factory's spread as prior:
+
+       min over z   sum_p rho(d_p(z) / sigma) + sum_k (z_k / spread_k)^2,      d_p from the cloud's points to the visible skin
+
+3. Sensors: with both kinds of shapes the strains are known, and sqrt(R) = a + a kappa+ max(eps, 0) + a kappa- min(eps, 0), a =
+   sqrt(R0), is linear in (a, a kappa+, a kappa-): least squares, robust, with the robot's priors.
+
+Every step is smooth and small; `tools/shape_error.py` holds it against a black-box search over all numbers at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from twin.bench import prepare
+from twin.errors import DataError
+from twin.measurements import Clouds, Recording
+from twin.quantities import Fitted, Parameter
+from twin.sensors import strain
+from twin.shape.modal import FILE, Network, read_weights
+from twin.shape.estimator import Felt
+from twin.shape.sensing import Sensed, sense
+from twin.shape.skin import Skin, distances, facing
+from twin.soft import SoftBody, SoftStatics
+from twin.soft.statics import turned
+from twin.twin import Twin, simulate
+
+CLOUD = 4e-4  # m, noise of a cloud's point along the normal; robust beyond
+BEYOND = 3.0  # standard deviations
+STRAIN_FREE, STRAIN_PUSHED = 4e-4, 1e-3  # what strains of shapes by tendons and by clouds are wrong by
+ROUNDS = 12  # of a frame's fit
+SETTLED = 2e-5  # m
+OHM = 0.3
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """The aligned twin, its fitted numbers with standard errors, and what they rest on: distances (m, root mean square) of the
+    clouds from the visible skin before and after, samples by kind, and what the clouds could not fix."""
+
+    twin: Twin
+    fitted: Mapping[str, Fitted]
+    before: float
+    after: float
+    frames: int
+    unfixed: tuple[str, ...]
+    notices: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A trial with clouds: what was sensed and, for a trial without a push, the shapes (n, n_free, 3) m at its samples."""
+
+    sensed: Sensed
+    clouds: Clouds
+    nodes: np.ndarray | None
+
+    def frames(self) -> list[tuple[int, np.ndarray]]:
+        """Samples next to each cloud, and its points."""
+        at = np.abs(self.sensed.time[None] - self.clouds.time[:, None]).argmin(axis=1)
+        o = self.clouds.offsets
+        return [(int(i), self.clouds.points[o[f] : o[f + 1]]) for f, i in enumerate(at) if o[f + 1] > o[f]]
+
+
+def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = lambda words: None) -> Aligned:
+    """The twin aligned to a recording that has clouds. Raises DataError where no trial has, or none is free of a hand."""
+    shown, notices = _shown(recording, twin)
+    body = twin.body()
+    assert isinstance(body, SoftBody)
+    skin = Skin.of(body)
+    progress("turning the finger onto its clouds")
+    before = _misfit(skin, shown, body.turn)
+    angle, angle_std = _angle(skin, shown, twin)
+    net = Network(read_weights(twin.robot.folder / FILE))
+    fitted: dict[str, Fitted] = {"mounting.angle": Fitted(angle, angle_std, "rad")}
+    statics = SoftStatics(body)
+    for sweep in range(2):
+        progress(f"shapes under the hand, sweep {sweep + 1}")
+        points = _known_strains(shown, skin, statics, net, twin, angle)
+        fitted |= _sensors(points, twin)
+        twin = replace(twin, values={**twin.values, **{name: f.value for name, f in fitted.items()}})
+    stds = {p.name: p.std for p in twin.robot.nuisance}
+    unfixed = tuple(n for n in stds if n not in fitted or (fitted[n].std or 0.0) > 0.5 * (stds[n] or np.inf))
+    frames = sum(len(s.frames()) for s in shown)
+    return Aligned(twin, fitted, before, _misfit(skin, shown, angle), frames, unfixed, notices)
+
+
+def _shown(recording: Recording, twin: Twin) -> tuple[list[Shown], tuple[str, ...]]:
+    if not any(t.clouds is not None for t in recording.trials):
+        raise DataError(f"{recording.title}: no trial has clouds; alignment needs them (`cloud` of a [[trial]])")
+    chosen = recording.select([k for k, t in enumerate(recording.trials) if t.clouds is not None])
+    sensed, notices = sense(chosen, twin)
+    if all(s.pushed for s in sensed):
+        raise DataError(f"{recording.title}: a hand is on the finger in every trial with clouds; one free motion is needed")
+    free = chosen.select([k for k, s in enumerate(sensed) if not s.pushed])
+    bench = prepare(free, twin.robot)
+    nodes = {
+        i.name: trace.path.q.reshape(len(i.time), -1, 3)
+        for i, trace in zip(bench.inputs, simulate(twin, bench), strict=True) if trace.path is not None
+    }  # fmt: skip
+    clouds = {t.name: t.clouds for t in chosen.trials}
+    return [Shown(s, c, nodes.get(s.name)) for s in sensed if (c := clouds[s.name]) is not None], notices
+
+
+def _residuals(skin: Skin, shown: Sequence[Shown], angle: float) -> np.ndarray:
+    """Distances (k,) m of the free trials' clouds from the skin turned by `angle`."""
+    turn, out = turned(angle), []
+    for trial in shown:
+        for i, cloud in trial.frames() if trial.nodes is not None else []:
+            x, normals = skin.at(trial.nodes[i])  # type: ignore[index]
+            out.append(distances(cloud @ turn, x, normals, facing(normals, turn))[0])
+    return np.concatenate(out)
+
+
+def _misfit(skin: Skin, shown: Sequence[Shown], angle: float) -> float:
+    return float(np.sqrt((_residuals(skin, shown, angle) ** 2).mean()))
+
+
+def _angle(skin: Skin, shown: Sequence[Shown], twin: Twin) -> tuple[float, float]:
+    """The mounting angle (rad) and its standard error."""
+    p = next(p for p in twin.robot.nuisance if p.name == "mounting.angle")
+    start = twin.values.get(p.name, p.value)
+    found = least_squares(
+        lambda a: _residuals(skin, shown, float(a[0])) / CLOUD, [start], bounds=([p.low], [p.high]), loss="soft_l1",
+        f_scale=BEYOND, diff_step=1e-3, x_scale=0.05,
+    )  # fmt: skip
+    h = 2e-3
+    slope = (_residuals(skin, shown, found.x[0] + h) - _residuals(skin, shown, found.x[0] - h)) / (2 * h * CLOUD)
+    return float(found.x[0]), float(1.0 / np.sqrt((slope**2).sum()))
+
+
+def fit_cloud(
+    cloud: np.ndarray, turn: np.ndarray, skin: Skin, net: Network, start: np.ndarray
+) -> np.ndarray:
+    """Coordinates (k,) m of the modes whose visible skin lies closest to a cloud (n, 3) m, from `start`, by Gauss-Newton steps with
+    correspondences sought again in each."""
+    modes, z = net.modes, start
+    own = cloud @ turn
+    basis = np.einsum("mn,knc->mkc", skin.weights, modes.basis.reshape(len(modes.basis), -1, 3))
+    for _ in range(ROUNDS):
+        x, normals = skin.at(modes.nodes(z[None])[0])
+        d, nearest = distances(own, x, normals, facing(normals, turn))
+        J = np.einsum("pkc,pc->pk", basis[nearest], normals[nearest])
+        weight = 1.0 / (CLOUD**2 * np.sqrt(1.0 + (d / (BEYOND * CLOUD)) ** 2))
+        H = (J * weight[:, None]).T @ J + np.diag(1.0 / modes.spread**2)
+        step = np.linalg.solve(H, J.T @ (weight * d) - z / modes.spread**2)
+        z = z + step
+        if np.abs(step).max() < SETTLED * np.sqrt(len(cloud)):
+            break
+    return z
+
+
+@dataclass(frozen=True)
+class Known:
+    """Strains (n, s) that shapes have, resistances (n, s) ohm measured there, and what the strains are wrong by (n,)."""
+
+    strain: np.ndarray
+    resistance: np.ndarray
+    error: np.ndarray
+
+
+def _known_strains(
+    shown: Sequence[Shown], skin: Skin, statics: SoftStatics, net: Network, twin: Twin, angle: float
+) -> Known:
+    turn, body = turned(angle), twin.body()
+    assert isinstance(body, SoftBody)
+    parts = []
+    for trial in shown:
+        if trial.nodes is not None:
+            nodes, R, error = trial.nodes, trial.sensed.resistance, STRAIN_FREE
+        else:
+            frames = trial.frames()
+            at = [i for i, _ in frames]
+            R, error = trial.sensed.resistance[at], STRAIN_PUSHED
+            start = net(Felt(strain(R, body.cords), trial.sensed.displacement[at]))[0]
+            nodes = net.modes.nodes(np.stack([fit_cloud(c, turn, skin, net, z) for (_, c), z in zip(frames, start, strict=True)]))
+        parts.append((statics.sensed(nodes)["strain"], R, np.full(len(R), error)))
+    return Known(*(np.concatenate(p) for p in zip(*parts, strict=True)))
+
+
+def _sensors(known: Known, twin: Twin) -> dict[str, Fitted]:
+    priors = {p.name: p for p in twin.robot.nuisance}
+    out: dict[str, Fitted] = {}
+    for i in range(known.strain.shape[1]):
+        mine = [priors[f"sensors.{name}_{i + 1}"] for name in ("resistance", "stretch", "compression")]
+        good = np.isfinite(known.resistance[:, i])
+        if not good.any():
+            continue
+        values, stds = _sensor(known.strain[good, i], known.resistance[good, i], known.error[good], mine)
+        for p, value, std in zip(mine, values, stds, strict=True):
+            out[p.name] = Fitted(float(np.clip(value, p.low, p.high)), float(std), p.unit)
+    return out
+
+
+def _sensor(eps: np.ndarray, R: np.ndarray, error: np.ndarray, priors: Sequence[Parameter]) -> tuple[np.ndarray, np.ndarray]:
+    """R0, kappa of stretch and of compression, and their standard errors."""
+    mean, spread = np.array([p.value for p in priors]), np.array([p.std or np.inf for p in priors])
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        kappa = np.where(eps > 0.0, x[1], x[2])
+        sigma = np.hypot(error * np.sqrt(R), OHM / (2.0 * np.sqrt(R)))
+        return (np.sqrt(x[0]) * (1.0 + kappa * eps) - np.sqrt(R)) / sigma
+
+    low, high = np.array([p.low for p in priors]), np.array([p.high for p in priors])
+    start = np.clip(np.r_[np.median(R[np.abs(eps) < 5e-3]) if (np.abs(eps) < 5e-3).any() else mean[0], mean[1:]], low, high)
+    found = least_squares(
+        lambda x: np.r_[residual(x), (x - mean) / spread], start, loss="soft_l1", f_scale=2.0, x_scale=spread, bounds=(low, high)
+    )  # fmt: skip
+    wrong = max(1.0, float((residual(found.x) ** 2).mean()))
+    covariance = np.linalg.inv(found.jac.T @ found.jac) * wrong
+    return found.x, np.sqrt(np.diag(covariance))
