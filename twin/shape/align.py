@@ -1,10 +1,7 @@
 """Alignment of a twin to a built finger from partial clouds, without a label: mounting angle, R0 and kappa of every sensor.
 
 1. Mounting angle: where nothing pushes, tendons of known length give the shape; it is turned until the clouds lie on it.
-2. Shape under a hand: coordinates of the twin's deformation modes, frame by frame, with the factory's spread as prior:
-
-       min over z   sum_p rho(d_p(z) / sigma) + sum_k (z_k / spread_k)^2,      d_p from the cloud's points to the visible skin
-
+2. Shape under a hand: coordinates of the twin's deformation modes, frame by frame (`cloud_fit.py`).
 3. Sensors: with both kinds of shapes the strains are known, and sqrt(R) = a + a kappa+ max(eps, 0) + a kappa- min(eps, 0), a =
    sqrt(R0), is linear in (a, a kappa+, a kappa-): least squares, robust, with the robot's priors.
 
@@ -27,16 +24,13 @@ from twin.sensors import strain
 from twin.shape.modal import FILE, Network, read_weights
 from twin.shape.estimator import Felt
 from twin.shape.sensing import Sensed, sense
+from twin.shape.cloud_fit import CLOUD, BEYOND, CloudFit
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody, SoftStatics
 from twin.soft.statics import turned
 from twin.twin import Twin, simulate
 
-CLOUD = 4e-4  # m, noise of a cloud's point along the normal; robust beyond
-BEYOND = 3.0  # standard deviations
 STRAIN_FREE, STRAIN_PUSHED = 4e-4, 1e-3  # what strains of shapes by tendons and by clouds are wrong by
-ROUNDS = 12  # of a frame's fit
-SETTLED = 2e-5  # m
 OHM = 0.3
 
 
@@ -136,27 +130,6 @@ def _angle(skin: Skin, shown: Sequence[Shown], twin: Twin) -> tuple[float, float
     return float(found.x[0]), float(1.0 / np.sqrt((slope**2).sum()))
 
 
-def fit_cloud(
-    cloud: np.ndarray, turn: np.ndarray, skin: Skin, net: Network, start: np.ndarray
-) -> np.ndarray:
-    """Coordinates (k,) m of the modes whose visible skin lies closest to a cloud (n, 3) m, from `start`, by Gauss-Newton steps with
-    correspondences sought again in each."""
-    modes, z = net.modes, start
-    own = cloud @ turn
-    basis = np.einsum("mn,knc->mkc", skin.weights, modes.basis.reshape(len(modes.basis), -1, 3))
-    for _ in range(ROUNDS):
-        x, normals = skin.at(modes.nodes(z[None])[0])
-        d, nearest = distances(own, x, normals, facing(normals, turn))
-        J = np.einsum("pkc,pc->pk", basis[nearest], normals[nearest])
-        weight = 1.0 / (CLOUD**2 * np.sqrt(1.0 + (d / (BEYOND * CLOUD)) ** 2))
-        H = (J * weight[:, None]).T @ J + np.diag(1.0 / modes.spread**2)
-        step = np.linalg.solve(H, J.T @ (weight * d) - z / modes.spread**2)
-        z = z + step
-        if np.abs(step).max() < SETTLED * np.sqrt(len(cloud)):
-            break
-    return z
-
-
 @dataclass(frozen=True)
 class Known:
     """Strains (n, s) that shapes have, resistances (n, s) ohm measured there, and what the strains are wrong by (n,)."""
@@ -169,9 +142,9 @@ class Known:
 def _known_strains(
     shown: Sequence[Shown], skin: Skin, statics: SoftStatics, net: Network, twin: Twin, angle: float
 ) -> Known:
-    turn, body = turned(angle), twin.body()
+    body = twin.body()
     assert isinstance(body, SoftBody)
-    parts = []
+    fit, parts = CloudFit(skin, net, turned(angle)), []
     for trial in shown:
         if trial.nodes is not None:
             nodes, R, error = trial.nodes, trial.sensed.resistance, STRAIN_FREE
@@ -180,7 +153,7 @@ def _known_strains(
             at = [i for i, _ in frames]
             R, error = trial.sensed.resistance[at], STRAIN_PUSHED
             start = net(Felt(strain(R, body.cords), trial.sensed.displacement[at]))[0]
-            nodes = net.modes.nodes(np.stack([fit_cloud(c, turn, skin, net, z) for (_, c), z in zip(frames, start, strict=True)]))
+            nodes = net.modes.nodes(np.stack([fit(c, z) for (_, c), z in zip(frames, start, strict=True)]))
         parts.append((statics.sensed(nodes)["strain"], R, np.full(len(R), error)))
     return Known(*(np.concatenate(p) for p in zip(*parts, strict=True)))
 

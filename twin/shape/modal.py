@@ -17,7 +17,7 @@ import numpy as np
 from twin.errors import DataError
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.shape.features import features
-from twin.shape.modes import Modes
+from twin.shape.modes import Habit, Modes
 from twin.twin import Twin
 
 FILE, FORMAT = "modal.npz", "twin-modal/1"
@@ -47,12 +47,14 @@ class Modal(Estimator):
 
 
 class Network:
-    """The trained network: layers, modes and what it knows."""
+    """The trained network: layers, modes and what it knows; `habit`: how its modes go together where
+    hands push a finger whose tendons are paid out."""
 
     def __init__(self, arrays: dict[str, Any]) -> None:
         self.layers = [(arrays[f"weight_{i}"], arrays[f"bias_{i}"]) for i in range(int(arrays["layers"]))]
         self.modes = Modes(arrays["mean"], arrays["basis"], arrays["spread"])
         self.rest, self.widen = float(arrays["rest"]), arrays["widen"]
+        self.habit = Habit(arrays["habit"], arrays["habit_inverse"], self.modes.spread)
         self._centre, self._inverse, self._far = arrays["known_mean"], arrays["known_inverse"], float(arrays["known_far"])
 
     def __call__(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:

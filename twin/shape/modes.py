@@ -44,3 +44,38 @@ class Modes:
     def nodes(self, z: np.ndarray) -> np.ndarray:
         """(n, n_free, 3) m of coordinates (n, k)."""
         return (self.mean + z @ self.basis).reshape(len(z), -1, 3)
+
+
+@dataclass(frozen=True)
+class Habit:
+    """How modes go together in a family of shapes: z = cubic(z_1, z_2) + e, e normal with the inverse covariance `inverse` (k, k)
+    1/m^2; `coefficient` (10, k) m of the powers of z_1, z_2 in their spreads. Of z_1 and z_2 themselves the cubic is zero."""
+
+    coefficient: np.ndarray
+    inverse: np.ndarray
+    spread: np.ndarray
+
+    @staticmethod
+    def fit(z: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients and inverse covariance for shapes z (n, k)."""
+        features = _powers(*(z[:, :2] / spread[:2]).T)[0]
+        coefficient = np.linalg.lstsq(features, z, rcond=None)[0]
+        coefficient[:, :2] = 0.0
+        away = z - features @ coefficient
+        return coefficient, np.linalg.inv(away.T @ away / len(z))
+
+    def __call__(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """e (k,) m of z (k,), and de/dz (k, k)."""
+        value, slope = _powers(*(z[:2] / self.spread[:2]))
+        D = np.eye(len(z))
+        D[:, :2] -= (slope @ self.coefficient).T / self.spread[:2]
+        return z - value @ self.coefficient, D
+
+
+def _powers(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """1, a, b, .. b^3 (..., 10), and their derivatives by a and b (2, ..., 10)."""
+    one, none = np.ones_like(a), np.zeros_like(a)
+    value = [one, a, b, a * a, a * b, b * b, a**3, a * a * b, a * b * b, b**3]
+    by_a = [none, one, none, 2 * a, b, none, 3 * a * a, 2 * a * b, b * b, none]
+    by_b = [none, none, one, none, a, 2 * b, none, a * a, 2 * a * b, 3 * b * b]
+    return np.stack(value, axis=-1), np.stack([np.stack(by_a, axis=-1), np.stack(by_b, axis=-1)])

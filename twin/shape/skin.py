@@ -15,6 +15,7 @@ from twin.soft import Cone, SoftBody
 
 LOOKS = np.array([-np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # the camera's direction in the base frame
 RINGS, AROUND, FACE = 41, 48, 5
+RIM = slice((RINGS - 1) * AROUND, RINGS * AROUND)  # the last ring of the mantle
 GRAZING = -0.05  # cosine from which a point may be seen: a little beyond the edge, where noise puts points
 
 
@@ -53,7 +54,7 @@ def _mantle(cone: Cone) -> np.ndarray:
 
 
 def _face(cone: Cone) -> np.ndarray:
-    return _rings(cone.tip * np.linspace(1.0, 0.0, FACE, endpoint=False)[::1] * 0.98, np.full(FACE, cone.length))
+    return _rings(cone.tip * np.linspace(0.98, 0.0, FACE, endpoint=False), np.full(FACE, cone.length))
 
 
 def _rings(radius: np.ndarray, z: np.ndarray) -> np.ndarray:

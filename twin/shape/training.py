@@ -13,7 +13,7 @@ from twin.factory import shard
 from twin.factory.draw import LENGTH as CHAIN
 from twin.shape.features import features
 from twin.shape.modal import FORMAT
-from twin.shape.modes import COUNT, Modes
+from twin.shape.modes import COUNT, Habit, Modes
 
 WIDTH, LAYERS = 192, 3
 BATCH = 1024
@@ -109,6 +109,8 @@ def _known(data: Data) -> dict[str, Any]:
     inverse = np.linalg.inv(np.cov(data.strain.T))
     x = data.strain - centre
     far = np.quantile(np.einsum("ni,ij,nj->n", x, inverse, x), 0.999)
-    m = data.modes
+    m, slack = data.modes, data.kind == "pushed"
     known = {"known_mean": centre, "known_inverse": inverse, "known_far": np.array(far)}
+    coefficient, inverse_habit = Habit.fit(data.z[slack], m.spread)
+    known |= {"habit": coefficient, "habit_inverse": inverse_habit}
     return known | {"mean": m.mean, "basis": m.basis.astype(np.float32), "spread": m.spread}
