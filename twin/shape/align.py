@@ -19,19 +19,19 @@ from scipy.optimize import least_squares
 from twin.bench import prepare
 from twin.errors import DataError
 from twin.measurements import Clouds, Recording
-from twin.quantities import Fitted, Parameter
+from twin.quantities import Fitted
 from twin.sensors import strain
 from twin.shape.modal import FILE, Network, read_weights
 from twin.shape.estimator import Felt
 from twin.shape.sensing import Sensed, sense
+from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
 from twin.shape.cloud_fit import CLOUD, BEYOND, CloudFit
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody, SoftStatics
 from twin.soft.statics import turned
 from twin.twin import Twin, simulate
 
-STRAIN_FREE, STRAIN_PUSHED = 4e-4, 1e-3  # what strains of shapes by tendons and by clouds are wrong by
-OHM = 0.3
+STEP = 1e-4  # m in z, of differences
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,7 @@ def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = la
     statics = SoftStatics(body)
     for sweep in range(2):
         progress(f"shapes under the hand, sweep {sweep + 1}")
-        points = _known_strains(shown, skin, statics, net, twin, angle)
-        fitted |= _sensors(points, twin)
+        fitted |= fit_sensors(_known(shown, CloudFit(skin, net, turned(angle)), statics, net, twin), twin)
         twin = replace(twin, values={**twin.values, **{name: f.value for name, f in fitted.items()}})
     stds = {p.name: p.std for p in twin.robot.nuisance}
     unfixed = tuple(n for n in stds if n not in fitted or (fitted[n].std or 0.0) > 0.5 * (stds[n] or np.inf))
@@ -130,62 +129,31 @@ def _angle(skin: Skin, shown: Sequence[Shown], twin: Twin) -> tuple[float, float
     return float(found.x[0]), float(1.0 / np.sqrt((slope**2).sum()))
 
 
-@dataclass(frozen=True)
-class Known:
-    """Strains (n, s) that shapes have, resistances (n, s) ohm measured there, and what the strains are wrong by (n,)."""
-
-    strain: np.ndarray
-    resistance: np.ndarray
-    error: np.ndarray
-
-
-def _known_strains(
-    shown: Sequence[Shown], skin: Skin, statics: SoftStatics, net: Network, twin: Twin, angle: float
-) -> Known:
+def _known(shown: Sequence[Shown], fit: CloudFit, statics: SoftStatics, net: Network, twin: Twin) -> Known:
+    """Strains that the shapes have, and resistances measured there."""
     body = twin.body()
     assert isinstance(body, SoftBody)
-    fit, parts = CloudFit(skin, net, turned(angle)), []
+    parts = []
     for trial in shown:
         if trial.nodes is not None:
-            nodes, R, error = trial.nodes, trial.sensed.resistance, STRAIN_FREE
-        else:
-            frames = trial.frames()
-            at = [i for i, _ in frames]
-            R, error = trial.sensed.resistance[at], STRAIN_PUSHED
-            start = net(Felt(strain(R, body.cords), trial.sensed.displacement[at]))[0]
-            nodes = net.modes.nodes(np.stack([fit(c, z) for (_, c), z in zip(frames, start, strict=True)]))
-        parts.append((statics.sensed(nodes)["strain"], R, np.full(len(R), error)))
+            eps = statics.sensed(trial.nodes)["strain"]
+            covariance = np.broadcast_to(FREE**2 * np.eye(eps.shape[1]), (len(eps), eps.shape[1], eps.shape[1]))
+            parts.append((eps, trial.sensed.resistance, covariance))
+            continue
+        frames = trial.frames()
+        at = [i for i, _ in frames]
+        R = trial.sensed.resistance[at]
+        start = net(Felt(strain(R, body.cords), trial.sensed.displacement[at]))[0]
+        found = [_by_cloud(fit, statics, net, cloud, z) for (_, cloud), z in zip(frames, start, strict=True)]
+        parts.append((np.stack([e for e, _ in found]), R, np.stack([c for _, c in found])))
     return Known(*(np.concatenate(p) for p in zip(*parts, strict=True)))
 
 
-def _sensors(known: Known, twin: Twin) -> dict[str, Fitted]:
-    priors = {p.name: p for p in twin.robot.nuisance}
-    out: dict[str, Fitted] = {}
-    for i in range(known.strain.shape[1]):
-        mine = [priors[f"sensors.{name}_{i + 1}"] for name in ("resistance", "stretch", "compression")]
-        good = np.isfinite(known.resistance[:, i])
-        if not good.any():
-            continue
-        values, stds = _sensor(known.strain[good, i], known.resistance[good, i], known.error[good], mine)
-        for p, value, std in zip(mine, values, stds, strict=True):
-            out[p.name] = Fitted(float(np.clip(value, p.low, p.high)), float(std), p.unit)
-    return out
-
-
-def _sensor(eps: np.ndarray, R: np.ndarray, error: np.ndarray, priors: Sequence[Parameter]) -> tuple[np.ndarray, np.ndarray]:
-    """R0, kappa of stretch and of compression, and their standard errors."""
-    mean, spread = np.array([p.value for p in priors]), np.array([p.std or np.inf for p in priors])
-
-    def residual(x: np.ndarray) -> np.ndarray:
-        kappa = np.where(eps > 0.0, x[1], x[2])
-        sigma = np.hypot(error * np.sqrt(R), OHM / (2.0 * np.sqrt(R)))
-        return (np.sqrt(x[0]) * (1.0 + kappa * eps) - np.sqrt(R)) / sigma
-
-    low, high = np.array([p.low for p in priors]), np.array([p.high for p in priors])
-    start = np.clip(np.r_[np.median(R[np.abs(eps) < 5e-3]) if (np.abs(eps) < 5e-3).any() else mean[0], mean[1:]], low, high)
-    found = least_squares(
-        lambda x: np.r_[residual(x), (x - mean) / spread], start, loss="soft_l1", f_scale=2.0, x_scale=spread, bounds=(low, high)
-    )  # fmt: skip
-    wrong = max(1.0, float((residual(found.x) ** 2).mean()))
-    covariance = np.linalg.inv(found.jac.T @ found.jac) * wrong
-    return found.x, np.sqrt(np.diag(covariance))
+def _by_cloud(
+    fit: CloudFit, statics: SoftStatics, net: Network, cloud: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Strains (s,) of the shape behind a cloud and their covariance (s, s)."""
+    z, covariance = fit(cloud, start)
+    eps = statics.sensed(net.modes.nodes(np.concatenate([z[None], z + STEP * np.eye(len(z))])))["strain"]
+    slope = (eps[1:] - eps[0]).T / STEP
+    return eps[0], slope @ covariance @ slope.T + PUSHED**2 * np.eye(len(slope))

@@ -35,9 +35,9 @@ class CloudFit:
         basis = self.modes.basis.reshape(len(self.modes.basis), -1, 3)
         self.basis = np.einsum("mn,knc->mck", skin.weights, basis)
 
-    def __call__(self, cloud: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Coordinates (k,) m for points (n, 3) m, from a start (k,)."""
-        own = cloud @ self.turn
+    def __call__(self, cloud: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (k,) m for points (n, 3) m, from a start (k,), and their covariance (k, k) m^2."""
+        own, hessian = cloud @ self.turn, self.habit.inverse
         for _ in range(ROUNDS):
             x, normals = self.skin.at(self.modes.nodes(z[None])[0])
             visible = facing(normals, self.turn)
@@ -48,12 +48,13 @@ class CloudFit:
             H = (J * weight[:, None]).T @ J + D.T @ self.habit.inverse @ D
             g = J.T @ (weight * d) - D.T @ self.habit.inverse @ away
             edge = self._edge(own, x, visible)
-            step = np.linalg.solve(H + edge[0], g + edge[1])
+            hessian = H + edge[0]
+            step = np.linalg.solve(hessian, g + edge[1])
             size = np.linalg.norm(step)
             z = z + step * min(1.0, LONGEST / size)
             if size < SETTLED:
                 break
-        return z
+        return z, np.linalg.inv(hessian)
 
     def _edge(self, own: np.ndarray, x: np.ndarray, visible: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the rim adds to the Hessian and to the downhill direction."""
