@@ -67,7 +67,7 @@ def draw(rng: np.random.Generator, cone: Cone, azimuth: np.ndarray, doubts: Sequ
     if KINDS[kind] != "pushed":
         command = np.stack([_tendons(rng, azimuth) for _ in range(TARGETS)])
     count = 0 if KINDS[kind] == "free" else PUSHES
-    return Chain(kind, command, tuple(_pushes(rng, cone, count) for _ in range(TARGETS)), values)
+    return Chain(kind, command, tuple(draw_pushes(rng, cone, count) for _ in range(TARGETS)), values)
 
 
 def _tendons(rng: np.random.Generator, azimuth: np.ndarray) -> np.ndarray:
@@ -76,7 +76,8 @@ def _tendons(rng: np.random.Generator, azimuth: np.ndarray) -> np.ndarray:
     return bend * np.cos(azimuth - towards) + pretension[np.arange(len(azimuth)) % 2]
 
 
-def _pushes(rng: np.random.Generator, cone: Cone, count: int) -> Pushes:
+def draw_pushes(rng: np.random.Generator, cone: Cone, count: int) -> Pushes:
+    """Up to `count` pushes at once."""
     height = rng.uniform(LOWEST, cone.length, count)
     azimuth = rng.uniform(0.0, 2.0 * np.pi, count)
     strength = np.minimum(MOMENT / (height - cone.clamp), STRONGEST) * rng.uniform(0.0, 1.0, count)

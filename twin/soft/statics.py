@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
 
@@ -62,8 +63,8 @@ class SoftStatics:
         return self.solid.cells.weight.size * 6
 
     def solve(self, problem: Problem) -> SoftPath:
-        """As `_solve`, each of its small systems by one thread: with two, these take tens of times longer on a busy machine."""
-        with _threads().limit(limits=1):
+        """As `_solve`, by one thread."""
+        with single_thread():
             return self._solve(problem)
 
     def _solve(self, problem: Problem) -> SoftPath:
@@ -95,6 +96,21 @@ class SoftStatics:
         strain = np.linalg.norm(np.diff(moved, axis=2), axis=3).sum(axis=2) / self._cord_rest - 1.0
         rest = np.broadcast_to(self.body.cords.rest, strain.shape)
         return {"strain": strain, "sensor": resistance(strain, self.body.cords), "sensor_rest": rest}
+
+
+    def strain_slope(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Strains (s,) of the cords at nodes' displacements u (n_free, 3) m, and their derivatives (s, 3 n_free) 1/m."""
+        s, points, _ = self.body.cord_paths.shape
+        weights = self._cords.reshape(s, points, -1)
+        piece = np.diff(self.body.cord_paths + weights @ u, axis=1)
+        length = np.linalg.norm(piece, axis=2)
+        slope = np.einsum("spc,spn->snc", piece / length[..., None], np.diff(weights, axis=1)).reshape(s, -1)
+        return length.sum(axis=1) / self._cord_rest - 1.0, slope / self._cord_rest[:, None]
+
+
+def single_thread() -> AbstractContextManager[object]:
+    """Small systems by one thread each: with two, these take tens of times longer on a busy machine."""
+    return _threads().limit(limits=1)
 
 
 @cache
