@@ -5,7 +5,7 @@ solve.py     its equilibria                        generate.py  shards by severa
 shard.py     Parquet in and out
 """
 
-from twin.factory.generate import Order, generate, need
+from twin.factory.generate import Order, doubts, generate, need
 from twin.factory.points import Points, named_points
 
-__all__ = ["Order", "Points", "generate", "named_points", "need"]
+__all__ = ["Order", "Points", "doubts", "generate", "named_points", "need"]

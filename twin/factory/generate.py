@@ -8,7 +8,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from twin.factory.points import named_points
 from twin.factory.solve import walk, weight_of
 from twin.quantities import Parameter, Values
 from twin.robots import Robot
+from twin.storage import read_twin, standard_errors
 from twin.soft import SoftBody, SoftStatics
 
 MANIFEST = "factory.json"
@@ -47,6 +48,15 @@ class Order:
             "format": FORMAT, "robot": self.robot.name, "description": digest, "samples": self.samples, "seed": self.seed,
             "doubts": {p.name: [p.value, p.std] for p in self.doubts},
         }  # fmt: skip
+
+
+def doubts(source: str) -> tuple[Robot, tuple[Parameter, ...]]:
+    """The robot of a twin.toml, a folder that holds one, or a robot's name; and its uncertain numbers: of a robot as described by its
+    own std, of a calibrated twin around what was found, by the standard errors in its file where it has them."""
+    twin = read_twin(source)
+    errors = standard_errors(source)
+    drawn = (replace(p, value=twin.values.get(p.name, p.value), std=errors.get(p.name, p.std)) for p in twin.robot.nuisance)
+    return twin.robot, tuple(drawn)
 
 
 def need(samples: int) -> int:

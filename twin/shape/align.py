@@ -10,6 +10,7 @@ Every step is smooth and small; `tools/shape_error.py` holds it against a black-
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -46,6 +47,7 @@ class Aligned:
     frames: int
     unfixed: tuple[str, ...]
     notices: tuple[str, ...]
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ class Shown:
 
 def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = lambda words: None) -> Aligned:
     """The twin aligned to a recording that has clouds. Raises DataError where no trial has, or none is free of a hand."""
+    begun = time.perf_counter()
     shown, notices = _shown(recording, twin)
     body = twin.body()
     assert isinstance(body, SoftBody)
@@ -82,7 +85,8 @@ def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = la
     stds = {p.name: p.std for p in twin.robot.nuisance}
     unfixed = tuple(n for n in stds if n not in fitted or (fitted[n].std or 0.0) > 0.5 * (stds[n] or np.inf))
     frames = sum(len(s.frames()) for s in shown)
-    return Aligned(twin, fitted, before, _misfit(skin, shown, angle), frames, unfixed, notices)
+    after = _misfit(skin, shown, angle)
+    return Aligned(twin, fitted, before, after, frames, unfixed, notices, time.perf_counter() - begun)
 
 
 def _shown(recording: Recording, twin: Twin) -> tuple[list[Shown], tuple[str, ...]]:

@@ -34,7 +34,7 @@ class Modal(Estimator):
         weights = self.body.lattice.weights(self.points.rest)
         self._mean, basis = self.net.modes.mean.reshape(-1, 3), self.net.modes.basis.reshape(len(self.net.modes.basis), -1, 3)
         if self._mean.shape[0] != weights.shape[1]:
-            raise DataError(f"{twin.robot.folder / FILE} was trained for another lattice; train it again: python -m tools.train_shape")
+            raise DataError(f"{twin.robot.folder / FILE} was trained for another lattice; train it again: twin train")
         self._basis = np.einsum("pn,knc->kpc", weights, basis)
         self._mean = weights @ self._mean
 
@@ -79,9 +79,9 @@ def read_weights(path: Path) -> dict[str, Any]:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         if str(arrays["format"]) != FORMAT:
-            raise DataError(f"{path}: format {arrays['format']}; {FORMAT} is needed, train it again: python -m tools.train_shape")
+            raise DataError(f"{path}: format {arrays['format']}; {FORMAT} is needed, train it again: twin train")
     except FileNotFoundError:
-        raise DataError(f"{path}: no weights there; train them: python -m tools.train_shape") from None
+        raise DataError(f"{path}: no weights there; train them: twin train") from None
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as fault:
-        raise DataError(f"{path}: no weights of this program ({fault}); train them again: python -m tools.train_shape") from None
+        raise DataError(f"{path}: no weights of this program ({fault}); train them again: twin train") from None
     return {name: a.astype(float) if a.dtype == np.float32 else a for name, a in arrays.items()}

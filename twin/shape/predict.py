@@ -43,11 +43,14 @@ class SkinOf:
     def __init__(self, estimator: Estimator) -> None:
         skin = Skin.of(estimator.body)
         self.rest = skin.rest
-        self.map = skin.weights @ np.linalg.pinv(estimator.body.lattice.weights(estimator.points.rest), rcond=1e-6)
+        self.weights = skin.weights
+        self.inverse = np.linalg.pinv(estimator.body.lattice.weights(estimator.points.rest), rcond=1e-6)
 
     def __call__(self, shapes: Shapes) -> np.ndarray:
         """(n, M, 3) m in the finger's own frame."""
-        return self.rest + np.matmul(self.map, shapes.moved)
+        n, p = shapes.moved.shape[:2]
+        nodes = self.inverse @ shapes.moved.transpose(1, 0, 2).reshape(p, -1)
+        return self.rest + (self.weights @ nodes).reshape(-1, n, 3).transpose(1, 0, 2)
 
 
 def write(path: Path, arrays: dict[str, np.ndarray]) -> None:
