@@ -1,6 +1,6 @@
 """The twin itself: the shape in equilibrium with the tendons' known lengths and the smooth push that best explains the strains.
 
-    max over a   -|a|^2 - |eps(u(a)) - eps_felt|^2 / sigma^2,       push on the nodes f = B a,  a ~ N(0, 1)
+    max over a   -|a|^2 - |(eps(u(a)) - eps_felt) / sigma|^2,       push on the nodes f = B a,  a ~ N(0, 1)
 
 B is the root of the covariance of the factory's hands, so that a is a Gaussian process of smooth loads on the skin; u(a) is the
 equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before; the covariance of the last step,
@@ -14,18 +14,18 @@ from functools import lru_cache
 import numpy as np
 
 from twin.factory.draw import PUSHES, draw_pushes
-from twin.factory.solve import NO_WALL, UNRELAXED, Surface, hang, march, surface, weight_of
+from twin.factory.solve import Surface, hang, march, surface, weight_of
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.soft import Cone, SoftStatics
-from twin.soft.cables import follow
-from twin.soft.finger import Burden, Pull, Shape, getrs
+from twin.soft.finger import getrs
 from twin.soft.statics import single_thread
 from twin.twin import Twin
 
 HANDS, RANK = 4000, 60  # hands drawn for the prior, components kept: the others push with less than 1 % of it
-STRAIN = 5e-4  # what a felt strain is wrong by, the twin's own error with it
+STRAIN, GAIN = 5e-4, 0.01  # what a felt strain is wrong by, the twin's own error with it: so much, and this share of it
 ROUNDS = 4
 SETTLED = 0.02  # of a step in a
+LONGEST = 4.0  # of a step in a
 OUTSIDE = 4.0  # standard deviations of the residual strain, or of a push, that the twin does not explain
 OWN = 1.5e-4  # m, the twin's own error at a point
 
@@ -70,7 +70,7 @@ class _Walk:
         self.owner, self.solid = owner, owner.statics.solid
         self.shape = self.solid.rest()
         self.hanging = hang(self.solid, self.shape, owner.weight)
-        self.at, self.a = np.zeros(len(self.hanging)), np.zeros(RANK)
+        self.at, self.burden, self.a = np.zeros(len(self.hanging)), owner.weight, np.zeros(RANK)
 
     def to(self, displacement: np.ndarray, strain: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, bool]:
         """Displacements (P, 3), std (P,) and whether this is outside, of the next sample; strain None where nothing pushes."""
@@ -79,15 +79,18 @@ class _Walk:
             found = self._march(displacement, np.zeros(RANK))
             moved = self.owner.weights @ self.shape.u
             return moved, np.full(len(moved), OWN), not found
-        felt, covariance, wrong, found = strain[there], np.eye(RANK), np.zeros(1), True
-        response = np.zeros((self.shape.u.size, RANK))
+        felt, covariance, wrong, step = strain[there], np.eye(RANK), np.zeros(1), np.zeros(RANK)
+        noise, response, found = np.hypot(STRAIN, GAIN * felt), np.zeros((self.shape.u.size, RANK)), True
         for _ in range(ROUNDS):
-            found &= self._march(displacement, self.a)
+            if not self._march(displacement, self.a):
+                found, step, covariance, response = False, np.zeros(RANK), np.eye(RANK), self._again(displacement)
+                break
             response = self._response()
             eps, slope = self._strain()
             J, wrong = (slope @ response)[there], felt - eps[there]
-            gain = np.linalg.solve(J @ J.T + STRAIN**2 * np.eye(len(felt)), J).T
+            gain = np.linalg.solve(J @ J.T + np.diag(noise**2), J).T
             step = gain @ (wrong + J @ self.a) - self.a
+            step *= min(1.0, LONGEST / np.linalg.norm(step))
             covariance = np.eye(RANK) - gain @ J
             self.a = self.a + step
             if np.abs(step).max() < SETTLED:
@@ -95,13 +98,20 @@ class _Walk:
         moved = self.owner.weights @ (self.shape.u + (response @ step).reshape(-1, 3))
         G = np.einsum("pn,nck->pck", self.owner.weights, response.reshape(-1, 3, RANK))
         variance = np.einsum("pck,kl,pcl->p", G, covariance, G, optimize=True) + OWN**2
-        far = np.abs(self.a).max() > OUTSIDE or np.abs(wrong).max() > OUTSIDE * STRAIN
-        return moved, np.sqrt(variance), bool(far or not found)
+        far = not found or np.abs(self.a).max() > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
+        return moved, np.sqrt(variance), bool(far)
+
+    def _again(self, displacement: np.ndarray) -> np.ndarray:
+        """Back to rest and to the tendons alone, where a push led nowhere; the response there."""
+        self.shape, self.a = self.solid.rest(), np.zeros(RANK)
+        hang(self.solid, self.shape, self.owner.weight)
+        self.at, self.burden = np.zeros(len(self.hanging)), self.owner.weight
+        self._march(displacement, self.a)
+        return self._response() if self.shape.LU is not None else np.zeros((self.shape.u.size, RANK))
 
     def _march(self, displacement: np.ndarray, a: np.ndarray) -> bool:
-        start = self.at, self.burden if hasattr(self, "burden") else self.owner.weight
         goal = displacement, self.owner.weight + (self.owner.prior @ a).reshape(-1, 3)
-        self.shape, found = march(self.solid, self.shape, self.hanging, start, goal)
+        self.shape, found = march(self.solid, self.shape, self.hanging, (self.at, self.burden), goal)
         if found:
             self.at, self.burden = goal
         return found
