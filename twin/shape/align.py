@@ -92,8 +92,9 @@ def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = la
 def _shown(recording: Recording, twin: Twin) -> tuple[list[Shown], tuple[str, ...]]:
     if not any(t.clouds is not None for t in recording.trials):
         raise DataError(f"{recording.title}: no trial has clouds; alignment needs them (`cloud` of a [[trial]])")
-    chosen = recording.select([k for k, t in enumerate(recording.trials) if t.clouds is not None])
-    sensed, notices = sense(chosen, twin)
+    everything, notices = sense(recording, twin)  # refuses a broken set, also where it breaks in a trial without clouds
+    keep = [k for k, t in enumerate(recording.trials) if t.clouds is not None]
+    chosen, sensed = recording.select(keep), [everything[k] for k in keep]
     if all(s.pushed for s in sensed):
         raise DataError(f"{recording.title}: a hand is on the finger in every trial with clouds; one free motion is needed")
     free = chosen.select([k for k, s in enumerate(sensed) if not s.pushed])

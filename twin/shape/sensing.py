@@ -21,7 +21,8 @@ from twin.twin import Twin
 
 ROUNDS = 30
 CONTACT = "external_contact"
-OPEN = 10.0  # times its resistance at rest: an open circuit
+OPEN = 3.0  # times its resistance at rest, or that part of it: strains of a finger make no more than 1.6
+FLAT, MOVING = 0.005, 0.03  # of the resistance at rest: noise is below the one, what moves is beyond the other
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,16 @@ def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[s
     bench = prepare(recording, twin.robot)
     if not bench.driven_by(Drive.DISPLACEMENT).all():
         raise DataError(f"{recording.title}: tendons are not driven by displacement; give tendon_I_displacement the role 'input'")
-    by_name = {t.name: t for t in recording.trials}
-    columns = {n: np.stack([by_name[n].values[c] for c in channels], axis=1) for n in by_name}
-    for name, values in columns.items():
+    by_name, notices, readings = {t.name: t for t in recording.trials}, _notices(bench), {}
+    for name, trial in by_name.items():
+        values = np.stack([trial.values[c] for c in channels], axis=1)
         _check(name, channels, values)
-    dead = _dead(channels, np.concatenate(list(columns.values())), body.cords.rest)
-    sensed = {i.name: _trial(twin, body, i, columns[i.name], list(dead), CONTACT in by_name[i.name].other) for i in bench.inputs}
-    return tuple(sensed[t.name] for t in recording.trials), (*_notices(bench), *dead.values())
+        readings[name], said = _alive(name, channels, values, body.cords.rest)
+        notices += said
+    if not any(np.isfinite(v).any() for v in readings.values()):
+        raise DataError(f"{recording.title}: no resistance is near {body.cords.rest.round(1).tolist()} ohm; check unit and robot")
+    sensed = {i.name: _trial(twin, body, i, readings[i.name], CONTACT in by_name[i.name].other) for i in bench.inputs}
+    return tuple(sensed[t.name] for t in recording.trials), tuple(notices)
 
 
 def _check(name: str, channels: list[str], values: np.ndarray) -> None:
@@ -75,22 +79,26 @@ def _notices(bench: Bench) -> list[str]:
     return [n for n in bench.notices if CONTACT not in n]
 
 
-def _dead(channels: list[str], values: np.ndarray, rest: np.ndarray) -> dict[int, str]:
-    """Sensors that say nothing, and why, by index."""
-    out: dict[int, str] = {}
-    span = np.array([np.ptp(v[np.isfinite(v)]) / r if np.isfinite(v).any() else 0.0 for v, r in zip(values.T, rest, strict=True)])
-    for i, (channel, column) in enumerate(zip(channels, values.T, strict=True)):
-        known = column[np.isfinite(column)]
-        if not len(known):
-            out[i] = f"{channel} is empty: the others are used"
-        elif np.median(known) > OPEN * rest[i]:
-            out[i] = f"{channel} reads {np.median(known):.3g} ohm, an open circuit: the others are used"
-        elif span[i] < 0.05 * np.median(span):
-            out[i] = f"{channel} does not change while others do, it is dead: the others are used"
-    return out
+def _alive(name: str, channels: list[str], values: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Readings (n, s) of one trial, NaN where a sensor says nothing, and what was found."""
+    out, said = values.copy(), []
+    broken = (values > OPEN * rest) | (values < rest / OPEN)
+    out[broken] = np.nan
+    known = np.isfinite(out)
+    span = np.array([np.ptp(v[k]) / r if k.any() else 0.0 for v, k, r in zip(out.T, known.T, rest, strict=True)])
+    still = (span < FLAT) & (np.median(span) > MOVING)
+    for i, channel in enumerate(channels):
+        if broken[:, i].any():
+            said.append(f"{name}: {channel} is an open or short circuit in {int(broken[:, i].sum())} rows; the others are used there")
+        elif not known[:, i].any():
+            said.append(f"{name}: {channel} is empty; the others are used")
+        elif still[i]:
+            out[:, i] = np.nan
+            said.append(f"{name}: {channel} does not change while the others do: it is dead, and they are used")
+    return out, said
 
 
-def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, dead: list[int], pushed: bool) -> Sensed:
+def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, pushed: bool) -> Sensed:
     laws = twin.laws
     driven = laws.drive(laws.command(inputs.signals.with_(antagonists=body.antagonists)))
     assert isinstance(body, SoftBody)
@@ -101,5 +109,4 @@ def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, dead: l
             seen = laws.sense(driven.with_(others={"sensor": R, "sensor_rest": rest})).group("sensor")[..., 0]
             R = np.maximum(R + known - seen, 1e-3 * rest)
     R = np.where(np.isfinite(reported), R, np.nan)
-    R[:, dead] = np.nan
     return Sensed(inputs.name, inputs.time, R, driven.command, pushed)
