@@ -55,7 +55,7 @@ def only(day: Recording, *trials: str) -> Recording:
 
 
 def test_alignment_finds_the_built_finger(aligned: Aligned) -> None:
-    """Bars: 0.5 deg moves a tip bent by 30 mm by 0.26 mm; 5 % of kappa is a twentieth of a bend, at most 0.5 mm of 10 on average."""
+    """Bars: 0.5 deg moves a tip bent by 30 mm by 0.26 mm; 5 % of kappa is a twentieth of a bend, some 0.5 mm of 10."""
     true = json.loads((DATA / "finger_shape_truth.json").read_text())["finger"]
     found = {n: f.value for n, f in aligned.fitted.items()}
     assert np.rad2deg(found["mounting.angle"]) == pytest.approx(true["phi_deg"], abs=0.5)

@@ -1,11 +1,11 @@
 """Error of estimated finger shapes by estimator, against the truth of bench days that nothing was trained or tuned on.
 
     python -m tools.bench.finger --shape --seed 1 --out DIR        a day of the independent finite element bench
-    python -m tools.shape_error DIR [DIR ...] [--estimators physics,modal] [--dead 2]
+    python -m tools.shape_error DIR [DIR ...] [--estimators physics,modal]
 
 For each estimator with the twin as described and with the twin aligned to the day's clouds: mean distance of the named points (mm) by
-trial, the share of points within the 90 % band (1.645 std), and the time a frame takes. --dead cuts a sensor off. --search adds
-alignment by a black-box search (CMA-ES, `pip install cma`) over all 13 numbers at once, for comparison.
+trial, the share of points within the 90 % band (1.645 std), and the time a frame takes. --dead 2 cuts sensor 2 off; --aligned leaves
+the twin as described out; --search adds a twin aligned by a black-box search (CMA-ES, `pip install cma`) over all 13 numbers at once.
 """
 
 from __future__ import annotations
@@ -79,13 +79,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("days", type=Path, nargs="+")
     parser.add_argument("--estimators", default=",".join(estimators()))
     parser.add_argument("--dead", type=int)
+    parser.add_argument("--aligned", action="store_true")
     parser.add_argument("--search", action="store_true")
     args = parser.parse_args(arguments)
     for day in args.days:
         recording, twin = read(day / "measured"), Twin.of(load("finger"))
         found = align(recording, twin)
         print(f"{day.name}: aligned in {found.seconds:.1f} s; off by {aligned_error(found, day / 'shape_truth.npz')}")
-        twins = {"described": twin, "aligned": found.twin}
+        twins = {"aligned": found.twin} if args.aligned else {"described": twin, "aligned": found.twin}
         if args.search:
             from tools.align_search import search
 
@@ -100,7 +101,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 s = score(day / "shape_truth.npz", arrays, time.perf_counter() - began)
                 errors = "  ".join(f"{k} {v:.2f}" for k, v in s.error.items())
                 mean = float(np.mean(list(s.error.values())))
-                print(f"  {name:20s} {label:10s} {mean:6.2f} mm  ({errors})  in band {100 * s.covered:.0f} %  {s.frame:.1f} ms", flush=True)
+                print(
+                    f"  {name:20s} {label:10s} {mean:6.2f} mm  ({errors})  in band {100 * s.covered:.0f} %  {s.frame:.1f} ms",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -246,7 +246,9 @@ class Generate:
         from twin.factory import Order, doubts, generate, need
 
         robot, drawn = doubts(self.twin)
-        out.print(f"{self.samples} samples take about {need(self.samples) / 1e6:.0f} MB in {self.out}", highlight=False, markup=False)
+        out.print(
+            f"{self.samples} samples take about {need(self.samples) / 1e6:.0f} MB in {self.out}", highlight=False, markup=False
+        )
         with _working(f"shapes of {robot.name}") as progress:
             lost = generate(
                 Order(robot, self.samples, self.seed, drawn), self.out, self.jobs,
@@ -257,7 +259,7 @@ class Generate:
 
 @dataclass(frozen=True)
 class Train:
-    """Train the network of the `modal` estimator on shapes that `twin generate` made. Needs torch: pip install tendon-twin[learn]."""
+    """Train the network of the `modal` estimator on shapes that `twin generate` made. Needs torch (extra `learn`)."""
 
     data: Positional[Annotated[Path, arg(help="folder of shards")]]
     out: Annotated[Path, arg(help="the weights to write; they ship beside a robot's robot.toml as modal.npz")]

@@ -1,8 +1,8 @@
 """What one chain of samples is asked: tendon commands and pushes on the skin, drawn from declared priors.
 
-A chain walks from rest through `TARGETS` targets in `STEPS` samples each, commands and forces in equal parts, so that every shape is
-close to the one before and half-made pushes are among the samples. Priors (ours; ranges of a finger that hands and motors bend by up
-to some 60 degrees):
+A chain walks from rest through `TARGETS` targets in `STEPS` samples each, commands and forces in equal parts, so that every shape
+is close to the one before and half-made pushes are among the samples. Priors (ours; ranges of a finger that hands and motors bend
+by up to some 60 degrees):
 
     kind       free motion | pushed with every tendon paid out | pushed while the tendons hold or pull
     tendons    d_i = c + bend cos(azimuth - azimuth_i): bend up to 11.5 mm, co-contraction c up to 2.5 mm a pair

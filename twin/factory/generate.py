@@ -23,8 +23,8 @@ from twin.factory.points import named_points
 from twin.factory.solve import walk, weight_of
 from twin.quantities import Parameter, Values
 from twin.robots import Robot
-from twin.storage import read_twin, standard_errors
 from twin.soft import SoftBody, SoftStatics
+from twin.storage import read_twin, standard_errors
 
 MANIFEST = "factory.json"
 FORMAT = "twin-factory/1"
@@ -51,8 +51,8 @@ class Order:
 
 
 def doubts(source: str) -> tuple[Robot, tuple[Parameter, ...]]:
-    """The robot of a twin.toml, a folder that holds one, or a robot's name; and its uncertain numbers: of a robot as described by its
-    own std, of a calibrated twin around what was found, by the standard errors in its file where it has them."""
+    """The robot of a twin.toml, a folder that holds one, or a robot's name; and its uncertain numbers: of a robot as described by
+    its own std, of a calibrated twin around what was found, by the standard errors in its file where it has them."""
     twin = read_twin(source)
     errors = standard_errors(source)
     drawn = (replace(p, value=twin.values.get(p.name, p.value), std=errors.get(p.name, p.std)) for p in twin.robot.nuisance)
@@ -77,7 +77,7 @@ def generate(order: Order, folder: Path, jobs: int, progress: Callable[[int, flo
     begun, made = time.perf_counter(), 0
     done = order.samples - sum(_rows(order, k) for k in todo)
     for rows in Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_shard)(order, folder, k) for k in todo):
-        made += rows
+        made += rows or 0
         progress(done + made, made / (time.perf_counter() - begun))
     return int((~shard.read(folder, ["converged"])["converged"]).sum())
 

@@ -22,11 +22,11 @@ from twin.errors import DataError
 from twin.measurements import Clouds, Recording
 from twin.quantities import Fitted
 from twin.sensors import strain
-from twin.shape.modal import FILE, Network, read_weights
+from twin.shape.cloud_fit import BEYOND, CLOUD, CloudFit
 from twin.shape.estimator import Felt
+from twin.shape.modal import FILE, Network, read_weights
 from twin.shape.sensing import Sensed, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
-from twin.shape.cloud_fit import CLOUD, BEYOND, CloudFit
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody, SoftStatics
 from twin.soft.statics import turned

@@ -2,10 +2,10 @@
 
     sum_p rho(d_p / sigma)  +  e' C^-1 e,  e = z - m(z_1, z_2)  +  sum_p -2 log Phi(-s_p / sigma)  +  2 l s_edge
 
-d_p is the distance of a point to the visible skin, rho = 2 b^2 (sqrt(1 + (d / b sigma)^2) - 1). m and C are the factory's, of fingers
-that a hand pushes: how a bent finger stretches and flattens, a cubic of its two bends, and how that scatters. A plane does not end: what says how long the finger is, is that its points end at the rim of the tip. They are
-evenly spread, l of them a metre, with noise, so a point at s_p beyond the rim has probability Phi(-s_p / sigma), and every metre the
-rim lies further out costs l.
+d_p is the distance of a point to the visible skin, rho = 2 b^2 (sqrt(1 + (d / b sigma)^2) - 1). m and C are the factory's, of
+fingers that a hand pushes: how a bent finger stretches and flattens, a cubic of its two bends, and how that scatters. A plane does
+not end: what says how long the finger is, is that its points end at the rim of the tip. They are evenly spread, l of them a metre,
+with noise, so a point at s_p beyond the rim has probability Phi(-s_p / sigma), and every metre the rim lies further out costs l.
 
 Gauss-Newton steps, correspondences sought again in each.
 """

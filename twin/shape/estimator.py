@@ -71,7 +71,8 @@ def estimators() -> dict[str, type[Estimator]]:
     for module in pkgutil.iter_modules(package.__path__):
         members = vars(importlib.import_module(f"{package.__name__}.{module.name}")).values()
         law = next(
-            (m for m in members if isinstance(m, type) and issubclass(m, Estimator) and m.__module__.endswith(f".{module.name}")), None
+            (m for m in members if isinstance(m, type) and issubclass(m, Estimator) and m.__module__.endswith(f".{module.name}")),
+            None,
         )
         if law is not None and law is not Estimator:
             found[module.name] = law

@@ -2,8 +2,9 @@
 
     (z, log std z) = MLP(features),       vertices = mean + basis z,      std^2 = sum_k (basis_k std z_k)^2 + rest^2
 
-Trained on the factory's shapes alone: of all the ways in which hands may have made these strains it gives the mean, and their spread.
-A strain pattern is outside what it knows where its distance from the factory's patterns, a Mahalanobis distance, is beyond theirs.
+Trained on the factory's shapes alone: of all the ways in which hands may have made these strains it gives the mean, and their
+spread. A strain pattern is outside what it knows where its distance from the factory's patterns, a Mahalanobis distance, is beyond
+theirs.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     nodes = mean + z @ basis,          z (k,) in m: sum z_i^2 is P times the mean squared displacement of the P named points
 
-The components are those of the named points, so that errors in z are errors of vertices; the nodes that go with them follow by least
-squares and give every other point of the body.
+The components are those of the named points, so that errors in z are errors of vertices; the nodes that go with them follow by
+least squares and give every other point of the body.
 """
 
 from __future__ import annotations

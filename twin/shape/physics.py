@@ -3,8 +3,9 @@
     max over a   -|a|^2 - |(eps(u(a)) - eps_felt) / sigma|^2,       push on the nodes f = B a,  a ~ N(0, 1)
 
 B is the root of the covariance of the factory's hands, so that a is a Gaussian process of smooth loads on the skin; u(a) is the
-equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before; the covariance of the last step,
-G (1 - J' (J J' + sigma^2)^-1 J) G', G = dx/da, J = deps/da, is the error bar. Without a push u is what the tendons make of it.
+equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before; the covariance of the last
+step, G (1 - J' (J J' + sigma^2)^-1 J) G', G = dx/da, J = deps/da, is the error bar. Without a push u is what the tendons make of
+it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ SETTLED = 0.02  # of a step in a
 LONGEST = 4.0  # of a step in a
 OUTSIDE = 4.0  # standard deviations of the residual strain, or of a push, that the twin does not explain
 OWN = 1.5e-4  # m, the twin's own error at a point
-FEWER = 0.7  # of the error bar: hands press in one to three places, fewer than a normal prior has; so that it holds 90 % of the factory's
+FEWER = 0.7  # of the error bar, to hold 90 % of the factory's points: hands press in fewer places than a normal prior has
 
 
 class Physics(Estimator):

@@ -15,8 +15,8 @@ from twin.soft.statics import turned
 
 
 def predict(recording: Recording, estimator: Estimator) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3) m of each trial, and
-    what a reader should know."""
+    """NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3) m of each trial,
+    and what a reader should know."""
     sensed, notices = sense(recording, estimator.twin)
     arrays, skin = {}, SkinOf(estimator)
     for trial in sensed:

@@ -1,7 +1,7 @@
 """From a measured trial to what an estimator is given: strains behind the resistances, and the tendons' displacements.
 
-Effects of the sensors that the twin has (drift, gain, hysteresis) are undone: R is sought such that what the sensors would report of
-it is what they reported, by R <- R + (reported - sense(R)).
+Effects of the sensors that the twin has (drift, gain, hysteresis) are undone: R is sought such that what the sensors would report
+of it is what they reported, by R <- R + (reported - sense(R)).
 """
 
 from __future__ import annotations
@@ -51,7 +51,9 @@ def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[s
     channels = [f"sensor_{i + 1}_resistance" for i in range(len(body.cord_paths))]
     there = {c.name for c in recording.channels}
     if missing := [c for c in channels if c not in there]:
-        raise DataError(f"{recording.title}: no column {', '.join(missing)}; a shape needs every sensor of robot {twin.robot.name!r}")
+        raise DataError(
+            f"{recording.title}: no column {', '.join(missing)}; a shape needs every sensor of robot {twin.robot.name!r}"
+        )
     bench = prepare(recording, twin.robot)
     if not bench.driven_by(Drive.DISPLACEMENT).all():
         raise DataError(f"{recording.title}: tendons are not driven by displacement; give tendon_I_displacement the role 'input'")
@@ -89,7 +91,9 @@ def _alive(name: str, channels: list[str], values: np.ndarray, rest: np.ndarray)
     still = (span < FLAT) & (np.median(span) > MOVING)
     for i, channel in enumerate(channels):
         if broken[:, i].any():
-            said.append(f"{name}: {channel} is an open or short circuit in {int(broken[:, i].sum())} rows; the others are used there")
+            said.append(
+                f"{name}: {channel} is an open or short circuit in {int(broken[:, i].sum())} rows; the others are used there"
+            )
         elif not known[:, i].any():
             said.append(f"{name}: {channel} is empty; the others are used")
         elif still[i]:

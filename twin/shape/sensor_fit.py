@@ -2,8 +2,8 @@
 
     sqrt(R) = sqrt(R0) (1 + kappa+ max(eps, 0) + kappa- min(eps, 0)),       eps = eps_shape + e,  e ~ N(0, C) in every sample
 
-C ties the sensors together: of a shape seen from one side the length is known worst, which shifts all strains alike; so the fit goes
-by their differences there, and by all of them where tendons of known length give the shape.
+C ties the sensors together: of a shape seen from one side the length is known worst, which shifts all strains alike; so the fit
+goes by their differences there, and by all of them where tendons of known length give the shape.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ NAMES = ("resistance", "stretch", "compression")
 
 @dataclass(frozen=True)
 class Known:
-    """Strains (n, s) that shapes have, resistances (n, s) ohm measured there, NaN where missing, covariance (n, s, s) of strains."""
+    """Strains (n, s) that shapes have, resistances (n, s) ohm measured there, NaN where missing, covariance (n, s, s) of
+    strains."""
 
     strain: np.ndarray
     resistance: np.ndarray

@@ -1,7 +1,7 @@
 """The skin as a camera sees it: points with outward normals, and how far a cloud lies from those that face the camera.
 
-The distance is one-way, from each measured point to the tangent plane at the nearest visible point of the predicted skin, so that it
-needs no correspondence and does not care for what the camera cannot see.
+The distance is one-way, from each measured point to the tangent plane at the nearest visible point of the predicted skin, so that
+it needs no correspondence and does not care for what the camera cannot see.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from twin.soft import Cone, SoftBody
 
@@ -59,7 +59,9 @@ def _face(cone: Cone) -> np.ndarray:
 
 def _rings(radius: np.ndarray, z: np.ndarray) -> np.ndarray:
     t = 2.0 * np.pi * np.arange(AROUND) / AROUND
-    return np.stack([np.outer(radius, np.cos(t)), np.outer(radius, np.sin(t)), np.outer(z, np.ones(AROUND))], axis=-1).reshape(-1, 3)
+    return np.stack([np.outer(radius, np.cos(t)), np.outer(radius, np.sin(t)), np.outer(z, np.ones(AROUND))], axis=-1).reshape(
+        -1, 3
+    )
 
 
 def facing(normals: np.ndarray, turn: np.ndarray) -> np.ndarray:
@@ -67,10 +69,8 @@ def facing(normals: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return -(normals @ turn.T @ LOOKS) > GRAZING
 
 
-def distances(
-    cloud: np.ndarray, x: np.ndarray, normals: np.ndarray, visible: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def distances(cloud: np.ndarray, x: np.ndarray, normals: np.ndarray, visible: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of cloud points (k, 3), in the frame of x: signed distances (k,) m from the skin, and which skin point each is nearest to."""
     seen = np.flatnonzero(visible)
-    nearest = seen[cKDTree(x[seen]).query(cloud)[1]]
+    nearest = seen[KDTree(x[seen]).query(cloud)[1]]
     return ((cloud - x[nearest]) * normals[nearest]).sum(axis=1), nearest

@@ -7,6 +7,7 @@ import importlib.util
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,7 @@ def train(data: Data, epochs: int, seed: int, progress: Callable[[int, float, fl
     k, inputs = data.z.shape[1], 2 * data.strain.shape[1] + data.displacement.shape[1]
     sizes = [inputs, *[WIDTH] * LAYERS]
     parts: list[Any] = []
-    for a, b in zip(sizes[:-1], sizes[1:], strict=True):
+    for a, b in pairwise(sizes):
         parts += [torch.nn.Linear(a, b), torch.nn.SiLU()]
     net = torch.nn.Sequential(*parts, torch.nn.Linear(WIDTH, 2 * k))
     optimizer = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=1e-5)

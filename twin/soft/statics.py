@@ -97,7 +97,6 @@ class SoftStatics:
         rest = np.broadcast_to(self.body.cords.rest, strain.shape)
         return {"strain": strain, "sensor": resistance(strain, self.body.cords), "sensor_rest": rest}
 
-
     def strain_slope(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Strains (s,) of the cords at nodes' displacements u (n_free, 3) m, and their derivatives (s, 3 n_free) 1/m."""
         s, points, _ = self.body.cord_paths.shape
