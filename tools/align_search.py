@@ -1,6 +1,6 @@
 """Alignment as the paper does it, for comparison: CMA-ES over R0, kappa of stretch and compression of every sensor and the mounting
-angle at once; the misfit is the robust one-way distance of the clouds to the visible skin of the shape that the `modal` estimator makes
-of the resistances. It asks nothing of what each number does. `pip install cma`.
+angle at once; the misfit is the robust one-way distance of the clouds to the visible skin of the shape that the `modal` estimator
+makes of the resistances. It asks nothing of what each number does. `pip install cma`.
 """
 
 from __future__ import annotations

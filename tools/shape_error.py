@@ -3,9 +3,9 @@
     python -m tools.bench.finger --shape --seed 1 --out DIR        a day of the independent finite element bench
     python -m tools.shape_error DIR [DIR ...] [--estimators physics,modal]
 
-For each estimator with the twin as described and with the twin aligned to the day's clouds: mean distance of the named points (mm) by
-trial, the share of points within the 90 % band (1.645 std), and the time a frame takes. --dead 2 cuts sensor 2 off; --aligned leaves
-the twin as described out; --search adds a twin aligned by a black-box search (CMA-ES, `pip install cma`) over all 13 numbers at once.
+For each estimator, with the twin as described and with the twin aligned to the day's clouds: mean distance of the named points (mm)
+by trial, the share of points within the 90 % band (1.645 std), and the time a frame takes. --dead 2 cuts sensor 2 off; --aligned
+leaves the twin as described out; --search adds one aligned by a black-box search (CMA-ES, `pip install cma`) over 13 numbers.
 """
 
 from __future__ import annotations
