@@ -40,6 +40,18 @@ def read_twin(source: str | Path) -> Twin:
         return _twin(table, path.parent)
 
 
+def standard_errors(source: str | Path) -> dict[str, float]:
+    """Standard errors (SI) of a twin's parameters, where its file has them; none of a robot's name alone."""
+    path = Path(source)
+    path = path / "twin.toml" if is_file(path / "twin.toml") else path
+    if path.suffix != ".toml":
+        return {}
+    with opened(path, FORMAT) as table:
+        file = fill(TwinFile, table, "", [])
+    entries = file.parameters if file is not None else {}
+    return {n: float(e["std"]) for n, e in entries.items() if isinstance(e, dict) and isinstance(e.get("std"), float)}
+
+
 class TwinFile(Form):
     """The top of a `twin.toml`."""
 

@@ -1,6 +1,15 @@
-"""Sensing: from what the robot feels to its shape, one estimator per file.
+"""Sensing: from what the robot feels to its shape.
 
-tensions.py   load cells, and tendon displacements where they are known, to markers with an error bar
+tensions.py    load cells, and tendon displacements where they are known, to markers with an error bar
+
+Strain sensors to the surface of a soft finger, one estimator per file, found by themselves:
+
+physics.py     the twin's equilibrium under the likeliest push         estimator.py  what an estimator is
+modal.py       a small network onto the twin's deformation modes       training.py   and how that one is trained (torch)
+constant_curvature.py  the baseline
+
+sensing.py     a trial to strains and displacements                    align.py      R0, kappa and mounting angle from clouds
+predict.py     a recording's shapes as a file                          cloud_fit.py, sensor_fit.py, skin.py  what it is made of
 """
 
 from twin.shape.tensions import Estimate, TensionShape

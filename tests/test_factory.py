@@ -1,0 +1,84 @@
+"""The data factory: what it makes depends on the order alone, goes on after a stop, and is what the twin's statics says."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from twin.errors import DataError
+from twin.factory import Order, generate, named_points, shard
+from twin.robots import load
+from twin.soft import SoftStatics
+
+SAMPLES = shard.SIZE + 40  # a shard, and two chains and a half of another
+
+
+@pytest.fixture(scope="module")
+def order() -> Order:
+    robot = load("finger")
+    return Order(robot, SAMPLES, 3, robot.nuisance)
+
+
+@pytest.fixture(scope="module")
+def made(order: Order, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("factory") / "data"
+    generate(order, folder, jobs=1)
+    return folder
+
+
+def digests(folder: Path) -> list[str]:
+    return [hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.glob("*.parquet"))]
+
+
+def test_workers_and_a_stop_change_nothing(order: Order, made: Path, tmp_path: Path) -> None:
+    """Two processes against one, and one that goes on where a shard was lost and another half written."""
+    again = tmp_path / "again"
+    generate(order, again, jobs=2)
+    assert digests(again) == digests(made)
+    sorted(again.glob("*.parquet"))[1].unlink()
+    (again / "samples-00001.parquet.part").write_bytes(b"half a shard")
+    generate(order, again, jobs=1)
+    assert digests(again) == digests(made)
+
+
+def test_a_longer_order_begins_with_the_same_samples(order: Order, made: Path, tmp_path: Path) -> None:
+    generate(replace(order, samples=16), tmp_path / "short", jobs=1)
+    short, long = (shard.read(f, ["nodes", "resistance"]) for f in (tmp_path / "short", made))
+    assert np.array_equal(short["nodes"], long["nodes"][:16])
+    assert np.array_equal(short["resistance"], long["resistance"][:16])
+
+
+def test_samples_hold_together(order: Order, made: Path) -> None:
+    """Vertices and strains follow from the nodes, to the single precision that these are kept in; tendons keep their word."""
+    d = shard.read(made, ["sample", "converged", "nodes", "vertices", "strain", "command", "tension"])
+    assert d["sample"].tolist() == list(range(SAMPLES))
+    assert d["converged"].all()
+    body = order.robot.build()
+    nodes = d["nodes"].astype(float).reshape(SAMPLES, -1, 3)
+    moved = np.einsum("pn,snk->spk", body.lattice.weights(named_points(order.robot).rest), nodes)
+    assert np.abs(moved.reshape(SAMPLES, -1) - d["vertices"]).max() < 1e-7  # m: single precision of centimetres
+    assert np.abs(SoftStatics(body).sensed(nodes)["strain"] - d["strain"]).max() < 1e-6
+    assert (d["tension"] >= 0.0).all()
+    assert not d["tension"][(d["command"] < -14e-3)].any()  # paid out: slack
+
+
+def test_another_order_in_the_same_folder_is_refused(order: Order, made: Path) -> None:
+    with pytest.raises(DataError, match="another order"):
+        generate(replace(order, seed=4), made, jobs=1)
+
+
+def test_a_robot_that_is_no_finger_is_refused(order: Order, tmp_path: Path) -> None:
+    robot = load("continuum")
+    with pytest.raises(DataError, match="no soft body"):
+        generate(Order(robot, 16, 0, robot.nuisance), tmp_path / "rod", jobs=1)
+    assert not (tmp_path / "rod").exists()
+
+
+def test_a_broken_shard_is_named(tmp_path: Path) -> None:
+    (tmp_path / "samples-00000.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(DataError, match="cannot be read"):
+        shard.read(tmp_path, ["nodes"])

@@ -1,0 +1,225 @@
+"""Shape from strain sensors, judged on a day of the independent finite element bench, which shares no code with the twin and which
+nothing was trained on: `python -m tools.bench.finger --shape --seed 22`, its third test trial left out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from twin.effects import named
+from twin.errors import DataError, TwinError
+from twin.measurements import Recording, read
+from twin.robots import load
+from twin.shape.align import Aligned, align
+from twin.shape.align_report import write_alignment
+from twin.shape.constant_curvature import ConstantCurvature
+from twin.shape.estimator import Z90, Estimator, Felt, estimator, estimators
+from twin.shape.modal import Modal, read_weights
+from twin.shape.modes import Habit
+from twin.shape.predict import predict
+from twin.shape.sensing import sense
+from twin.storage import read_twin
+from twin.twin import Twin
+
+DATA = Path(__file__).parent / "data"
+LAWS = pytest.mark.parametrize("name", sorted(estimators()))
+
+
+@pytest.fixture(scope="module")
+def day() -> Recording:
+    return read(DATA / "finger_shape")
+
+
+@pytest.fixture(scope="module")
+def aligned(day: Recording) -> Aligned:
+    return align(day, Twin.of(load("finger")))
+
+
+def errors(arrays: dict[str, np.ndarray], trial: str) -> tuple[np.ndarray, np.ndarray]:
+    """Distances (f, P) m from the truth, and the estimated std."""
+    true = np.load(DATA / "finger_shape_truth.npz")
+    at = np.abs(arrays[f"{trial}_time"][None] - true[f"{trial}_time"][:, None]).argmin(axis=1)
+    places = true[f"{trial}_vertices"] * float(true["unit_mm"]) * 1e-3
+    return np.linalg.norm(arrays[f"{trial}_vertices"][at] - places, axis=2), arrays[f"{trial}_std"][at]
+
+
+def only(day: Recording, *trials: str) -> Recording:
+    return day.select(trials)
+
+
+# ---- alignment ----------------------------------------------------------------------------------------------------------------
+
+
+def test_alignment_finds_the_built_finger(aligned: Aligned) -> None:
+    """Bars: 0.5 deg moves a tip bent by 30 mm by 0.26 mm; 5 % of kappa is a twentieth of a bend, some 0.5 mm of 10."""
+    true = json.loads((DATA / "finger_shape_truth.json").read_text())["finger"]
+    found = {n: f.value for n, f in aligned.fitted.items()}
+    assert np.rad2deg(found["mounting.angle"]) == pytest.approx(true["phi_deg"], abs=0.5)
+    for i in range(4):
+        assert found[f"sensors.resistance_{i + 1}"] == pytest.approx(true["R0_ohm"][i], rel=2e-3)
+        assert found[f"sensors.stretch_{i + 1}"] == pytest.approx(true["kappa_stretch"][i], rel=0.05)
+        assert found[f"sensors.compression_{i + 1}"] == pytest.approx(true["kappa_compression"][i], rel=0.02)
+    assert aligned.after < aligned.before
+    assert aligned.unfixed == ("silicone.youngs_modulus",)
+
+
+def test_alignment_is_read_back(aligned: Aligned, tmp_path: Path) -> None:
+    write_alignment(aligned, tmp_path / "al", {})
+    assert read_twin(tmp_path / "al").values == pytest.approx(dict(aligned.twin.values))
+    assert json.loads((tmp_path / "al/alignment.json").read_text())["cloud_frames"] == aligned.frames
+
+
+def test_alignment_without_clouds_or_without_free_motion_is_refused(day: Recording) -> None:
+    with pytest.raises(DataError, match="no trial has clouds"):
+        align(only(day, "test_1"), Twin.of(load("finger")))
+    with pytest.raises(DataError, match="free motion"):
+        align(only(day, "align_2", "test_1"), Twin.of(load("finger")))
+
+
+# ---- every estimator ----------------------------------------------------------------------------------------------------------
+
+
+@LAWS
+def test_estimators_keep_the_contract(name: str, aligned: Aligned) -> None:
+    law = estimator(name)(aligned.twin)
+    felt = Felt(np.array([[0.003] * 4, [0.03, -0.02, -0.03, 0.02], [np.nan, -0.02, -0.03, 0.02]]), np.full((3, 4), -15e-3))
+    shapes = law.estimate(felt)
+    n = len(law.points.rest)
+    assert (shapes.moved.shape, shapes.std.shape, shapes.outside.shape) == ((3, n, 3), (3, n), (3,))
+    assert shapes.outside.dtype == bool
+    assert np.isfinite(shapes.moved).all()
+    assert (shapes.std > 0.0).all()
+    again = law.estimate(felt)
+    assert np.array_equal(again.moved, shapes.moved)  # nothing is remembered from call to call
+    held = law.points.rest[:, 2] <= aligned.twin.robot.build().cone.clamp  # type: ignore[attr-defined]
+    assert np.abs(shapes.moved[:, held]).max() < 1e-9
+    assert law.about
+
+
+@LAWS
+def test_a_hanging_finger_is_straight(name: str, aligned: Aligned) -> None:
+    """At the strain that its weight makes; the network may be off by its own error at small shapes, 0.2 mm."""
+    law = estimator(name)(aligned.twin)
+    shapes = law.estimate(Felt(np.full((1, 4), 0.003), np.full((1, 4), -15e-3)))
+    assert np.linalg.norm(shapes.moved[0], axis=1).mean() < 5e-4
+
+
+@pytest.mark.parametrize(("name", "bar"), [("physics", 0.8e-3), ("modal", 0.8e-3), ("constant_curvature", 2.5e-3)])
+def test_error_on_the_independent_bench(name: str, bar: float, day: Recording, aligned: Aligned) -> None:
+    """Issue 16: 0.8 mm is the aim on free motion and hand pushes; the baseline is only asked to be a baseline."""
+    arrays, _ = predict(only(day, "test_1", "test_2"), estimator(name)(aligned.twin))
+    for trial in ("test_1", "test_2"):
+        assert errors(arrays, trial)[0].mean() < bar
+        assert arrays[f"{trial}_cloud"].shape[2] == 3
+
+
+def test_alignment_halves_the_error_at_least(day: Recording, aligned: Aligned) -> None:
+    trial = only(day, "test_2")
+    before, after = (
+        errors(predict(trial, Modal(t))[0], "test_2")[0].mean() for t in (Twin.of(load("finger")), aligned.twin)
+    )  # fmt: skip
+    assert after < 0.5 * before
+
+
+def test_the_band_holds_what_it_says(day: Recording, aligned: Aligned) -> None:
+    """90 % of points; one day's frames are alike, so that 80 % is still by chance."""
+    away, std = errors(predict(only(day, "test_2"), Modal(aligned.twin))[0], "test_2")
+    assert (away < Z90 * std).mean() > 0.8
+
+
+def test_the_skin_goes_with_the_points(day: Recording, aligned: Aligned) -> None:
+    """Every named point of the skin has skin nearby: rings lie 2.5 mm apart, 1.25 mm from the furthest."""
+    law = Modal(aligned.twin)
+    arrays, _ = predict(only(day, "test_2"), law)
+    frame = len(arrays["test_2_time"]) // 2
+    points = arrays["test_2_vertices"][frame][law.points.skin]
+    gap = np.linalg.norm(points[:, None] - arrays["test_2_cloud"][frame][None], axis=2).min(axis=1)
+    assert gap.max() < 2.5e-3
+
+
+# ---- sensors that fail or lie -------------------------------------------------------------------------------------------------
+
+
+def changed(day: Recording, sensor: int, values: float) -> Recording:
+    name = f"sensor_{sensor}_resistance"
+    return day.with_values([{name: np.full(len(t.time), values)} for t in day.trials], day.source)
+
+
+@pytest.mark.parametrize(("value", "said"), [(1000.0, "dead"), (1e6, "open or short"), (np.nan, "empty")])
+def test_a_lost_sensor_is_named_and_done_without(value: float, said: str, day: Recording, aligned: Aligned) -> None:
+    trial = only(day, "test_2")
+    whole = errors(predict(trial, Modal(aligned.twin))[0], "test_2")[0].mean()
+    arrays, notices = predict(changed(trial, 2, value), Modal(aligned.twin))
+    assert any("sensor_2" in n and said in n for n in notices)
+    assert errors(arrays, "test_2")[0].mean() < 2.0 * whole  # the bar of issue 16
+
+
+def test_drift_that_the_twin_knows_is_undone(day: Recording, aligned: Aligned) -> None:
+    """Resistances as a drifting sensor would report them, read by a twin with that drift, are the strains before."""
+    drift = named("sensor_drift")({"rate_1": 2e-4}, 4)
+    twin = replace(aligned.twin, effects=(drift,))
+    rate = {t.name: 1.0 + 2e-4 * ((t.start or 0.0) + t.time - t.time[0]) for t in day.trials}
+    name = "sensor_1_resistance"
+    drifted = day.with_values([{name: t.values[name] * rate[t.name]} for t in day.trials], day.source)
+    plain, undone = sense(day, aligned.twin)[0], sense(drifted, twin)[0]
+    for a, b in zip(plain, undone, strict=True):
+        assert np.allclose(a.resistance, b.resistance, rtol=1e-9)
+
+
+def test_bad_resistances_and_robots_are_refused(day: Recording, aligned: Aligned, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="above zero"):
+        predict(changed(day, 3, 0.0), Modal(aligned.twin))
+    without = replace(
+        day, channels=tuple(c for c in day.channels if c.name != "sensor_3_resistance"),
+        trials=tuple(replace(t, values={k: v for k, v in t.values.items() if k != "sensor_3_resistance"}) for t in day.trials),
+    )  # fmt: skip
+    with pytest.raises(DataError, match="sensor_3_resistance"):
+        predict(without, Modal(aligned.twin))
+    with pytest.raises(DataError, match="feels no strain"):
+        ConstantCurvature(Twin.of(load("continuum")))
+    with pytest.raises(TwinError, match="physics"):
+        estimator("no_such")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
+def test_truncated_weights_are_refused(share: float, tmp_path: Path) -> None:
+    whole = (load("finger").folder / "modal.npz").read_bytes()
+    path = tmp_path / "modal.npz"
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(DataError, match="twin train"):
+        read_weights(path)
+
+
+def test_weights_of_another_format_are_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "modal.npz", format=np.array("other/1"))
+    with pytest.raises(DataError, match="other/1"):
+        read_weights(tmp_path / "modal.npz")
+
+
+def test_weights_are_small() -> None:
+    assert (load("finger").folder / "modal.npz").stat().st_size < 2e6
+
+
+# ---- parts --------------------------------------------------------------------------------------------------------------------
+
+
+def test_slope_of_the_habit() -> None:
+    """Against differences."""
+    rng = np.random.default_rng(0)
+    habit = Habit(rng.normal(size=(10, 5)), np.eye(5), np.array([2.0, 1.5, 1.0, 1.0, 1.0]))
+    habit.coefficient[:, :2] = 0.0
+    z, h = rng.normal(size=5), 1e-6
+    numeric = np.stack([(habit(z + h * e)[0] - habit(z - h * e)[0]) / (2 * h) for e in np.eye(5)], axis=1)
+    assert np.allclose(habit(z)[1], numeric, atol=1e-7)
+
+
+def test_an_arc_bends_away_from_the_stretched_cord(aligned: Aligned) -> None:
+    """Cord 1 at 45 degrees stretched, cord 3 opposite shortened: the tip goes to 225 degrees."""
+    law: Estimator = ConstantCurvature(aligned.twin)
+    moved = law.estimate(Felt(np.array([[0.05, 0.0, -0.05, 0.0]]), np.zeros((1, 4)))).moved[0]
+    tip = moved[law.points.rest[:, 2].argmax()]
+    assert np.rad2deg(np.arctan2(tip[1], tip[0])) % 360 == pytest.approx(225.0, abs=5.0)

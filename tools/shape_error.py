@@ -1,0 +1,111 @@
+"""Error of estimated finger shapes by estimator, against the truth of bench days that nothing was trained or tuned on.
+
+    python -m tools.bench.finger --shape --seed 1 --out DIR        a day of the independent finite element bench
+    python -m tools.shape_error DIR [DIR ...] [--estimators physics,modal]
+
+For each estimator, with the twin as described and with the twin aligned to the day's clouds: mean distance of the named points (mm)
+by trial, the share of points within the 90 % band (1.645 std), and the time a frame takes. --dead 2 cuts sensor 2 off; --aligned
+leaves the twin as described out; --search adds one aligned by a black-box search (CMA-ES, `pip install cma`) over 13 numbers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from twin.measurements import Recording, read
+from twin.robots import load
+from twin.shape.align import Aligned, align
+from twin.shape.estimator import Z90, estimator, estimators
+from twin.shape.predict import predict
+from twin.twin import Twin
+
+NEAR = 0.06  # s, within which a frame is the truth's
+
+
+@dataclass(frozen=True)
+class Score:
+    """Mean vertex error (mm) by trial, the share of points within the band, and ms a frame."""
+
+    error: dict[str, float]
+    covered: float
+    frame: float
+
+
+def score(truth: Path, arrays: dict[str, np.ndarray], seconds: float) -> Score:
+    true = np.load(truth)
+    error, inside, frames = {}, [], 0
+    for name in sorted(k[:-5] for k in true.files if k.startswith("test") and k.endswith("_time")):
+        time_of, t = true[f"{name}_time"], arrays[f"{name}_time"]
+        at = np.abs(t[None] - time_of[:, None]).argmin(axis=1)
+        near = np.abs(t[at] - time_of) < NEAR
+        places = true[f"{name}_vertices"] * float(true["unit_mm"]) * 1e-3
+        away = np.linalg.norm(arrays[f"{name}_vertices"][at] - places, axis=2)[near]
+        inside.append((away <= Z90 * arrays[f"{name}_std"][at][near]).ravel())
+        error[name] = 1e3 * float(away.mean())
+    frames = sum(len(v) for k, v in arrays.items() if k.endswith("_time"))
+    return Score(error, float(np.concatenate(inside).mean()), 1e3 * seconds / frames)
+
+
+def cut(recording: Recording, sensor: int | None) -> Recording:
+    """Without what one sensor (from 1) read."""
+    if sensor is None:
+        return recording
+    name = f"sensor_{sensor}_resistance"
+    gone = [{name: np.full(len(t.time), np.nan)} for t in recording.trials]
+    return recording.with_values(gone, recording.source)
+
+
+def aligned_error(aligned: Aligned, truth: Path) -> str:
+    """Mounting angle off by degrees, R0 and kappa off by per cent (largest)."""
+    true, found = json.loads((truth.parent / "truth.json").read_text())["finger"], aligned.fitted
+    parts = []
+    if "phi_deg" in true:
+        parts.append(f"phi {np.rad2deg(found['mounting.angle'].value) - true['phi_deg']:+.2f} deg")
+    for key, name in (("R0_ohm", "resistance"), ("kappa_stretch", "stretch"), ("kappa_compression", "compression")):
+        values = [found[f"sensors.{name}_{i + 1}"].value / v - 1.0 for i, v in enumerate(true.get(key, []))]
+        parts.append(f"{key} {100 * np.abs(values).max():.1f} %" if values else "")
+    return ", ".join(parts)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(prog="python -m tools.shape_error", description=__doc__)
+    parser.add_argument("days", type=Path, nargs="+")
+    parser.add_argument("--estimators", default=",".join(estimators()))
+    parser.add_argument("--dead", type=int)
+    parser.add_argument("--aligned", action="store_true")
+    parser.add_argument("--search", action="store_true")
+    args = parser.parse_args(arguments)
+    for day in args.days:
+        recording, twin = read(day / "measured"), Twin.of(load("finger"))
+        found = align(recording, twin)
+        print(f"{day.name}: aligned in {found.seconds:.1f} s; off by {aligned_error(found, day / 'shape_truth.npz')}")
+        twins = {"aligned": found.twin} if args.aligned else {"described": twin, "aligned": found.twin}
+        if args.search:
+            from tools.align_search import search
+
+            began = time.perf_counter()
+            values, count = search(recording, twin)
+            twins["searched"] = replace(twin, values=values)
+            print(f"  searched in {time.perf_counter() - began:.0f} s, {count} trials")
+        for name in args.estimators.split(","):
+            for label, each in twins.items():
+                law, began = estimator(name)(each), time.perf_counter()
+                arrays, _ = predict(cut(recording, args.dead), law)
+                s = score(day / "shape_truth.npz", arrays, time.perf_counter() - began)
+                errors = "  ".join(f"{k} {v:.2f}" for k, v in s.error.items())
+                mean = float(np.mean(list(s.error.values())))
+                print(
+                    f"  {name:20s} {label:10s} {mean:6.2f} mm  ({errors})  in band {100 * s.covered:.0f} %  {s.frame:.1f} ms",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()

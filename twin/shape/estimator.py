@@ -1,0 +1,87 @@
+"""What an estimator is: strains and tendon displacements in; named points, their uncertainty and a doubt out; batch first.
+
+A new estimator is one file in this folder with one subclass of `Estimator`; it is found by itself, by its file's name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+
+from twin.errors import DataError, UnknownNameError
+from twin.factory import Points, named_points
+from twin.soft import SoftBody
+from twin.twin import Twin
+
+Z90 = 1.645  # standard deviations: the band is 1.645 std wide
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What is felt: strain (n, s) of the cords, NaN where a sensor is missing; displacement (n, t) m of the tendons, of the hanging
+    finger; `pushed`: something may be pressing."""
+
+    strain: np.ndarray
+    displacement: np.ndarray
+    pushed: bool = True
+
+    def __len__(self) -> int:
+        return len(self.strain)
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Displacements (n, P, 3) m of the named points in the finger's own frame; `std` (n, P) m, the root of the expected squared
+    distance between the estimated point and the true one; `outside` (n,): what was felt is unlike all that the estimator knows."""
+
+    moved: np.ndarray
+    std: np.ndarray
+    outside: np.ndarray
+
+
+class Estimator(ABC):
+    """Base of all estimators. One is made for a twin (a robot with its calibrated numbers) and remembers nothing between calls."""
+
+    about: ClassVar[str]
+
+    def __init__(self, twin: Twin) -> None:
+        """Raises DataError for a robot that no estimator knows."""
+        body = twin.body()
+        if not isinstance(body, SoftBody) or len(body.cord_paths) == 0:
+            raise DataError(f"robot {twin.robot.name!r} feels no strain: shape is estimated for soft bodies with strain sensors")
+        self.twin, self.body = twin, body
+        self.points: Points = named_points(twin.robot)
+
+    @abstractmethod
+    def estimate(self, felt: Felt) -> Shapes:
+        """The shapes behind what is felt."""
+
+
+@cache
+def estimators() -> dict[str, type[Estimator]]:
+    """All estimators by name."""
+    found = {}
+    package = importlib.import_module(__package__ or "twin.shape")
+    for module in pkgutil.iter_modules(package.__path__):
+        members = vars(importlib.import_module(f"{package.__name__}.{module.name}")).values()
+        law = next(
+            (m for m in members if isinstance(m, type) and issubclass(m, Estimator) and m.__module__.endswith(f".{module.name}")),
+            None,
+        )
+        if law is not None and law is not Estimator:
+            found[module.name] = law
+    return found
+
+
+def estimator(name: str) -> type[Estimator]:
+    """The estimator of this name. Raises UnknownNameError, listing those that exist."""
+    try:
+        return estimators()[name]
+    except KeyError:
+        raise UnknownNameError("estimator", name, list(estimators())) from None

@@ -1,0 +1,116 @@
+"""From a measured trial to what an estimator is given: strains behind the resistances, and the tendons' displacements.
+
+Effects of the sensors that the twin has (drift, gain, hysteresis) are undone: R is sought such that what the sensors would report
+of it is what they reported, by R <- R + (reported - sense(R)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bench import Bench, Inputs, prepare
+from twin.body import Body
+from twin.effects import Drive
+from twin.errors import DataError
+from twin.measurements import Recording
+from twin.sensors import Cords, strain
+from twin.soft import SoftBody
+from twin.twin import Twin
+
+ROUNDS = 30
+CONTACT = "external_contact"
+OPEN = 3.0  # times its resistance at rest, or that part of it: strains of a finger make no more than 1.6
+FLAT, MOVING = 0.005, 0.03  # of the resistance at rest: noise is below the one, what moves is beyond the other
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """One trial: time (n,) s, resistance (n, s) ohm with the sensors' effects undone, NaN where a sensor is dead; displacement
+    (n, t) m as the motors pull; whether something may push."""
+
+    name: str
+    time: np.ndarray
+    resistance: np.ndarray
+    displacement: np.ndarray
+    pushed: bool
+
+    def strain(self, cords: Cords) -> np.ndarray:
+        return strain(self.resistance, cords)
+
+
+def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[str, ...]]:
+    """Trials in the order of the recording, and what a reader should know.
+
+    Raises DataError for a missing column of a sensor, a resistance that is not above zero, or tendons not driven by displacement.
+    """
+    body = twin.body()
+    if not isinstance(body, SoftBody) or not len(body.cord_paths):
+        raise DataError(f"robot {twin.robot.name!r} feels no strain: shape is estimated for soft bodies with strain sensors")
+    channels = [f"sensor_{i + 1}_resistance" for i in range(len(body.cord_paths))]
+    there = {c.name for c in recording.channels}
+    if missing := [c for c in channels if c not in there]:
+        raise DataError(
+            f"{recording.title}: no column {', '.join(missing)}; a shape needs every sensor of robot {twin.robot.name!r}"
+        )
+    bench = prepare(recording, twin.robot)
+    if not bench.driven_by(Drive.DISPLACEMENT).all():
+        raise DataError(f"{recording.title}: tendons are not driven by displacement; give tendon_I_displacement the role 'input'")
+    by_name, notices, readings = {t.name: t for t in recording.trials}, _notices(bench), {}
+    for name, trial in by_name.items():
+        values = np.stack([trial.values[c] for c in channels], axis=1)
+        _check(name, channels, values)
+        readings[name], said = _alive(name, channels, values, body.cords.rest)
+        notices += said
+    if not any(np.isfinite(v).any() for v in readings.values()):
+        raise DataError(f"{recording.title}: no resistance is near {body.cords.rest.round(1).tolist()} ohm; check unit and robot")
+    sensed = {i.name: _trial(twin, body, i, readings[i.name], CONTACT in by_name[i.name].other) for i in bench.inputs}
+    return tuple(sensed[t.name] for t in recording.trials), tuple(notices)
+
+
+def _check(name: str, channels: list[str], values: np.ndarray) -> None:
+    rows, columns = np.nonzero(values <= 0.0)
+    if len(rows):
+        raise DataError(
+            f"{name}, row {rows[0] + 1}: {channels[columns[0]]} is {values[rows[0], columns[0]]:g} ohm; resistances are above zero"
+        )
+
+
+def _notices(bench: Bench) -> list[str]:
+    return [n for n in bench.notices if CONTACT not in n]
+
+
+def _alive(name: str, channels: list[str], values: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Readings (n, s) of one trial, NaN where a sensor says nothing, and what was found."""
+    out, said = values.copy(), []
+    broken = (values > OPEN * rest) | (values < rest / OPEN)
+    out[broken] = np.nan
+    known = np.isfinite(out)
+    span = np.array([np.ptp(v[k]) / r if k.any() else 0.0 for v, k, r in zip(out.T, known.T, rest, strict=True)])
+    still = (span < FLAT) & (np.median(span) > MOVING)
+    for i, channel in enumerate(channels):
+        if broken[:, i].any():
+            said.append(
+                f"{name}: {channel} is an open or short circuit in {int(broken[:, i].sum())} rows; the others are used there"
+            )
+        elif not known[:, i].any():
+            said.append(f"{name}: {channel} is empty; the others are used")
+        elif still[i]:
+            out[:, i] = np.nan
+            said.append(f"{name}: {channel} does not change while the others do: it is dead, and they are used")
+    return out, said
+
+
+def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, pushed: bool) -> Sensed:
+    laws = twin.laws
+    driven = laws.drive(laws.command(inputs.signals.with_(antagonists=body.antagonists)))
+    assert isinstance(body, SoftBody)
+    known = np.where(np.isfinite(reported), reported, body.cords.rest)
+    rest, R = np.broadcast_to(body.cords.rest, known.shape), known.copy()
+    if any(e.acts_in("sense") for e in twin.effects):
+        for _ in range(ROUNDS):
+            seen = laws.sense(driven.with_(others={"sensor": R, "sensor_rest": rest})).group("sensor")[..., 0]
+            R = np.maximum(R + known - seen, 1e-3 * rest)
+    R = np.where(np.isfinite(reported), R, np.nan)
+    return Sensed(inputs.name, inputs.time, R, driven.command, pushed)
