@@ -1,4 +1,4 @@
-"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `calibrate`, `effects`.
+"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `calibrate`, `effects`.
 
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, said in one line.
 """
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import tyro
 from rich.console import Console
@@ -25,7 +25,9 @@ from twin.errors import DataError, TwinError
 
 if TYPE_CHECKING:
     from twin.calibrate import Fit
+    from twin.measurements import Recording
     from twin.robots import Robot
+    from twin.twin import Twin
 
 FAR = 2.0  # prior standard deviations: one in twenty fitted parameters of a robot as described lies further away
 SAMPLE = "*/samples/friday"
@@ -115,6 +117,61 @@ class Simulate:
             predicted = twin.predict(recording, dynamic=self.dynamic)
             write(replace(predicted, robot=robot_reference(twin.robot, self.out)), self.out)
         out.print(f"simulated set: {self.out}", highlight=False, markup=False)
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Roll a twin out under given or drawn controls: MuJoCo steps, or static equilibria for a robot without dynamics.
+
+    Writes a measurement set, which can be diagnosed again. The same seed gives the same set, whatever the number of workers.
+    """
+
+    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, a robot's name or the path to its folder")]]
+    out: Annotated[Path, arg(help="new folder for the rolled-out set")]
+    controls: Annotated[
+        Path | None, arg(help="what drives: the folder of a measurement set, or a CSV in SI (time, tendon_1_tension, ...)")
+    ] = None
+    random: Annotated[int | None, arg(help="instead: how many rollouts of drawn controls")] = None
+    seed: Annotated[int, arg(help="draws the controls and the noise")] = 0
+    seconds: Annotated[float, arg(help="length of a drawn rollout")] = 10.0
+    rate: Annotated[float, arg(help="samples a second of a drawn rollout")] = 50.0
+    drive: Annotated[Literal["tension", "displacement"], arg(help="what drawn controls say of each tendon")] = "tension"
+    pull: Annotated[float | None, arg(help="the most drawn, N or m; default: what bends the robot by some one radian")] = None
+    noise: Annotated[float, arg(help="one standard deviation of noise on the markers, m")] = 0.0
+    dynamic: Annotated[bool | None, arg(help="MuJoCo steps or static equilibria; default: steps where the robot has them")] = None
+    jobs: Annotated[int, arg(help="worker threads")] = _cores()
+
+    def run(self) -> None:
+        from twin.measurements import write
+        from twin.rollout import rollout
+        from twin.storage import read_twin, robot_reference
+
+        if self.noise < 0.0:
+            raise DataError(f"--noise {self.noise:g} is below zero; give one standard deviation in metres")
+        twin = read_twin(self.twin)
+        controls = self._controls(twin)
+        with _working(f"rolling out {controls.title}") as progress:
+            made = rollout(
+                twin, controls, dynamic=self.dynamic, noise=self.noise, seed=self.seed, jobs=self.jobs, progress=progress
+            )
+            write(replace(made.recording, robot=robot_reference(twin.robot, self.out)), self.out)
+        for one in made.ended:
+            out.print(f"ended early: {one.why}", highlight=False, markup=False)
+        out.print(f"{len(made.recording.trials)} rollouts ({made.recording.source}): {self.out}", highlight=False, markup=False)
+
+    def _controls(self, twin: Twin) -> Recording:
+        from twin.effects import Drive
+        from twin.measurements import read
+        from twin.rollout import drawn, from_set, from_table
+        from twin.rollout.controls import Drawing
+
+        if (self.controls is None) == (self.random is None):
+            raise DataError("say what drives the rollouts: either --controls FILE or --random N")
+        if self.controls is None:
+            return drawn(twin, self.random or 0, self.seed, Drawing(self.seconds, self.rate, Drive(self.drive), self.pull))
+        if self.controls.is_dir():
+            return from_set(twin, read(self.controls, least_trials=1))
+        return from_table(twin, self.controls)
 
 
 @dataclass(frozen=True)
@@ -293,7 +350,7 @@ def _command() -> str:
     return " ".join(["twin", *sys.argv[1:]])
 
 
-Command = New | Robots | Diagnose | Evaluate | Simulate | Calibrate | Effects
+Command = New | Robots | Diagnose | Evaluate | Simulate | Rollout | Calibrate | Effects
 
 
 def main() -> None:
