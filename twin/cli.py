@@ -1,4 +1,4 @@
-"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `calibrate`, `effects`.
+"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `view`, `calibrate`, `effects`.
 
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, said in one line.
 """
@@ -172,6 +172,34 @@ class Rollout:
         if self.controls.is_dir():
             return from_set(twin, read(self.controls, least_trials=1))
         return from_table(twin, self.controls)
+
+
+@dataclass(frozen=True)
+class View:
+    """Look at a robot in a browser: under sliders, or as it moved in a measurement set, beside what was measured."""
+
+    what: Positional[
+        Annotated[
+            str | None, arg(help="a robot, a twin.toml, a report's folder or a measurement set; without it the bundled sample")
+        ]
+    ] = None
+    set: Positional[Annotated[Path | None, arg(help="the set to replay with a twin")]] = None
+    port: Annotated[int, arg(help="where to serve on 127.0.0.1; the next one that is free if it is taken")] = 8080
+
+    def run(self) -> None:
+        from twin.storage import read_twin
+        from twin.viewer import serve
+
+        folder = self.set or (None if self.what is None else Path(self.what))
+        if self.what is None or (folder is not None and (folder / "measurements.toml").is_file()):
+            recording, twin = _load(folder, self.what if self.set else None)
+        elif self.set is not None:
+            raise DataError(f"{self.set}: no measurement set, a folder with a measurements.toml")
+        else:
+            recording, twin = None, read_twin(self.what)
+        with _working(f"drawing {twin.robot.name}"):
+            pass
+        serve(twin, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
 
 
 @dataclass(frozen=True)
@@ -350,7 +378,7 @@ def _command() -> str:
     return " ".join(["twin", *sys.argv[1:]])
 
 
-Command = New | Robots | Diagnose | Evaluate | Simulate | Rollout | Calibrate | Effects
+Command = New | Robots | Diagnose | Evaluate | Simulate | Rollout | View | Calibrate | Effects
 
 
 def main() -> None:
