@@ -27,7 +27,7 @@ from twin.viewer.scene import Scene
 
 RATE = 60.0  # Hz, of the loop
 MOST = 1.5  # full pulls at a slider's end
-TELLING = 0.1  # s between words and sliders of a running replay: the picture needs more, a reader does not
+TELLING, PLOTTING = 0.1, 1.0  # s between words and between plots of a running replay: a reader needs no more
 DESCRIBED, BETTER = "as described", "with effects"
 REPLAY, BY_HAND = "replay", "by hand"
 NOW = {"label": "now", "stroke": "#d62728", "points": {"show": True, "size": 9}}
@@ -44,7 +44,7 @@ class App:
         self._figure = figure(twin)
         self._replay = Replay(recording, twin) if recording is not None else None
         self._scene = Scene(server, self._figure, twin.robot.gravity)
-        self._wanted, self._clock, self._told = True, time.monotonic(), 0.0
+        self._wanted, self._clock, self._told, self._plotted = True, time.monotonic(), 0.0, 0.0
         self._track: Track | None = None
         self._live: tuple[Twin, Figure, Live] | None = None
         self._range = self._figure.coloured(MOST)
@@ -55,7 +55,7 @@ class App:
 
     def _panel(self, recording: Recording | None) -> None:
         gui, robot = self.server.gui, self.twin.robot
-        gui.configure_theme(control_layout="fixed", control_width="medium", dark_mode=False)
+        gui.configure_theme(control_width="medium", dark_mode=False)
         told = f"**{robot.title}**" + (f"\n\n{recording.title}  \n*{recording.source}*" if recording else "")
         gui.add_markdown(told)
         self._bar = gui.add_html(bar(self._range))
@@ -104,7 +104,9 @@ class App:
                 gui.add_slider(f"tendon {i}, N", 0.0, most, 0.01, 0.0, hint="tension as its load cell reads it")
                 for i in range(1, robot.n_tendon + 1)
             ]
-            self.payload = gui.add_slider("payload, g", 0.0, 30.0, 1.0, 0.0, hint="at the tip; backbones only")
+            self.payload = gui.add_slider(
+                "payload, g", 0.0, 30.0, 1.0, 0.0, hint="at the tip", visible=len(self._figure.cylinders) > 0
+            )
             self.tilt = gui.add_slider("gravity tilt, deg", 0, 180, 5, 0, hint="of its direction from that described")
             self.azimuth = gui.add_slider("gravity azimuth, deg", 0, 355, 5, 0, hint="about the robot's axis")
             self.slack = gui.add_button("let go", hint="all tendons slack, friction's history forgotten")
@@ -181,18 +183,20 @@ class App:
         now = time.monotonic()
         if asked or now - self._told > TELLING:
             self._told = now
-            self._tell_replay(track, twin, k, i)
+            self._tell_replay(track, twin, k, i, asked)
 
     def _slide(self, t: float) -> None:
         if abs(t - self.time.value) > 1e-9:
             self.time.value = t
 
-    def _tell_replay(self, track: Track, twin: Twin, k: int, i: int) -> None:
+    def _tell_replay(self, track: Track, twin: Twin, k: int, i: int, asked: bool) -> None:
         assert self._replay is not None
         described = self._replay.track(self._described, k)
         present = np.full(len(track.time), np.nan)
         present[i] = 1e3 * track.error[i]
-        self.plot.data = (track.time, 1e3 * described.error, 1e3 * track.error, present)
+        if asked or time.monotonic() - self._plotted > PLOTTING:
+            self._plotted = time.monotonic()
+            self.plot.data = (track.time, 1e3 * described.error, 1e3 * track.error, present)
         named = ", ".join(e.id.replace("_", " ") for e in twin.effects) or "no effect"
         named = DESCRIBED if self.which.value == DESCRIBED else named
         now, whole, before = (1e3 * e for e in (track.error[i], track.rms, described.rms))

@@ -15,18 +15,14 @@ from twin.viewer.figures import Frames, figure
 
 @dataclass(frozen=True)
 class Track:
-    """One trial as predicted: time (n,) s; frames; markers (n, m, 3) m as reported, those that were measured too; and the error of
-    an instant, (n,) m, root-mean-square over its markers."""
+    """One trial as predicted: time (n,) s; frames; markers (n, m, 3) m as reported, those that were measured too; the error of an
+    instant, (n,) m, and of the trial, root-mean-square over their markers."""
 
     time: np.ndarray
     frames: Frames
     markers: np.ndarray
     error: np.ndarray
-
-    @property
-    def rms(self) -> float:
-        """(m) over the trial."""
-        return float(np.sqrt(np.nanmean(self.error**2)))
+    rms: float
 
 
 class Replay:
@@ -62,5 +58,6 @@ class Replay:
             with np.errstate(invalid="ignore"):
                 counted = np.isfinite(away).sum(axis=1)
                 error = np.sqrt(np.nansum(away**2, axis=1) / np.where(counted, counted, np.nan))
-            self._kept[twin, trial] = Track(inputs.time - inputs.time[0], frames, markers, error)
+            rms = float(np.sqrt(np.nanmean(away**2)))
+            self._kept[twin, trial] = Track(inputs.time - inputs.time[0], frames, markers, error, rms)
         return self._kept[twin, trial]

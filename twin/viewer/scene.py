@@ -56,12 +56,12 @@ class Scene:
                 self._links.batched_wxyzs = shown.turn[0].astype(np.float32)
             pieces = (s * shown.piece[0]).astype(np.float32)
             along = colours(shown.tension[0], over) if self._links is not None else np.full((len(pieces), 3), 60, np.uint8)
-            shades = np.repeat(along[:, None], 2, axis=1)
+            shades = np.repeat(_linear(along)[:, None], 2, axis=1)
             if self._cords is None:
                 self._cords = self._server.scene.add_line_segments("/tendons", pieces, shades, thickness=CORD)
             self._cords.points, self._cords.colors = pieces, shades
             if len(self._figure.faces):
-                shade = colours(shown.strain[0], over)
+                shade = _linear(colours(shown.strain[0], over))
                 skin = trimesh.Trimesh(s * shown.skin[0], self._figure.faces, vertex_colors=shade, process=False)
                 self._server.scene.add_mesh_trimesh("/skin", skin)
 
@@ -75,3 +75,10 @@ class Scene:
             self._measured.points = (s * measured[there]).astype(np.float32)
             arrows = np.stack([start, start + enlarged * away], axis=1) if enlarged > 0.0 else np.zeros((0, 2, 3))
             self._arrows.points = (s * arrows).astype(np.float32)
+
+
+def _linear(srgb: np.ndarray) -> np.ndarray:
+    """Bytes that viser, which takes the colours of lines and vertices for linear light, shows as these of sRGB (IEC 61966-2-1)."""
+    share = srgb / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)
