@@ -30,7 +30,7 @@ MOST = 1.5  # full pulls at a slider's end
 TELLING, PLOTTING = 0.1, 1.0  # s between words and between plots of a running replay: a reader needs no more
 DESCRIBED, BETTER = "as described", "with effects"
 REPLAY, BY_HAND = "replay", "by hand"
-NOW = {"label": "now", "stroke": "#d62728", "points": {"show": True, "size": 9}}
+NOW = {"label": "now", "stroke": "#d62728"}
 
 
 class App:
@@ -192,11 +192,10 @@ class App:
     def _tell_replay(self, track: Track, twin: Twin, k: int, i: int, asked: bool) -> None:
         assert self._replay is not None
         described = self._replay.track(self._described, k)
-        present = np.full(len(track.time), np.nan)
-        present[i] = 1e3 * track.error[i]
         if asked or time.monotonic() - self._plotted > PLOTTING:
             self._plotted = time.monotonic()
-            self.plot.data = (track.time, 1e3 * described.error, 1e3 * track.error, present)
+            present = np.where(np.arange(len(track.time)) == i, track.error, 0.0)  # a needle: the plot takes no missing numbers
+            self.plot.data = (track.time, *(1e3 * np.nan_to_num(e) for e in (described.error, track.error, present)))
         named = ", ".join(e.id.replace("_", " ") for e in twin.effects) or "no effect"
         named = DESCRIBED if self.which.value == DESCRIBED else named
         now, whole, before = (1e3 * e for e in (track.error[i], track.rms, described.rms))
