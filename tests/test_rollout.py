@@ -129,5 +129,8 @@ def test_the_command_writes_a_set_that_reads_again(tmp_path: Path) -> None:
     assert recording.robot == "continuum"
     assert recording.source.startswith("simulation: twin of continuum, MuJoCo steps")
     assert {c.name for c in recording.outputs()} >= {"disk_8_z", "tendon_1_displacement"}
+    with pytest.raises(DataError, match="below zero"):
+        cli.Rollout("continuum", tmp_path / "other", random=1, seconds=0.5, noise=-1.0).run()
+    assert not (tmp_path / "other").exists()
     with pytest.raises(DataError, match="either --controls FILE or --random N"):
         cli.Rollout("continuum", tmp_path / "other").run()

@@ -146,14 +146,11 @@ class Rollout:
         from twin.rollout import rollout
         from twin.storage import read_twin, robot_reference
 
-        if self.noise < 0.0:
-            raise DataError(f"--noise {self.noise:g} is below zero; give one standard deviation in metres")
         twin = read_twin(self.twin)
         controls = self._controls(twin)
         with _working(f"rolling out {controls.title}") as progress:
-            made = rollout(
-                twin, controls, dynamic=self.dynamic, noise=self.noise, seed=self.seed, jobs=self.jobs, progress=progress
-            )
+            noisy = {"noise": self.noise, "seed": self.seed}
+            made = rollout(twin, controls, dynamic=self.dynamic, jobs=self.jobs, progress=progress, **noisy)
             write(replace(made.recording, robot=robot_reference(twin.robot, self.out)), self.out)
         for one in made.ended:
             out.print(f"ended early: {one.why}", highlight=False, markup=False)
@@ -162,8 +159,7 @@ class Rollout:
     def _controls(self, twin: Twin) -> Recording:
         from twin.effects import Drive
         from twin.measurements import read
-        from twin.rollout import drawn, from_set, from_table
-        from twin.rollout.controls import Drawing
+        from twin.rollout import Drawing, drawn, from_set, from_table
 
         if (self.controls is None) == (self.random is None):
             raise DataError("say what drives the rollouts: either --controls FILE or --random N")
@@ -190,11 +186,9 @@ class View:
         from twin.storage import read_twin
         from twin.viewer import serve
 
-        folder = self.set or (None if self.what is None else Path(self.what))
-        if self.what is None or (folder is not None and (folder / "measurements.toml").is_file()):
+        if self.what is None or self.set is not None or (Path(self.what) / "measurements.toml").is_file():
+            folder = self.set or (None if self.what is None else Path(self.what))
             recording, twin = _load(folder, self.what if self.set else None)
-        elif self.set is not None:
-            raise DataError(f"{self.set}: no measurement set, a folder with a measurements.toml")
         else:
             recording, twin = None, read_twin(self.what)
         with _working(f"drawing {twin.robot.name}"):

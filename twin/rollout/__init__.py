@@ -4,7 +4,7 @@ controls.py   where controls come from: a table, a measurement set's inputs, or 
 rollout.py    the runs, side by side
 """
 
-from twin.rollout.controls import drawn, from_set, from_table, full_pull
+from twin.rollout.controls import Drawing, drawn, from_set, from_table, full_pull
 from twin.rollout.rollout import Ended, Rollouts, is_dynamic, rollout
 
-__all__ = ["Ended", "Rollouts", "drawn", "from_set", "from_table", "full_pull", "is_dynamic", "rollout"]
+__all__ = ["Drawing", "Ended", "Rollouts", "drawn", "from_set", "from_table", "full_pull", "is_dynamic", "rollout"]

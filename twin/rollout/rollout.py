@@ -51,6 +51,8 @@ def rollout(
     ends there and is listed. Joblib's threads run `jobs` of them at a time. Raises DataError where dynamics are asked for and there
     are none, SolveError where no rollout got anywhere.
     """
+    if not noise >= 0.0:
+        raise DataError(f"noise {noise:g} is below zero; give one standard deviation in metres")
     able = is_dynamic(twin, controls)
     if dynamic and not able:
         raise DataError(
