@@ -11,10 +11,11 @@ equilibrium   the static solve                                         dynamics 
 bench         what prediction needs of a recording
 twin          Robot + parameters + effects: predict(recording) -> Recording
 residual      measured - predicted in sensor sigmas, and the noise     evaluate     the error of a given twin
-storage       twin.toml
+storage       twin.toml                                                rollout      recordings of a twin's own motion
 calibrate     the robot's own uncertain parameters, and those of effects
 diagnose      which effect, or none, explains what is left
 report        report.json, report.html, twin.toml
+env           gymnasium environments                                   viewer       the robot in a browser
 cli           the command line
 """
 

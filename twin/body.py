@@ -164,8 +164,8 @@ class Problem:
 @dataclass(frozen=True, kw_only=True)
 class Path:
     """What a solve answers: base tension (n, n_tendon) N, path lengths of the tendons (n, n_tendon) m, markers (n, n_marker, 3) m
-    in the base frame, further signals by group (n, n_port) SI; status (n,), and how it `started`. `q` (n, nq) and `LU` are the
-    solver's own: its coordinates, and what a neighbour needs of it, or empty."""
+    in the base frame, further signals by group (n, n_port) SI; status (n,), how it `started`, and, where known, why it `ended`
+    early, in words. `q` (n, nq) and `LU` are the solver's own: its coordinates, and what a neighbour needs of it, or empty."""
 
     tension: np.ndarray
     path: np.ndarray
@@ -174,6 +174,7 @@ class Path:
     q: np.ndarray
     others: Mapping[str, np.ndarray] = field(default_factory=dict)
     started: int = DIRECT
+    ended: str = ""
     LU: np.ndarray = field(default_factory=lambda: np.empty((0, 0, 0)), repr=False)
 
     @property

@@ -1,5 +1,5 @@
-"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `calibrate`, `effects`,
-`generate`, `train`, `align`, `shape`.
+"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `view`, `calibrate`, `effects`, and of soft
+fingers `generate`, `train`, `align`, `shape`.
 
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, said in one line.
 """
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import tyro
 from rich.console import Console
@@ -26,7 +26,9 @@ from twin.errors import DataError, TwinError
 
 if TYPE_CHECKING:
     from twin.calibrate import Fit
+    from twin.measurements import Recording
     from twin.robots import Robot
+    from twin.twin import Twin
 
 FAR = 2.0  # prior standard deviations: one in twenty fitted parameters of a robot as described lies further away
 SAMPLE = "*/samples/friday"
@@ -116,6 +118,83 @@ class Simulate:
             predicted = twin.predict(recording, dynamic=self.dynamic)
             write(replace(predicted, robot=robot_reference(twin.robot, self.out)), self.out)
         out.print(f"simulated set: {self.out}", highlight=False, markup=False)
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Roll a twin out under given or drawn controls: MuJoCo steps, or static equilibria for a robot without dynamics.
+
+    Writes a measurement set, which can be diagnosed again. The same seed gives the same set, whatever the number of workers.
+    """
+
+    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, a robot's name or the path to its folder")]]
+    out: Annotated[Path, arg(help="new folder for the rolled-out set")]
+    controls: Annotated[
+        Path | None, arg(help="what drives: the folder of a measurement set, or a CSV in SI (time, tendon_1_tension, ...)")
+    ] = None
+    random: Annotated[int | None, arg(help="instead: how many rollouts of drawn controls")] = None
+    seed: Annotated[int, arg(help="draws the controls and the noise")] = 0
+    seconds: Annotated[float, arg(help="length of a drawn rollout")] = 10.0
+    rate: Annotated[float, arg(help="samples a second of a drawn rollout")] = 50.0
+    drive: Annotated[Literal["tension", "displacement"], arg(help="what drawn controls say of each tendon")] = "tension"
+    pull: Annotated[float | None, arg(help="the most drawn, N or m; default: what bends the robot by some one radian")] = None
+    noise: Annotated[float, arg(help="one standard deviation of noise on the markers, m")] = 0.0
+    dynamic: Annotated[bool | None, arg(help="MuJoCo steps or static equilibria; default: steps where the robot has them")] = None
+    jobs: Annotated[int, arg(help="worker threads")] = _cores()
+
+    def run(self) -> None:
+        from twin.measurements import write
+        from twin.rollout import rollout
+        from twin.storage import read_twin, robot_reference
+
+        twin = read_twin(self.twin)
+        controls = self._controls(twin)
+        with _working(f"rolling out {controls.title}") as progress:
+            noisy = {"noise": self.noise, "seed": self.seed}
+            made = rollout(twin, controls, dynamic=self.dynamic, jobs=self.jobs, progress=progress, **noisy)
+            write(replace(made.recording, robot=robot_reference(twin.robot, self.out)), self.out)
+        for one in made.ended:
+            out.print(f"ended early: {one.why}", highlight=False, markup=False)
+        out.print(f"{len(made.recording.trials)} rollouts ({made.recording.source}): {self.out}", highlight=False, markup=False)
+
+    def _controls(self, twin: Twin) -> Recording:
+        from twin.effects import Drive
+        from twin.measurements import read
+        from twin.rollout import Drawing, drawn, from_set, from_table
+
+        if (self.controls is None) == (self.random is None):
+            raise DataError("say what drives the rollouts: either --controls FILE or --random N")
+        if self.controls is None:
+            return drawn(twin, self.random or 0, self.seed, Drawing(self.seconds, self.rate, Drive(self.drive), self.pull))
+        if self.controls.is_dir():
+            return from_set(twin, read(self.controls, least_trials=1))
+        return from_table(twin, self.controls)
+
+
+@dataclass(frozen=True)
+class View:
+    """Look at a robot in a browser: under sliders, or as it moved in a measurement set, beside what was measured."""
+
+    what: Positional[
+        Annotated[
+            str | None, arg(help="a robot, a twin.toml, a report's folder or a measurement set; without it the bundled sample")
+        ]
+    ] = None
+    set: Positional[Annotated[Path | None, arg(help="the set to replay with a twin")]] = None
+    port: Annotated[int, arg(help="where to serve on 127.0.0.1; the next one that is free if it is taken")] = 8080
+
+    def run(self) -> None:
+        from twin.storage import read_twin
+        from twin.viewer import serve
+
+        if self.what is None or self.set is not None or (Path(self.what) / "measurements.toml").is_file():
+            folder = self.set or (None if self.what is None else Path(self.what))
+            recording, twin = _load(folder, self.what if self.set else None)
+        else:
+            recording, twin = None, read_twin(self.what)
+        with _working(f"drawing {twin.robot.name}"):
+            pass
+        serve(twin, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
 
 
 @dataclass(frozen=True)
@@ -410,7 +489,7 @@ def _command() -> str:
     return " ".join(["twin", *sys.argv[1:]])
 
 
-Command = New | Robots | Diagnose | Evaluate | Simulate | Calibrate | Effects | Generate | Train | Align | Shape
+Command = New | Robots | Diagnose | Evaluate | Simulate | Rollout | View | Calibrate | Effects | Generate | Train | Align | Shape
 
 
 def main() -> None:

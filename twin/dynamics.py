@@ -24,18 +24,21 @@ from twin.equilibrium.engine import mj_step
 from twin.equilibrium.newton import place
 from twin.equilibrium.trial import Slow, rested
 from twin.equilibrium.trial import creep as advance_creep
+from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs
 
 STEP_PER_PRESLIDING = 2.0  # s/m
 # m, from a wall to a post before it, to which slack springs of that length tie the disks: the sphere they cannot leave is flat to
 # x^2 / (2 FAR) = 1e-7 m at a robot's length, and lengths keep 1e-11 m of their 16 digits.
 FAR = 1e5
+FASTEST = 1e5  # rad/s: a hinge that turns sixteen times in a step of a millisecond is lost, long before its numbers overflow
 REFRESH = 2  # steps between evaluations of the applied forces, which change by per cents a step
 
 
 class Motion(NamedTuple):
     """MuJoCo's own arrays that the loop reads and writes between steps, and what drives it."""
 
+    now: float  # s, the time MuJoCo's state is at
     step: float  # s
     velocity: np.ndarray  # (nv,)
     ctrl: np.ndarray
@@ -98,9 +101,12 @@ def look(at, state, motion, i, seen):
 
 @jit
 def step_through(at, motion, slow, state, seen):
-    """Step from the first sample's time, tensions linear between samples. `at.rest` are MuJoCo's rest angles, which creep moves."""
+    """Step on through the samples, tensions linear between them. `at.rest` are MuJoCo's rest angles, which creep moves.
+
+    Returns how many samples were seen, the time reached, and the joint that ran away in the last step, or -1.
+    """
     chain, time, tension, step = at.chain, motion.time, motion.tension, motion.step
-    now, r, taken = time[0], np.zeros(state.q.size), 0
+    now, r, taken = motion.now, np.zeros(state.q.size), 0
     D = np.empty((chain.hand.size, 3, 3))
     for i in range(time.size):
         while i > 0 and now + step <= time[i]:
@@ -113,6 +119,9 @@ def step_through(at, motion, slow, state, seen):
             taken += 1
             mj_step(at.model, at.data)
             now += step
+            for k in range(r.size):
+                if not abs(motion.velocity[k]) < FASTEST:
+                    return i, now, k
         assign(state.q, chain.qpos)
         place(at, state.q + (time[i] - now) * motion.velocity)
         look(at, state, motion, i, seen)
@@ -123,6 +132,68 @@ def step_through(at, motion, slow, state, seen):
                 r[k] -= at.rest[k]
             advance_creep(slow, r, time[i] - time[i - 1])
             rested(motion.fixed, slow.delayed, at.rest)
+    return time.size, now, -1
+
+
+class Moving:
+    """A body in motion under given loads: what MuJoCo, the slip of its tendons and its creep carry from one call to the next."""
+
+    def __init__(self, dynamics: Dynamics, problem: Problem) -> None:
+        """At rest in equilibrium under the problem's first tensions. The body's stiffness counts with its mean: temperature changes
+        little in a fast trial. Raises SolveError where there is no such equilibrium."""
+        loads, route = problem.loads, problem.route
+        scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
+        amplitude = np.array(problem.creep.amplitude, float)
+        delayed = np.zeros((amplitude.size, dynamics.n_slow)) if problem.delayed is None else problem.delayed
+        first = replace(
+            problem, time=problem.time[:1], command=problem.command[:1], stiffness=np.array([scale]), delayed=delayed, near=None
+        )
+        self.start = start = dynamics.statics.solve(first)
+        if not start.status.all():
+            raise SolveError(f"no equilibrium to start from under tensions {np.round(problem.command[0], 3).tolist()} N")
+        moving = Equilibrium(_loaded(dynamics.body, loads, scale))
+        self.model, self.data = model, data = moving.model, moving.data
+        step = min(model.opt.timestep, STEP_PER_PRESLIDING * route.presliding) if route.mu > 0.0 else model.opt.timestep
+        model.opt.timestep = step
+        model.opt.gravity[:] = loads.gravity
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a state that is lost must be seen as such
+        fixed = model.qpos_spring.copy()
+        model.qpos_spring[:] = fixed + delayed.sum(axis=0)
+        data.qpos[:] = start.q[0]
+        mujoco.mj_forward(model, data)
+        motor, self._began = np.zeros(start.slip.shape, np.int64), float(problem.time[0])
+        for t, d in ((t, d) for t, n in enumerate(moving.chain.pieces) for d in range(n)):
+            motor[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id
+        nt = problem.command.shape[1]
+        self._motion = Motion(
+            self._began, float(step), data.qvel, data.ctrl, data.qfrc_applied, motor, fixed, np.zeros(0), np.zeros((0, nt))
+        )
+        self.state = State(np.empty(nt), start.q[0].copy(), start.slip.copy(), start.distal.copy())
+        self._slow = Slow(amplitude, np.array(problem.creep.time, float), delayed)
+        self._at, self._n_marker = moving.statics(problem)._replace(rest=model.qpos_spring), moving.chain.marker.size
+
+    def run(self, time: np.ndarray, tension: np.ndarray) -> tuple[Seen, int, str]:
+        """On through times (n,) s under base tensions (n, n_tendon) N, linear in between, from where it stands at the first.
+
+        Returns what was seen, at how many samples, and why no further, in words.
+        """
+        n, nt = tension.shape
+        seen = Seen(np.full((n, self._n_marker, 3), np.nan), np.full((n, nt), np.nan), np.full((n, self.model.nv), np.nan))
+        motion = self._motion._replace(time=np.array(time, float), tension=np.maximum(tension, 0.0, order="C"))
+        samples, now, lost = step_through(self._at, motion, self._slow, self.state, seen)
+        self._motion = self._motion._replace(now=now)
+        return seen, samples, "" if lost < 0 else self._lost(now, lost)
+
+    def _lost(self, now: float, k: int) -> str:
+        """What became of joint k in the last step."""
+        speed, at, step = float(self.data.qvel[k]), float(self.data.qpos[k]), self._motion.step
+        pull = ", ".join(f"{T:.4g}" for T in self.state.T)
+        what = f"turns at {speed:.2g} rad/s" if np.isfinite(speed) else "has no finite speed"
+        return (
+            f"the motion is lost at step {round((now - self._began) / step)} (t = {now:.4g} s, step {1e3 * step:g} ms): joint "
+            f"{self.model.joint(k).name} {what}, at {at:.3g} rad, under tensions {pull} N; smoother or smaller tensions, or a "
+            "shorter step, may keep it"
+        )
 
 
 class Dynamics:
@@ -130,7 +201,7 @@ class Dynamics:
 
     def __init__(self, body: HingeChain) -> None:
         self.statics = Equilibrium(body)
-        self.model, self.straight_path, self._body = self.statics.model, self.statics.straight_path, body
+        self.model, self.straight_path, self.body = self.statics.model, self.statics.straight_path, body
 
     @property
     def n_slow(self) -> int:
@@ -139,41 +210,15 @@ class Dynamics:
     def solve(self, problem: Problem) -> ChainPath:
         """The motion under base tensions, from rest in equilibrium under the first ones.
 
-        A motion has no neighbour to start from: `near`, `keep`, `once` and `tolerance` are of statics only. The body's stiffness
-        counts with its mean: temperature changes little in a fast trial.
+        A motion has no neighbour to start from: `near`, `keep`, `once` and `tolerance` are of statics only. Where the motion is
+        lost `ended` says how; samples from there on are NaN.
         """
-        loads, route, (n, nt) = problem.loads, problem.route, problem.command.shape
-        scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
-        amplitude = np.array(problem.creep.amplitude, float)
-        delayed = np.zeros((amplitude.size, self.n_slow)) if problem.delayed is None else problem.delayed
-        first = replace(
-            problem, time=problem.time[:1], command=problem.command[:1], stiffness=np.array([scale]), delayed=delayed, near=None
-        )
-        start = self.statics.solve(first)
-        moving = Equilibrium(_loaded(self._body, loads, scale))
-        model, data = moving.model, moving.data
-        step = min(model.opt.timestep, STEP_PER_PRESLIDING * route.presliding) if route.mu > 0.0 else model.opt.timestep
-        model.opt.timestep = step
-        model.opt.gravity[:] = loads.gravity
-        fixed = model.qpos_spring.copy()
-        model.qpos_spring[:] = fixed + delayed.sum(axis=0)
-        data.qpos[:] = start.q[0]
-        mujoco.mj_forward(model, data)
-        motor = np.zeros(start.slip.shape, np.int64)
-        for t, d in ((t, d) for t, n in enumerate(moving.chain.pieces) for d in range(n)):
-            motor[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id
-        tension = np.maximum(problem.command, 0.0, order="C")
-        motion = Motion(
-            float(step), data.qvel, data.ctrl, data.qfrc_applied, motor, fixed, np.array(problem.time, float), tension
-        )  # fmt: skip
-        state = State(np.empty(nt), start.q[0].copy(), start.slip.copy(), start.distal.copy())
-        seen = Seen(np.empty((n, moving.chain.marker.size, 3)), np.empty((n, nt)), np.empty((n, model.nv)))
-        slow = Slow(amplitude, np.array(problem.creep.time, float), delayed)
-        step_through(moving.statics(problem)._replace(rest=model.qpos_spring), motion, slow, state, seen)
-        finite = np.isfinite(seen.markers).all(axis=(1, 2))
+        moving = Moving(self, problem)
+        seen, samples, ended = moving.run(problem.time, problem.command)
+        status = np.where(np.arange(len(problem.time)) < samples, DIRECT, NOT_FOUND)
         return ChainPath(
-            tension=np.array(problem.command), path=seen.path, markers=seen.markers, status=np.where(finite, DIRECT, NOT_FOUND),
-            q=seen.q, started=start.started, slip=state.z, distal=state.s,
+            tension=np.array(problem.command), path=seen.path, markers=seen.markers, status=status, q=seen.q,
+            started=moving.start.started, slip=moving.state.z, distal=moving.state.s, ended=ended,
         )  # fmt: skip
 
 

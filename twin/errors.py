@@ -28,6 +28,11 @@ class UnknownNameError(TwinError):
 class SolveError(TwinError):
     """The statics or dynamics found no answer; says where it stopped and what usually helps."""
 
+    def __init__(self, words: str, sample: int | None = None) -> None:
+        """`sample` (from 0) is the first of a trial without an answer, where that is known."""
+        super().__init__(words)
+        self.sample = sample
+
 
 def shown(value: object, longest: int = 60) -> str:
     """What came, in one short line for a message."""

@@ -151,7 +151,8 @@ def _trial(
     )  # fmt: skip
     path = solver.solve(problem)
     if not path.status.all():
-        raise SolveError(_unsolved(inputs.name, problem, int(np.flatnonzero(path.status == 0)[0])))
+        bad = int(np.flatnonzero(path.status == 0)[0])
+        raise SolveError(f"{inputs.name}: {path.ended}" if path.ended else _unsolved(inputs.name, problem, bad), bad)
     shortening = solver.straight_path - path.path + problem.route.elongation(path.tension)
     travel = np.where(driven.by_length, driven.displacement, shortening)
     markers = body.frame.reported(path.markers)

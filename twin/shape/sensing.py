@@ -6,11 +6,11 @@ of it is what they reported, by R <- R + (reported - sense(R)).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.bench import Bench, Inputs, prepare
+from twin.bench import CONTACT, Inputs, prepare
 from twin.body import Body
 from twin.effects import Drive
 from twin.errors import DataError
@@ -20,7 +20,6 @@ from twin.soft import SoftBody
 from twin.twin import Twin
 
 ROUNDS = 30
-CONTACT = "external_contact"
 OPEN = 3.0  # times its resistance at rest, or that part of it: strains of a finger make no more than 1.6
 FLAT, MOVING = 0.005, 0.03  # of the resistance at rest: noise is below the one, what moves is beyond the other
 
@@ -54,10 +53,13 @@ def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[s
         raise DataError(
             f"{recording.title}: no column {', '.join(missing)}; a shape needs every sensor of robot {twin.robot.name!r}"
         )
-    bench = prepare(recording, twin.robot)
+    disturbed = tuple(
+        replace(t, other={}) for t in recording.trials
+    )  # who pushed is no matter here: what was felt and commanded is
+    bench = prepare(replace(recording, trials=disturbed), twin.robot)
     if not bench.driven_by(Drive.DISPLACEMENT).all():
         raise DataError(f"{recording.title}: tendons are not driven by displacement; give tendon_I_displacement the role 'input'")
-    by_name, notices, readings = {t.name: t for t in recording.trials}, _notices(bench), {}
+    by_name, notices, readings = {t.name: t for t in recording.trials}, list(bench.notices), {}
     for name, trial in by_name.items():
         values = np.stack([trial.values[c] for c in channels], axis=1)
         _check(name, channels, values)
@@ -75,10 +77,6 @@ def _check(name: str, channels: list[str], values: np.ndarray) -> None:
         raise DataError(
             f"{name}, row {rows[0] + 1}: {channels[columns[0]]} is {values[rows[0], columns[0]]:g} ohm; resistances are above zero"
         )
-
-
-def _notices(bench: Bench) -> list[str]:
-    return [n for n in bench.notices if CONTACT not in n]
 
 
 def _alive(name: str, channels: list[str], values: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, list[str]]:

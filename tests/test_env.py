@@ -1,0 +1,192 @@
+"""The environments: gymnasium's own checker, seeds, refusals, and that effects and randomisation act in them as they should."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+import warnings
+from dataclasses import replace
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+
+os.environ.setdefault("MUJOCO_GL", "egl")
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from twin.effects import named
+from twin.env import LENGTHS, register_envs
+from twin.env.continuum import ContinuumReach, ContinuumTrack, Options
+from twin.env.domain import Spread, draw, read_spread
+from twin.env.plant import Plant
+from twin.errors import DataError, TwinError, UnknownNameError
+from twin.measurements import Channel, Recording, Trial
+from twin.storage import read_twin
+from twin.twin import Twin
+
+register_envs()
+DIAGNOSED = """
+format = "twin/1"
+robot = "continuum"
+[parameters]
+"backbone.youngs_modulus" = { value = 76.1, std = 0.5, unit = "GPa" }
+[[effect]]
+id = "tendon_friction"
+parameters = { mu = { value = 0.21, std = 0.02, unit = "1" } }
+"""
+
+
+@pytest.fixture
+def diagnosed(tmp_path: Path) -> Path:
+    path = tmp_path / "twin.toml"
+    path.write_text(DIAGNOSED)
+    return path
+
+
+@pytest.mark.parametrize("name", sorted(LENGTHS))
+def test_gymnasiums_checker_finds_nothing(name: str) -> None:
+    env = gymnasium.make(f"twin/{name}").unwrapped
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Its advice on observations without bounds does not fit a state that has none.
+        warnings.filterwarnings("ignore", message=".*Box observation space (maximum|minimum) value is .*infinity")
+        warnings.filterwarnings("ignore", message=".*is not within the observation space")  # never, but for its own formatting
+        check_env(env, skip_render_check=True)
+
+
+def test_gymnasium_finds_them_by_itself() -> None:
+    """Through the entry point that pyproject.toml declares; installed copies of the package are asked in a process of their own."""
+    declared = tomllib.loads(Path("pyproject.toml").read_text())["project"]["entry-points"]["gymnasium.envs"]["twin"]
+    module, _, name = declared.partition(":")
+    assert getattr(import_module(module), name) is register_envs
+    if "twin" not in {e.name for e in entry_points(group="gymnasium.envs")}:
+        pytest.skip("the installed package is older than its pyproject.toml: pip install it again")
+    code = "import gymnasium; print(gymnasium.make('twin/ContinuumReach-v0').spec.max_episode_steps)"
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.strip()) == (0, "100"), done.stderr
+
+
+def episode(env: ContinuumReach, seed: int, steps: int = 30) -> np.ndarray:
+    rows = [env.reset(seed=seed)[0]]
+    rng = np.random.default_rng(0)
+    rows += [env.step(rng.uniform(-1, 1, env.n).astype(np.float32))[0] for _ in range(steps)]
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("kind", [ContinuumReach, ContinuumTrack])
+def test_a_seed_gives_the_same_episode_bit_for_bit(kind: type[ContinuumReach], diagnosed: Path) -> None:
+    env = kind(diagnosed, randomise=True, tip_noise=2.5e-4, payload=(0.0, 0.01), observe="full")
+    first, other, again = (episode(env, seed) for seed in (3, 4, 3))
+    assert first.tobytes() == again.tobytes()
+    assert not np.array_equal(first, other)
+    assert np.isfinite(first).all()
+
+
+def test_the_environment_moves_as_the_twin_predicts() -> None:
+    """Friction and a lag in force: the plant, step by step, against the prediction of the same commands as a whole trial."""
+    effects = tuple(named(n)(v) for n, v in (("tendon_friction", {"mu": 0.25}), ("actuator_lag", {"time": 0.15})))
+    twin = replace(Twin.of("continuum"), effects=effects)
+    plant, time = Plant(twin, 0.05), np.arange(41) * 0.05
+    command = np.clip(np.column_stack([time, time - 1.0, 0 * time]), 0.0, 1.5)
+    seen = np.array([plant.sensed().markers[-1], *(plant.step(c).markers[-1] for c in command[1:])])
+    channels = [Channel(f"tendon_{i}_tension", "input", "N") for i in (1, 2, 3)] + [
+        Channel(f"tip_{a}", "output", "m") for a in "xyz"
+    ]
+    values = {c.name: command[:, k] if k < 3 else np.zeros(41) for k, c in enumerate(channels)}
+    whole = Recording("continuum", "", "", None, tuple(channels), (Trial("a", time, values),))
+    predicted = twin.predict(whole, dynamic=True).trials[0]
+    # The same steps but for when the elastic correction is taken anew (every other step, counted from each call): under 1e-6 m.
+    assert np.abs(seen - np.column_stack([predicted.values[f"tip_{a}"] for a in "xyz"])).max() < 1e-6
+    assert np.ptp(seen[:, 0]) > 0.02
+
+
+def test_a_reachable_goal_is_reached_by_its_own_tensions() -> None:
+    env = ContinuumReach("continuum")
+    env.reset(seed=1)
+    goals = env._tips(np.array([0.8]), np.array([0.0]))  # tendon 1 alone (the others let go)
+    env._path = goals
+    wanted = 0.8 * env.pull.tension
+    for _ in range(100):
+        rate = np.clip((np.array([wanted, 0, 0]) - env.command) / (env.pull.tension * env.options.interval), -1, 1)
+        _, reward, terminated, truncated, info = env.step(rate)
+    assert not terminated
+    assert not truncated
+    assert info["success"]
+    assert info["distance"] < 1e-4  # m: five seconds, of which the pull takes one; the first mode is gone after one more
+    assert reward == pytest.approx(-info["distance"] / (0.1 * env.length))
+
+
+def test_actions_that_are_refused_and_clipped(recwarn: pytest.WarningsRecorder) -> None:
+    env = ContinuumReach("continuum")
+    env.reset(seed=0)
+    with pytest.raises(DataError, match="action 1 is nan"):
+        env.step(np.array([0.0, np.nan, 0.0]))
+    with pytest.raises(DataError, match=r"shape \(2,\)"):
+        env.step(np.zeros(2))
+    for _ in range(3):
+        env.step(np.array([7.0, 0.0, 0.0]))
+    assert env.command[0] == pytest.approx(3 * env.pull.tension * env.options.interval)
+    assert sum("clipped" in str(w.message) for w in recwarn) == 1
+
+
+def test_bad_options_are_told_with_the_known_ones(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match=r"interval.*randomise.*did you mean 'payload'"):
+        gymnasium.make("twin/ContinuumReach-v0", paylod=(0.0, 0.1))
+    with pytest.raises(DataError, match="no dynamics"):
+        gymnasium.make("twin/ContinuumReach-v0", twin="two_link")
+    newer = tmp_path / "twin.toml"
+    newer.write_text(DIAGNOSED.replace("twin/1", "twin/2"))
+    with pytest.raises(DataError, match="'twin/2'; this program reads 'twin/1'"):
+        gymnasium.make("twin/ContinuumReach-v0", twin=newer)
+    env = ContinuumReach("continuum", ranges={"tendon_frction.mu": (0.0, 0.3)})
+    with pytest.raises(UnknownNameError, match=r"tendon_friction\.mu"):
+        env.reset(seed=0)
+
+
+def test_randomisation_draws_what_the_diagnosis_does_not_know(diagnosed: Path) -> None:
+    twin = read_twin(diagnosed)
+    spread = read_spread(diagnosed, twin)
+    assert spread.std == pytest.approx({"backbone.youngs_modulus": 0.5e9, "tendon_friction.mu": 0.02})
+    rng = np.random.default_rng(0)
+    drawn = [draw(twin, spread, {}, rng) for _ in range(400)]
+    for name, got in (("E", [t.values["backbone.youngs_modulus"] for t in drawn]), ("mu", [t.effects[0]["mu"] for t in drawn])):
+        mean, std = {"E": (76.1e9, 0.5e9), "mu": (0.21, 0.02)}[name]
+        # 400 normal draws: the mean within 4 std/20, the standard deviation within 4/sqrt(800) = 14 %.
+        assert np.mean(got) == pytest.approx(mean, abs=0.2 * std)
+        assert np.std(got) == pytest.approx(std, rel=0.15)
+    doubtful = [bool(draw(twin, Spread(probability={"tendon_friction": 0.7}), {}, rng).effects) for _ in range(400)]
+    assert np.mean(doubtful) == pytest.approx(0.7, abs=0.1)  # 4 sqrt(0.21 / 400)
+    joined = draw(twin, Spread(), {"tip_payload.mass": (0.001, 0.002)}, rng)
+    assert 0.001 <= next(e for e in joined.effects if e.id == "tip_payload")["mass"] <= 0.002
+    own = read_spread("continuum", Twin.of("continuum"))
+    assert own.std["backbone.youngs_modulus"] == pytest.approx(4.66e9)
+
+
+def test_a_frame_shows_the_robot_moving() -> None:
+    env = gymnasium.make("twin/ContinuumReach-v0", render_mode="rgb_array")
+    env.reset(seed=0)
+    try:
+        before = env.render()
+    except TwinError as lacking:
+        pytest.skip(str(lacking))
+    for _ in range(20):
+        env.step(np.array([1.0, -1.0, -1.0], np.float32))
+    after = env.render()
+    env.close()
+    assert before.shape == (480, 640, 3)
+    assert before.std() > 5.0  # grey levels: an empty picture of the sky has less
+    changed = np.abs(after.astype(int) - before).max(axis=2) > 40
+    assert 500 < changed.sum() < 0.2 * changed.size  # the robot moved, the background did not
+
+
+def test_the_table_of_options_is_that_of_the_docstring() -> None:
+    assert str(Options().rate) == "1.0"
+    env = ContinuumReach("continuum", observe="full")
+    nv = env.plant.moving.model.nv
+    assert env.observation_space.shape == (3 * env.n + 6 + 2 * nv,)
+    assert len(env.reset(seed=0)[0]) == 3 * env.n + 6 + 2 * nv

@@ -1,0 +1,244 @@
+"""The viewer: what it draws is what the twin predicts, and a real browser shows it and drives it.
+
+The browser's part needs Chromium (Debian's `chromium`) and is skipped, loudly, where there is none.
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+import threading
+import time
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import viser
+from PIL import Image
+
+from twin.body import Problem
+from twin.effects import Loads, named
+from twin.errors import DataError
+from twin.evaluate import evaluate
+from twin.measurements import Recording, read
+from twin.twin import Twin
+from twin.viewer import App
+from twin.viewer.colours import Range, bar, colours
+from twin.viewer.figures import figure
+from twin.viewer.live import live
+from twin.viewer.replay import Replay
+
+SAMPLE = Path(__file__).parents[1] / "models/continuum/samples/friday"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+G = np.array([0.0, 0.0, 9.81])
+LEAST_RATE = 30.0  # pictures a second while a replay runs
+
+
+def rubbing() -> Twin:
+    return replace(Twin.of("continuum"), effects=(named("tendon_friction")({"mu": 0.21}),))
+
+
+def sample() -> Recording:
+    whole = read(SAMPLE)
+    return replace(whole, trials=whole.select(["circle_1", "slow_1"]).trials)
+
+
+# ---- what is drawn ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_finger_skin_moves_with_the_silicone() -> None:
+    twin = Twin.of("finger")
+    drawn = figure(twin)
+    shown = live(twin, drawn).shape(np.array([1.5, 0.0, 0.0, 0.0]), Loads(G))
+    tip = shown.markers[0, -1]
+    assert np.allclose(shown.skin[0, -1], tip, atol=1e-9)  # the last point of the skin is the tip
+    assert tip[0] > 0.01  # m, towards tendon 1
+    inside, outside = shown.strain[0].reshape(-1)[:-1].reshape(-1, 32)[14, [0, 16]]
+    assert inside < -0.02 < 0.02 < outside  # pressed on the side that is pulled, stretched on the other
+    assert drawn.faces.max() == shown.skin.shape[1] - 1
+
+
+def test_tension_along_the_tendons_falls_by_friction_and_not_without() -> None:
+    tension = np.array([1.5, 0.0, 0.0])
+    for twin, falls in ((rubbing(), True), (Twin.of("continuum"), False)):
+        along = live(twin, figure(twin)).shape(tension, Loads(G)).tension[0].reshape(3, -1)[0]
+        assert along[0] == pytest.approx(1.5)
+        if falls:  # Euler: 1.5 exp(-mu theta) at most; the turn at the holes adds up to less than the bend of a radian
+            assert np.all(np.diff(along) < 0.0)
+            assert 1.5 * np.exp(-0.21 * 1.2) < along[-1] < 1.5 * np.exp(-0.21 * 0.5)
+        else:
+            assert np.allclose(along, 1.5, atol=1e-12)
+
+
+def test_a_replay_is_what_evaluate_measures() -> None:
+    one = replace(sample(), trials=sample().trials[:1])
+    replay, twin = Replay(one, rubbing()), rubbing()
+    track = replay.track(twin, 0)
+    assert 1e3 * track.rms == pytest.approx(evaluate(twin, one)["rmse"], rel=1e-6)
+    assert np.allclose(track.frames.markers[:, :8], track.markers)  # no effect stands between the two here
+    slack = track.frames.at(3).tension[0]
+    between = track.frames.at(3, 0.5).tension[0]
+    assert np.allclose(between, 0.5 * (slack + track.frames.at(4).tension[0]))
+
+
+def test_the_standing_robot_and_the_replayed_one_are_one_figure() -> None:
+    twin = Twin.of("continuum")
+    tension = np.array([1.0, 0.4, 0.0])
+    drawn = figure(twin)
+    path = twin.robot.solver(twin.body()).solve(Problem(np.zeros(1), tension[None], Loads(G)))
+    replayed, standing = drawn.frames(path, Loads(G)), live(twin, drawn).shape(tension, Loads(G))
+    for name in ("place", "piece", "markers"):
+        assert np.allclose(getattr(replayed, name), getattr(standing, name), atol=1e-6)  # m: two solves' tolerance
+
+
+def test_the_bar_says_what_the_colours_are() -> None:
+    over = Range("tension", "N", 1.0, 0.0, 2.0)
+    assert colours(np.array([0.0, 2.0, 9.0]), over).tolist() == [[68, 1, 84], [253, 231, 37], [253, 231, 37]]
+    for word in ("tension, N", ">0<", ">1<", ">2<"):
+        assert word in bar(over)
+
+
+def test_what_is_not_drawn_is_said() -> None:
+    with pytest.raises(DataError, match="not drawn here yet"):
+        figure(Twin.of("two_link"))
+
+
+# ---- in a browser -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Served:
+    app: App
+    address: str
+
+
+def _served(twin: Twin, recording: Recording | None, port: int = 8650) -> Iterator[Served]:
+    server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
+    app, over = App(server, twin, recording), threading.Event()
+
+    def loop() -> None:
+        while not over.is_set():
+            app.tick()
+            time.sleep(0.005)
+
+    thread = threading.Thread(target=loop)
+    thread.start()
+    yield Served(app, f"http://127.0.0.1:{server.get_port()}")
+    over.set()
+    thread.join()
+    server.stop()
+
+
+@pytest.fixture
+def replayed() -> Iterator[Served]:
+    yield from _served(rubbing(), sample())
+
+
+@pytest.fixture(params=["continuum", "finger"])
+def by_hand(request: pytest.FixtureRequest) -> Iterator[Served]:
+    yield from _served(Twin.of(request.param), None)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    if CHROMIUM is None:
+        warnings.warn("NO BROWSER: the viewer was not tried; apt-get install chromium", stacklevel=1)
+        pytest.skip("no chromium here: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    software = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+    with sync_playwright() as play:
+        chromium = play.chromium.launch(executable_path=CHROMIUM, args=software)
+        yield chromium
+        chromium.close()
+
+
+class Page:
+    """A browser's window of 1366 x 768, of which the left 1,000 columns below the notices are the scene."""
+
+    def __init__(self, browser, address: str) -> None:  # type: ignore[no-untyped-def]
+        self.page = browser.new_page(viewport={"width": 1366, "height": 768})
+        self.page.goto(address)
+        self.page.wait_for_selector("canvas")
+
+    def scene(self) -> np.ndarray:
+        shot = self.page.screenshot(clip={"x": 320, "y": 160, "width": 700, "height": 560})
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
+
+    def until(self, true) -> bool:  # type: ignore[no-untyped-def]
+        """Whether `true()` comes true within 30 s; a software renderer on a busy machine takes its time."""
+        end = time.monotonic() + 30.0
+        while time.monotonic() < end:
+            if true():
+                return True
+            self.page.wait_for_timeout(250)
+        return False
+
+    def changed(self, before: np.ndarray) -> bool:
+        """Whether over 500 pixels of the scene become other ones: a disk is larger."""
+        return self.until(lambda: int((np.abs(self.scene() - before).max(axis=2) > 40).sum()) > 500)
+
+    def there(self) -> bool:
+        """Whether the scene is more than its white: a robot fills thousands of pixels."""
+        return self.until(lambda: int((self.scene().min(axis=2) < 200).sum()) > 3000)
+
+    def put(self, label: str, value: str) -> None:
+        """Into the number beside a slider."""
+        row = self.page.locator("label", has_text=label).first.locator("xpath=ancestor::div[.//input[@type='text']][1]")
+        box = row.locator("input[type=text]").first
+        box.fill(value)
+        box.press("Enter")
+
+
+def test_a_slider_moves_the_robot(browser, by_hand: Served) -> None:  # type: ignore[no-untyped-def]
+    page = Page(browser, by_hand.address)
+    assert page.there()
+    before, words = page.scene(), by_hand.app.words.content
+    page.put("tendon 1, N", "2")
+    assert page.until(lambda: by_hand.app.pulls[0].value == 2.0)
+    assert page.changed(before)
+    assert by_hand.app.words.content != words
+    assert "2.00 N" in by_hand.app.words.content
+
+
+def test_scrubber_and_effect_switch_change_picture_and_numbers(browser, replayed: Served) -> None:  # type: ignore[no-untyped-def]
+    page, app = Page(browser, replayed.address), replayed.app
+    assert page.there()
+    before, words = page.scene(), app.words.content
+    page.put("time, s", "6")
+    assert page.changed(before)
+    assert page.until(lambda: "t = 5." in app.words.content)  # the last sample before 6 s: they come every half second
+    assert app.words.content != words
+    before, words = page.scene(), app.words.content
+    page.page.locator("label", has_text="tendon friction").first.click()
+    if app.effects["tendon_friction"].value:
+        page.page.get_by_role("checkbox", checked=True).first.click()
+    assert page.until(lambda: "no effect" in app.words.content)
+    assert page.changed(before)
+    page.page.get_by_role("button", name="as described").click()
+    assert page.until(lambda: "(as described)" in app.words.content)
+
+
+def test_two_clients_one_that_goes_and_a_second_server_on_the_port(browser, replayed: Served) -> None:  # type: ignore[no-untyped-def]
+    first, second = Page(browser, replayed.address), Page(browser, replayed.address)
+    assert first.there()
+    assert second.there()
+    first.page.close()
+    before = second.scene()
+    second.put("time, s", "6")
+    assert second.changed(before)
+    other = next(_served(Twin.of("continuum"), None, int(replayed.address.rpartition(":")[2])))
+    assert other.address != replayed.address
+
+
+def test_a_replay_runs_at_thirty_pictures_a_second(replayed: Served) -> None:
+    app = replayed.app
+    app.play.value = True
+    time.sleep(0.5)
+    before, start = app.drawn, time.monotonic()
+    time.sleep(2.0)
+    rate = (app.drawn - before) / (time.monotonic() - start)
+    assert rate >= LEAST_RATE

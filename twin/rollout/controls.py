@@ -1,0 +1,159 @@
+"""Controls: recordings whose inputs drive a twin and whose outputs, all that its robot shows, are still to be filled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.body import Problem
+from twin.effects import Drive, Loads
+from twin.errors import DataError
+from twin.measurements import Channel, Recording, Trial
+from twin.measurements.tables import read_table
+from twin.robots import Robot
+from twin.twin import Twin
+
+PROBE = 0.01  # N: bends the robots here by less than a degree, and is far above what a solve's tolerance lets through
+CO_CONTRACTION = 0.1
+RELAXED = 10.0  # retardation times of a body's creep between one rollout and the next: e^-10 of it is left
+UNITS = {"marker": "mm", "displacement": "mm", "tension": "N", "sensor": "ohm", "angle": "deg"}  # that people read them in
+INPUTS = {Drive.TENSION: "N", Drive.DISPLACEMENT: "mm"}
+
+
+class Pull(NamedTuple):
+    """How far tendons are pulled: tension (N), and travel (m) of a motor; and where each moves the tip, unit (n_tendon, 2)."""
+
+    tension: float
+    displacement: float
+    towards: np.ndarray
+
+
+def full_pull(twin: Twin) -> Pull:
+    """The pull of one tendon at which the tip would have moved sideways by half its own height, had it gone on as it began.
+
+    Of an arc of constant curvature that is a bend of one radian. Gravity and friction do not count. Raises DataError for a robot
+    whose tendons move no tip sideways.
+    """
+    body = twin.robot.build(twin.values)
+    solver, n = twin.robot.solver(body), body.n_tendon
+    if body.markers:
+        path = solver.solve(Problem(np.arange(n + 1.0), PROBE * np.eye(n + 1, n, -1), Loads(np.zeros(3))))
+        tip, travel = path.markers[:, -1], path.path[0] - np.diagonal(path.path[1:])
+        moved = np.linalg.norm(tip[1:, :2] - tip[0, :2], axis=1)
+        if moved.min() > 0.0:
+            share = float(moved.mean() / (0.5 * np.linalg.norm(tip[0])))
+            return Pull(PROBE / share, float(travel.mean()) / share, (tip[1:, :2] - tip[0, :2]) / moved[:, None])
+    raise DataError(f"not every tendon of robot {twin.robot.name!r} moves a tip sideways: no controls are drawn for it; give them")
+
+
+def from_table(twin: Twin, path: Path) -> Recording:
+    """One rollout from a CSV or Parquet file in SI: `time` (s), and tendon_I_tension (N) or tendon_I_displacement (m) of each.
+
+    Raises DataError for a column that is missing, a value that is no finite number and time that does not increase.
+    """
+    header = path.read_text("utf-8").partition("\n")[0] if path.suffix == ".csv" and path.is_file() else ""
+    drive = Drive.DISPLACEMENT if "_displacement" in header else Drive.TENSION
+    names = _inputs(twin.robot, drive)
+    table = read_table(path, ["time", *names])
+    for name, column in table.columns.items():
+        if not np.isfinite(column).all():
+            bad = int(np.flatnonzero(~np.isfinite(column))[0])
+            raise DataError(f"{table.cell(bad, name)}: a rollout needs a finite number there")
+    trial = Trial(path.stem, table.columns["time"], {name: table.columns[name] for name in names})
+    return _controls(twin, [trial], drive, f"rollout under {path.name}")
+
+
+def from_set(twin: Twin, recording: Recording) -> Recording:
+    """A measurement set's inputs and conditions, a rollout a trial. Raises DataError where they do not drive the robot."""
+    present = {c.name for c in recording.channels}
+    fitting = [d for d in INPUTS if set(_inputs(twin.robot, d)) <= {c.name for c in recording.inputs()}]
+    if not fitting:
+        wanted = " or ".join(_inputs(twin.robot, d)[0].replace("_1_", "_I_") for d in INPUTS)
+        raise DataError(f"the set's inputs do not drive robot {twin.robot.name!r}: {wanted} of each tendon is needed")
+    names = _inputs(twin.robot, fitting[0])
+    kept = [c.name for c in recording.contexts() if c.kind == "ambient_temperature" and c.name in present]
+    trials = [replace(t, values={n: t.values[n] for n in (*names, *kept)}, clouds=None) for t in recording.trials]
+    made = _controls(
+        twin, trials, fitting[0], f"rollout under {recording.title}", [c for c in recording.channels if c.name in kept]
+    )
+    return replace(made, gravity=recording.gravity)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How controls are drawn: from slack, eased moves of 0.3 to 1.5 s from bend to bend, drawn evenly from a disk.
+
+    Each tendon takes the part of a bend along its own direction, up to `pull`. Displacements pay out on the far side; tensions are
+    none there, but for a common pull of up to `CO_CONTRACTION` of the most.
+    """
+
+    seconds: float = 10.0
+    rate: float = 50.0
+    drive: Drive = Drive.TENSION
+    pull: float | None = None  # N or m; full_pull where it is not said
+
+    def __post_init__(self) -> None:
+        if self.drive not in INPUTS:
+            raise DataError(f"controls by {self.drive} are not drawn; allowed: {', '.join(INPUTS)}")
+        for name, value in (("seconds", self.seconds), ("rate", self.rate), ("pull", 1.0 if self.pull is None else self.pull)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise DataError(f"{name} = {value:g}; a number above zero is needed")
+
+
+def drawn(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = None) -> Recording:
+    """n rollouts of drawn controls; rollout k depends on the seed and k only."""
+    drawing = drawing or Drawing()
+    if n < 1:
+        raise DataError(f"{n} rollouts asked for; at least one is needed")
+    by_length, pull = drawing.drive is Drive.DISPLACEMENT, full_pull(twin)
+    full = drawing.pull or (pull.displacement if by_length else pull.tension)
+    time = np.arange(round(drawing.seconds * drawing.rate) + 1) / drawing.rate
+    names = _inputs(twin.robot, drawing.drive)
+    trials = []
+    for k in range(n):
+        rng = np.random.default_rng([seed, k])
+        knots = np.append(0.0, np.cumsum(rng.uniform(0.3, 1.5, int(time[-1] / 0.3) + 2)))
+        radius, angle = np.sqrt(rng.uniform(size=len(knots))), rng.uniform(0.0, 2.0 * np.pi, len(knots))
+        pulls = full * (radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])) @ pull.towards.T
+        if not by_length:
+            pulls = np.maximum(pulls, 0.0) + full * CO_CONTRACTION * rng.uniform(size=(len(knots), 1))
+        pulls[0] = 0.0
+        at, way = np.divmod(np.interp(time, knots, np.arange(len(knots))), 1.0)
+        command = np.stack([np.interp(at + way**2 * (3 - 2 * way), np.arange(len(knots)), p) for p in pulls.T])
+        trials.append(Trial(f"rollout_{k + 1}", time, dict(zip(names, command, strict=True))))
+    return _controls(twin, trials, drawing.drive, f"{n} drawn rollouts, seed {seed}")
+
+
+def _inputs(robot: Robot, drive: Drive) -> list[str]:
+    ports = [next((p for p in ports if p.drive is drive), None) for ports in robot.build().drives]
+    if None in ports:
+        raise DataError(f"robot {robot.name!r} is not driven by {drive}s of its tendons: rollouts are not made for it")
+    return [p.channel for p in ports if p is not None]
+
+
+def _shown(robot: Robot, inputs: Mapping[str, object] | list[str]) -> list[Channel]:
+    """All a robot shows but what drives it, and a tip that is its last marker once more."""
+    body = robot.build()
+    twice = bool(body.markers) and body.markers[-1] in body.markers[:-1]
+    return [
+        Channel(name, "output", UNITS.get(sense.group, "N"))
+        for name, sense in body.senses.items()
+        if sense.only is None and sense.group in UNITS and name not in inputs and not (twice and name.startswith("tip_"))
+    ]
+
+
+def _controls(twin: Twin, trials: list[Trial], drive: Drive, title: str, more: list[Channel] | None = None) -> Recording:
+    names = _inputs(twin.robot, drive)
+    outputs = _shown(twin.robot, names)
+    channels = (*(Channel(n, "input", INPUTS[drive]) for n in names), *(more or []), *outputs)
+    pause = RELAXED * max(twin.laws.creep.time, default=0.1)
+    starts = np.cumsum([0.0, *(float(t.time[-1] - t.time[0]) + pause for t in trials)])
+    filled = tuple(
+        replace(t, values={**t.values, **{c.name: np.full(len(t.time), np.nan) for c in outputs}}, start=float(starts[k]))
+        for k, t in enumerate(trials)
+    )
+    return Recording(twin.robot.name, title, f"controls for a twin of {twin.robot.name}", None, channels, filled)
