@@ -1,5 +1,5 @@
-"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `view`, `calibrate`, `effects`, and of soft
-fingers `generate`, `train`, `align`, `shape`.
+"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `view`, `calibrate`, `effects`, and of
+soft fingers `generate`, `train`, `align`, `shape`.
 
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, said in one line.
 """

@@ -53,9 +53,7 @@ def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[s
         raise DataError(
             f"{recording.title}: no column {', '.join(missing)}; a shape needs every sensor of robot {twin.robot.name!r}"
         )
-    disturbed = tuple(
-        replace(t, other={}) for t in recording.trials
-    )  # who pushed is no matter here: what was felt and commanded is
+    disturbed = tuple(replace(t, other={}) for t in recording.trials)  # who pushed is no matter here
     bench = prepare(replace(recording, trials=disturbed), twin.robot)
     if not bench.driven_by(Drive.DISPLACEMENT).all():
         raise DataError(f"{recording.title}: tendons are not driven by displacement; give tendon_I_displacement the role 'input'")

@@ -16,7 +16,8 @@ from twin.equilibrium.chain import Law
 from twin.errors import DataError
 from twin.hinges import HingeChain
 from twin.soft import SoftBody, SoftStatics
-from twin.soft.cables import Slip, follow
+from twin.soft.cables import follow, unpulled
+from twin.soft.room import undeformed
 from twin.soft.statics import turned
 from twin.twin import Twin
 from twin.viewer.colours import Range
@@ -153,18 +154,17 @@ class SoftFigure:
 
     def frames(self, path: Path, loads: Loads) -> Frames:
         """Of a path that began hanging; friction's share of the tension is followed from there."""
-        solid, route, turn = self._solver.solid, self.twin.laws.route, turned(self.body.turn).T
-        slip: Slip | None = None
-        drawn = []
+        cables, route, turn = self._solver.parts.cables, self.twin.laws.route, turned(self.body.turn).T
+        start = undeformed(self._solver.parts, np.empty((0, 0, 0, 6)))
+        slip, beyond, pulled, drawn = start.slip, start.beyond, unpulled(cables), []
         for q, tension in zip(path.q, path.tension, strict=True):
             u = q.reshape(-1, 3)
-            slip = solid.rest().slip if slip is None else slip
-            follow(solid.cables, u, slip, float(route.mu), float(route.presliding), solid.pulled)
-            slip = Slip(solid.pulled.slip.state.copy(), solid.pulled.slip.beyond.copy())
-            points = (solid.cables.rest + solid.cables.weights @ u) @ turn
+            follow(cables, u, slip, beyond, float(route.mu), float(route.presliding), pulled)
+            slip, beyond = pulled.slip.copy(), pulled.beyond.copy()
+            points = (cables.rest + cables.weights @ u) @ turn
             piece = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
             skin = self._skin + self._weights @ u
-            along = (tension[:, None] * solid.pulled.share).ravel()
+            along = (tension[:, None] * pulled.share).ravel()
             drawn.append((np.zeros((0, 3)), np.zeros((0, 4)), piece, along, skin @ turn, self._strain(skin)))
         return _stacked(drawn, path.markers)
 
