@@ -18,7 +18,7 @@ from twin.shape.modal import FILE, Network, read_weights
 from twin.shape.sensing import sense
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody
-from twin.soft.statics import turned
+from twin.soft.statics import single_thread, turned
 from twin.twin import Twin
 
 EVERY = 3  # clouds of a trial that count, to save time
@@ -54,7 +54,7 @@ def search(recording: Recording, twin: Twin, seed: int = 1) -> tuple[dict[str, f
             total += float((np.sqrt(1.0 + d**2) - 1.0).mean())
         return total + 1e-3 * float(x @ x)
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), single_thread():
         warnings.simplefilter("ignore")
         best, run = cma.fmin2(misfit, np.zeros(len(free)), 0.5, {"maxfevals": TRIALS, "seed": seed, "verbose": -9})
     found = {p.name: float(np.clip(p.value + (p.std or 1.0) * v, p.low, p.high)) for p, v in zip(free, best, strict=True)}

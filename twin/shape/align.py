@@ -29,7 +29,7 @@ from twin.shape.sensing import Sensed, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody, SoftStatics
-from twin.soft.statics import turned
+from twin.soft.statics import single_thread, turned
 from twin.twin import Twin, simulate
 
 STEP = 1e-4  # m in z, of differences
@@ -67,6 +67,11 @@ class Shown:
 
 def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = lambda words: None) -> Aligned:
     """The twin aligned to a recording that has clouds. Raises DataError where no trial has, or none is free of a hand."""
+    with single_thread():
+        return _align(recording, twin, progress)
+
+
+def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) -> Aligned:
     begun = time.perf_counter()
     shown, notices = _shown(recording, twin)
     body = twin.body()

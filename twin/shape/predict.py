@@ -11,7 +11,7 @@ from twin.measurements import Recording
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.shape.sensing import Sensed, sense
 from twin.shape.skin import Skin
-from twin.soft.statics import turned
+from twin.soft.statics import single_thread, turned
 
 
 def predict(recording: Recording, estimator: Estimator) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
@@ -21,7 +21,8 @@ def predict(recording: Recording, estimator: Estimator) -> tuple[dict[str, np.nd
     arrays, skin = {}, SkinOf(estimator)
     for trial in sensed:
         label = next(t.label for t in recording.trials if t.name == trial.name)
-        shapes = estimator.estimate(felt(trial, estimator))
+        with single_thread():
+            shapes = estimator.estimate(felt(trial, estimator))
         turn = turned(estimator.body.turn).T
         arrays |= {
             f"{label}_time": trial.time,
