@@ -1,5 +1,4 @@
-"""The command line: `twin new`, `robots`, `diagnose`, `evaluate`, `simulate`, `rollout`, `view`, `calibrate`, `effects`, and of
-soft fingers `generate`, `train`, `align`, `shape`.
+"""A digital twin of tendon-driven soft and continuum robots that learns from measured data what it is missing.
 
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, said in one line.
 """
@@ -9,20 +8,17 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import tyro
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 from tyro.conf import Positional, arg
 
 from twin.errors import DataError, TwinError
+from twin.finger_commands import Align, Generate, Shape, Train
+from twin.terminal import command_line, cores, err, out, plain, working
 
 if TYPE_CHECKING:
     from twin.calibrate import Fit
@@ -32,13 +28,6 @@ if TYPE_CHECKING:
 
 FAR = 2.0  # prior standard deviations: one in twenty fitted parameters of a robot as described lies further away
 SAMPLE = "*/samples/friday"
-
-out = Console()
-err = Console(stderr=True)
-
-
-def _cores() -> int:
-    return os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
@@ -54,7 +43,7 @@ class Diagnose:
     twin: Annotated[
         str | None, arg(help="a twin.toml, a robot's name or the path to its folder; default: the robot the set names")
     ] = None
-    jobs: Annotated[int, arg(help="worker threads")] = _cores()
+    jobs: Annotated[int, arg(help="worker threads")] = cores()
     seed: Annotated[int, arg(help="draws the sealed trials and the no-effect sets")] = 0
 
     def run(self) -> None:
@@ -65,10 +54,10 @@ class Diagnose:
         if self.out.exists() and not self.out.is_dir():
             raise DataError(f"{self.out} is a file; give a folder for the report with --out")
         settings = Settings(seed=self.seed, jobs=self.jobs)
-        with _working(f"diagnosing {recording.title}") as progress:
+        with working(f"diagnosing {recording.title}") as progress:
             diagnosis = diagnose(recording, twin, settings, progress, lambda s: out.print(report.suspected(s)) if s else None)
             progress("writing the report")
-            report.write(diagnosis, self.out, report.provenance(recording, settings, _command()))
+            report.write(diagnosis, self.out, report.provenance(recording, settings, command_line()))
         out.print(report.console(diagnosis))
         out.print(f"report: {self.out / 'report.html'}", highlight=False, markup=False)
 
@@ -88,7 +77,7 @@ class Evaluate:
 
         twin = read_twin(self.twin)
         recording = read(self.set, least_trials=1)
-        with _working(f"evaluating on {recording.title}"):
+        with working(f"evaluating on {recording.title}"):
             error = evaluate(twin, recording)
         if self.json:
             print(json.dumps(error, indent=2))
@@ -114,7 +103,7 @@ class Simulate:
 
         twin = read_twin(self.twin)
         recording = read(self.set, least_trials=1)
-        with _working(f"simulating {recording.title}"):
+        with working(f"simulating {recording.title}"):
             predicted = twin.predict(recording, dynamic=self.dynamic)
             write(replace(predicted, robot=robot_reference(twin.robot, self.out)), self.out)
         out.print(f"simulated set: {self.out}", highlight=False, markup=False)
@@ -140,7 +129,7 @@ class Rollout:
     pull: Annotated[float | None, arg(help="the most drawn, N or m; default: what bends the robot by some one radian")] = None
     noise: Annotated[float, arg(help="one standard deviation of noise on the markers, m")] = 0.0
     dynamic: Annotated[bool | None, arg(help="MuJoCo steps or static equilibria; default: steps where the robot has them")] = None
-    jobs: Annotated[int, arg(help="worker threads")] = _cores()
+    jobs: Annotated[int, arg(help="worker threads")] = cores()
 
     def run(self) -> None:
         from twin.measurements import write
@@ -149,7 +138,7 @@ class Rollout:
 
         twin = read_twin(self.twin)
         controls = self._controls(twin)
-        with _working(f"rolling out {controls.title}") as progress:
+        with working(f"rolling out {controls.title}") as progress:
             noisy = {"noise": self.noise, "seed": self.seed}
             made = rollout(twin, controls, dynamic=self.dynamic, jobs=self.jobs, progress=progress, **noisy)
             write(replace(made.recording, robot=robot_reference(twin.robot, self.out)), self.out)
@@ -192,7 +181,7 @@ class View:
             recording, twin = _load(folder, self.what if self.set else None)
         else:
             recording, twin = None, read_twin(self.what)
-        with _working(f"drawing {twin.robot.name}"):
+        with working(f"drawing {twin.robot.name}"):
             pass
         serve(twin, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
 
@@ -208,7 +197,7 @@ class Calibrate:
         arg(help="where to start: a twin.toml, a robot's name or the path to its folder; default: the robot the set names"),
     ] = None
     force: Annotated[bool, arg(help="write over a file that is there")] = False
-    jobs: Annotated[int, arg(help="worker threads")] = _cores()
+    jobs: Annotated[int, arg(help="worker threads")] = cores()
     seed: Annotated[int, arg(help="draws the sealed trials and the no-effect sets")] = 0
 
     def run(self) -> None:
@@ -222,10 +211,10 @@ class Calibrate:
             raise DataError(f"{self.out.absolute().parent} is no folder; make it, or give another file with --out")
         recording, twin = _load(self.set, self.twin)
         settings = Settings(seed=self.seed, jobs=self.jobs)
-        with _working(f"calibrating on {recording.title}"):
+        with working(f"calibrating on {recording.title}"):
             fitted, sealed, notices = calibration(recording, twin, settings)
         for notice in notices:
-            out.print(f"note: {_line(notice)}", highlight=False, markup=False)
+            out.print(f"note: {plain(notice)}", highlight=False, markup=False)
         found = fitted.fitted(None)
         out.print(_fitted_table(fitted))
         if fitted.unfixed():
@@ -234,7 +223,7 @@ class Calibrate:
         table = twin_table(
             fitted.model.twin, self.out.parent, found, {e.id: fitted.fitted(e.id) for e in fitted.model.twin.effects}
         )
-        write_twin(self.out, table, report.provenance(recording, settings, _command()))
+        write_twin(self.out, table, report.provenance(recording, settings, command_line()))
         out.print(f"twin: {self.out}", highlight=False, markup=False)
 
 
@@ -273,7 +262,7 @@ class Robots:
         table = Table("robot", "what it is", "family", "uncertain parameters")
         for name in available():
             robot = load(name)
-            table.add_row(name, _line(robot.title), robot.family, str(len(robot.nuisance)))
+            table.add_row(name, plain(robot.title), robot.family, str(len(robot.nuisance)))
         out.print(table)
 
     def _show(self, robot: Robot) -> None:
@@ -282,7 +271,7 @@ class Robots:
 
         path = self.out or Path(f"{robot.name}.html")
         write_drawing(robot, path)
-        out.print(_line(f"{robot.name}: {robot.title}"))
+        out.print(plain(f"{robot.name}: {robot.title}"))
         table = Table("parameter", "value", "± std", "unit", "what it is")
         for line in lines(robot):
             table.add_row(
@@ -308,122 +297,6 @@ class Effects:
         out.print(table)
 
 
-@dataclass(frozen=True)
-class Generate:
-    """Make shapes of a soft finger under random tendon commands and random hands, for what is learned from them.
-
-    Parquet shards in a folder; the same whatever the number of jobs; run again to go on after a stop.
-    """
-
-    twin: Positional[Annotated[str, arg(help="a robot's name, or a twin.toml, whose numbers are then drawn around")]]
-    samples: Annotated[int, arg(help="how many shapes")]
-    out: Annotated[Path, arg(help="folder for the shards")]
-    jobs: Annotated[int, arg(help="worker processes")] = _cores()
-    seed: Annotated[int, arg(help="draws everything")] = 0
-
-    def run(self) -> None:
-        from twin.factory import Order, doubts, generate, need
-
-        robot, drawn = doubts(self.twin)
-        out.print(
-            f"{self.samples} samples take about {need(self.samples) / 1e6:.0f} MB in {self.out}", highlight=False, markup=False
-        )
-        with _working(f"shapes of {robot.name}") as progress:
-            lost = generate(
-                Order(robot, self.samples, self.seed, drawn), self.out, self.jobs,
-                lambda done, rate: progress(f"{done} of {self.samples}, {rate:.0f} a second"),
-            )  # fmt: skip
-        out.print(f"shapes: {self.out}; without an equilibrium: {lost} of {self.samples}", highlight=False, markup=False)
-
-
-@dataclass(frozen=True)
-class Train:
-    """Train the network of the `modal` estimator on shapes that `twin generate` made. Needs torch (extra `learn`)."""
-
-    data: Positional[Annotated[Path, arg(help="folder of shards")]]
-    out: Annotated[Path, arg(help="the weights to write; they ship beside a robot's robot.toml as modal.npz")]
-    robot: Annotated[str, arg(help="a robot's name or the path to its folder")] = "finger"
-    epochs: Annotated[int, arg(help="passes over the data")] = 100
-    seed: Annotated[int, arg(help="draws first weights, batches and noise")] = 0
-
-    def run(self) -> None:
-        from twin.robots import load
-        from twin.shape.training import write_trained
-
-        with _working(f"training on {self.data}") as progress:
-            card = write_trained(load(self.robot), self.data, self.out, self.epochs, self.seed, progress)
-        out.print(f"weights: {self.out}; error on held-out fingers {card['held_out_mm']:.2f} mm", highlight=False, markup=False)
-
-
-@dataclass(frozen=True)
-class Align:
-    """Align a soft finger's twin to a built one from the clouds of a set: mounting angle, R0 and kappa of its strain sensors.
-
-    Writes twin.toml, alignment.json and alignment.txt.
-    """
-
-    set: Positional[Annotated[Path, arg(help="folder of a measurement set with clouds, one trial of them without a hand")]]
-    out: Annotated[Path, arg(help="folder for the aligned twin")]
-    twin: Annotated[str | None, arg(help="where to start: a twin.toml or a robot's name; default: the robot the set names")] = None
-
-    def run(self) -> None:
-        from twin import report
-        from twin.diagnose import Settings
-        from twin.shape.align_report import lines, write_alignment
-
-        recording, twin = _fingers(self.set, self.twin)
-        from twin.shape.align import align
-
-        if self.out.exists() and not self.out.is_dir():
-            raise DataError(f"{self.out} is a file; give a folder for the aligned twin with --out")
-        with _working(f"aligning to {recording.title}") as progress:
-            aligned = align(recording, twin, progress)
-            write_alignment(aligned, self.out, report.provenance(recording, Settings(), _command()))
-        out.print("\n".join(lines(aligned)), highlight=False, markup=False)
-        out.print(f"twin: {self.out / 'twin.toml'}", highlight=False, markup=False)
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Estimate a soft finger's shape from its strain sensors and tendon displacements, with an error bar.
-
-    Writes NAME_time, NAME_vertices, NAME_std, NAME_outside and NAME_cloud of every trial, in metres.
-    """
-
-    set: Positional[Annotated[Path, arg(help="folder of a measurement set")]]
-    twin: Annotated[str, arg(help="an aligned twin: its folder or twin.toml, or a robot's name")]
-    out: Annotated[Path, arg(help="the npz file to write")]
-    estimator: Annotated[str, arg(help="which estimator; a wrong name lists those there are")] = "physics"
-
-    def run(self) -> None:
-        from twin.shape.estimator import estimator
-        from twin.shape.predict import predict, write
-
-        law = estimator(self.estimator)
-        recording, twin = _fingers(self.set, self.twin)
-        with _working(f"shapes of {recording.title}"):
-            arrays, notices = predict(recording, law(twin))
-            write(self.out, arrays)
-        for notice in notices:
-            out.print(f"note: {_line(notice)}", highlight=False, markup=False)
-        out.print(f"shapes: {self.out}", highlight=False, markup=False)
-
-
-def _fingers(folder: Path, twin: str | None) -> tuple[Any, Any]:
-    """The recording, one trial or more, and the twin to read it with, which must be of its robot."""
-    from twin.measurements import read
-    from twin.robots import load
-    from twin.storage import read_twin
-    from twin.twin import Twin
-
-    recording = read(folder, least_trials=1)
-    robot = load(recording.robot, recording.folder)
-    found = read_twin(twin) if twin else Twin.of(robot)
-    if found.robot.name != robot.name:
-        raise DataError(f"{folder} is of robot {robot.name!r}, the twin of {found.robot.name!r}; give the twin of the set's robot")
-    return recording, found
-
-
 def _load(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
     """The recording (the bundled sample if no folder is given) and the twin to hold against it."""
     from twin.measurements import read
@@ -437,26 +310,6 @@ def _load(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
         out.print("no measurement set given: diagnosing the bundled sample (a simulated bench day, see its `source`)")
     recording = read(folder)
     return recording, read_twin(twin) if twin else Twin.of(load(recording.robot, recording.folder))
-
-
-@contextmanager
-def _working(title: str) -> Iterator[Callable[[str], None]]:
-    """A spinner with the present step; says so while the solver is compiled, which happens once."""
-    from twin.equilibrium import is_compiled
-    from twin.robots import compile_solver
-
-    title = escape(str(_line(title)))
-    with err.status(title) as status:
-        if not is_compiled():
-            status.update("compiling the solver, once on this machine (a minute or more)")
-            compile_solver()
-        status.update(title)
-        yield lambda words: status.update(f"{title}: {words}")
-
-
-def _line(words: str) -> Text:
-    """Words of a file as they stand, without what would steer the terminal."""
-    return Text("".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in words))
 
 
 def _fitted_table(fitted: Fit) -> Table:
@@ -483,10 +336,6 @@ def _fitted_table(fitted: Fit) -> Table:
     for _, _, *cells in sorted(rows, key=lambda row: row[:2]):
         table.add_row(*cells)
     return table
-
-
-def _command() -> str:
-    return " ".join(["twin", *sys.argv[1:]])
 
 
 Command = New | Robots | Diagnose | Evaluate | Simulate | Rollout | View | Calibrate | Effects | Generate | Train | Align | Shape
