@@ -62,7 +62,16 @@ def test_positions_are_said_in_millimetres_of_distance_and_channels_alone() -> N
     assert error["by_channel"]["disk_4_x"]["rmse"] == pytest.approx(3.0)
 
 
-SI = {"marker": "m", "displacement": "m", "tension": "N", "temperature": "K", "resistance": "ohm", "angle": "rad", "torque": "N*m"}
+SI = {
+    "marker": "m",
+    "displacement": "m",
+    "tension": "N",
+    "temperature": "K",
+    "resistance": "ohm",
+    "sensor": "ohm",
+    "angle": "rad",
+    "torque": "N*m",
+}
 
 
 @pytest.mark.parametrize("group", UNIT)

@@ -158,7 +158,7 @@ def test_loads_add_up_and_turn() -> None:
 
 def test_a_law_that_finds_nothing_to_act_on_is_refused() -> None:
     jaw = load("cable_tool")
-    with pytest.raises(DataError, match=r"backbone_creep acts on backbone, which robot 'cable_tool' has not"):
+    with pytest.raises(DataError, match=r"backbone_creep acts on viscosity, which robot 'cable_tool' has not"):
         Twin(jaw, {}, (named("backbone_creep")({"amplitude": 0.1}, 2),)).body()
 
 

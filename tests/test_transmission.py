@@ -157,7 +157,7 @@ def test_slack_in_both_tendons_is_a_dead_band_less_what_pretension_takes_up() ->
 
 def test_what_does_not_fit_a_jaw_is_refused_with_the_way_out() -> None:
     trial = run(sine(), 0.01)
-    with pytest.raises(DataError, match=r"backbone_creep acts on backbone.*cable_tool"):
+    with pytest.raises(DataError, match=r"backbone_creep acts on viscosity.*cable_tool"):
         solved({}, (law("backbone_creep", amplitude=0.1),), trial)
     blind = recording(trial)
     blind = replace(blind, channels=(replace(blind.channels[0], role="context"), *blind.channels[1:]))

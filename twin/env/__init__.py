@@ -1,4 +1,6 @@
-"""gymnasium environments on a twin, effects included; found by `gymnasium.make` through its plugin entry point.
+"""gymnasium environments on a twin, effects included; registered where this package is imported.
+
+`gymnasium.make("twin.env:twin/ContinuumReach-v0")` imports it by itself; gymnasium 1.x asks no plugins.
 
 plant.py       a twin stepped in time: command in, what the robot's sensors say out
 domain.py      twins drawn from what a diagnosis does not know
@@ -8,12 +10,15 @@ picture.py     frames by MuJoCo's renderer
 
 from __future__ import annotations
 
-import gymnasium
+from gymnasium.envs.registration import register
 
 LENGTHS = {"ContinuumReach-v0": ("ContinuumReach", 100), "ContinuumTrack-v0": ("ContinuumTrack", 200)}  # class, steps an episode
 
 
 def register_envs() -> None:
-    """What `gymnasium` calls on its first import: names only, so that it costs no MuJoCo."""
+    """Names only, so that it costs no MuJoCo."""
     for name, (kind, steps) in LENGTHS.items():
-        gymnasium.register(f"twin/{name}", f"twin.env.continuum:{kind}", max_episode_steps=steps)
+        register(f"twin/{name}", f"twin.env.continuum:{kind}", max_episode_steps=steps)
+
+
+register_envs()

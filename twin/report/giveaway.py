@@ -22,7 +22,7 @@ BINS = 14
 FEWEST = 4  # samples in a bin whose mean is drawn
 WORDS = (  # words of a law or of a regressor -> kind of variable; the first that matches counts
     (r"^trial ", "clock"),
-    (r"\bdirection of (pull|travel|[td]\d)", "loop"),
+    (r"\bdirection of (pull|travel|strain|[td]\d)", "loop"),
     (r"\bdirection of bending", "azimuth"),
     (r"\brate\b", "rate"),
     (r"\btime held|over the last", "elapsed"),
@@ -31,7 +31,7 @@ WORDS = (  # words of a law or of a regressor -> kind of variable; the first tha
     (r"\bpayload\b", "payload"),
     (r"\btorque\b", "torque"),
     (r"\bposition\b", "position"),
-    (r"\bbending\b|\balong the body\b", "reach"),
+    (r"\bbending\b|\bstrain\b|\balong the body\b", "reach"),
     (r"\btension|\bpull\b|\bload|^[td]\d", "tension"),
 )
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg.cython_blas  # noqa: F401  compiled products call it: it must be there before anyone limits its threads
 
 from twin.compiled import inner, jit
 from twin.soft.cables import Cables, Pulled, follow, geometric, sticking
