@@ -47,7 +47,7 @@ def test_workers_and_a_stop_change_nothing(order: Order, made: Path, tmp_path: P
 
 
 def test_a_longer_order_begins_with_the_same_samples(order: Order, made: Path, tmp_path: Path) -> None:
-    generate(replace(order, samples=16), tmp_path / "short", jobs=1)
+    generate(replace(order, samples=16), tmp_path / "short", jobs=2)
     short, long = (shard.read(f, ["nodes", "resistance"]) for f in (tmp_path / "short", made))
     assert np.array_equal(short["nodes"], long["nodes"][:16])
     assert np.array_equal(short["resistance"], long["resistance"][:16])
