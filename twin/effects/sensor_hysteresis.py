@@ -46,7 +46,6 @@ class SensorHysteresis(Effect):
         Parameter("time", 2.0, "s", 0.05, 500.0, "relaxation time of that", scale=0.5),
     )
     shape = ("swap", "time")
-    guesses = ({"width": 1e-3}, {"share": 0.05})
     needs = frozenset({"strain sensors"})
     moves_with = "the direction of strain"
 

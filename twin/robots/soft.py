@@ -29,7 +29,6 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
     markers = [f"marker_{m}" for m in range(1, shape.markers + 1)]
     cells = lattice(cone, shape.cells).quadrature[1]
     nt, ns = shape.tendons, shape.sensors
-    kinds = {"tension": "tension", "displacement": "displacement"}
     return SoftBody(
         spec=_picture(cone, paths, cord_paths, seen),
         n_tendon=nt,
@@ -38,7 +37,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
         ),
         drives=tuple(ports[:2] for ports in tendon_ports(nt)),
         senses={
-            **{f"tendon_{i}_{kind}": Sense(group, i - 1) for i in range(1, nt + 1) for kind, group in kinds.items()},
+            **{f"tendon_{i}_{kind}": Sense(kind, i - 1) for i in range(1, nt + 1) for kind in ("tension", "displacement")},
             **{f"sensor_{i}_resistance": Sense("sensor", i - 1) for i in range(1, ns + 1)},
             **marker_senses([*markers, "tip"]),
         },

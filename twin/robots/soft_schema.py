@@ -18,7 +18,7 @@ Points = Annotated[int, Field(ge=3, le=200)]
 class Soft(Structure):
     """[structure] of family "soft"."""
 
-    cells: Annotated[int, Field(ge=2, le=12)] = Field(5, description="layers of 27-node cells from clamp to tip; 5 bend to 0.2 mm")
+    cells: Annotated[int, Field(ge=2, le=12)] = Field(5, description="layers of 27-node cells from clamp to tip")
     tendons: Count = Field(description="how many tendons")
     tendon_points: Points = Field(21, description="points of the body that each tendon runs straight between, equally spaced")
     sensors: Count = Field(description="how many strain-sensing cords")

@@ -70,10 +70,10 @@ def straight(azimuth: float, heights: tuple[float, float], radii: tuple[float, f
     return np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.linspace(*heights, n)])
 
 
-def skin_points(cone: Cone, rings: int = RINGS, around: int = AROUND) -> np.ndarray:
-    """(rings * around, 3) m on the free part of the cone's surface, ring by ring, the last at the tip."""
-    z = np.linspace(cone.clamp, cone.length, rings + 1)[1:]
-    t = 2.0 * np.pi * np.arange(around) / around
+def skin_points(cone: Cone) -> np.ndarray:
+    """(RINGS * AROUND, 3) m on the free part of the cone's surface, ring by ring, the last at the tip."""
+    z = np.linspace(cone.clamp, cone.length, RINGS + 1)[1:]
+    t = 2.0 * np.pi * np.arange(AROUND) / AROUND
     Z, T = (v.ravel() for v in np.meshgrid(z, t, indexing="ij"))
     R = cone.radius(Z)
     return np.stack([R * np.cos(T), R * np.sin(T), Z], axis=1)

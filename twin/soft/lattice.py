@@ -13,7 +13,7 @@ import numpy as np
 
 NODES = 27  # of a cell
 ACROSS = 3  # levels of nodes in x and in y
-RADII, ANGLES, HEIGHTS = 2, 8, 3  # Gauss points of a cell; more change the tip by less than 0.02 mm
+RADII, ANGLES, HEIGHTS = 2, 8, 3  # Gauss points of a cell; with 3, 12 and 4 resistances stay to 0.01 ohm (RMS)
 GRADING = 1.15  # cells are lower near the clamp, where the strain concentrates
 RIM = 1e-9  # m; a point on the face between two cells belongs to the lower
 
