@@ -123,6 +123,8 @@ def test_numbers_follow_their_error():
     assert plus_minus(Fitted(0.10312, 0.0011, "1")) == "0.1031 ± 0.0011"
     assert plus_minus(Fitted(6.4e-4, None, "m")) == "0.6400 mm"
     assert plus_minus(Fitted(7.333e10, 2e8, "Pa")) == "73.33 ± 0.20 GPa"
+    assert plus_minus(Fitted(1.2345e5, 300.0, "Pa")) == "123.45 ± 0.30 kPa"
+    assert plus_minus(Fitted(-4.097e-5, 3.9e-7, "1/s")) == "\N{MINUS SIGN}14.75 ± 0.14 %/h"
     assert number(float("nan")) == "\N{EN DASH}"
     assert number(-0.001) == "0.00"
     assert column([0.0123, 1.5, None]) == ["0.01", "1.50", "\N{EN DASH}"]

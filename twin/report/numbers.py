@@ -15,13 +15,14 @@ MINUS = "\N{MINUS SIGN}"
 FRIENDLY = {  # SI unit -> (shown unit, factor)
     "m": ("mm", 1e3),
     "kg": ("g", 1e3),
-    "Pa": ("GPa", 1e-9),
     "rad": ("°", 180.0 / math.pi),
     "m/N": ("mm/N", 1e3),
     "N/s": ("N/h", 3600.0),
     "1/K": ("%/K", 1e2),
+    "1/s": ("%/h", 3.6e5),
     "1": ("", 1.0),
 }
+MODULI = (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))  # metals, plastics, silicones
 
 
 def finite(value: float | None, factor: float = 1.0) -> float | None:
@@ -45,9 +46,17 @@ def number(value: float | None, decimals: int = 2) -> str:
     return text.replace("-", MINUS) if float(text) else text.lstrip("-")
 
 
+def everyday(unit: str, value: float) -> tuple[str, float]:
+    """The unit (mm, g, kPa to GPa, degrees, ...) that suits a `value` of an SI unit, and the factor from there; others stay SI."""
+    if unit == "Pa":
+        shown, size = next((m for m in MODULI if abs(value) >= m[1]), MODULI[-1])
+        return shown, 1.0 / size
+    return FRIENDLY.get(unit, (unit, 1.0))
+
+
 def friendly(fitted: Fitted) -> Fitted:
-    """The same quantity in a unit of everyday size (mm, g, GPa, degrees); others stay SI."""
-    unit, factor = FRIENDLY.get(fitted.unit, (fitted.unit, 1.0))
+    """The same quantity in a unit of everyday size."""
+    unit, factor = everyday(fitted.unit, fitted.value)
     return Fitted(fitted.value * factor, None if fitted.std is None else fitted.std * factor, unit)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from twin.quantities import Fitted
-from twin.report.numbers import NONE, digits, friendly, number
+from twin.report.numbers import NONE, digits, everyday, friendly, number
 from twin.report.sections.section import Section, Story
 
 
@@ -17,15 +16,15 @@ def section(story: Story) -> Section:
     rows = []
     for name, f in shown.items():
         places, p = decimals[_family(name)], declared.get(name)
-        before = None if p is None else friendly(Fitted(p.value, p.std, p.unit))
+        factor = everyday(d.parameters[name].unit, d.parameters[name].value)[1]
         rows.append(
             {
                 "name": name,
                 "unit": f.unit or "1",
                 "value": number(f.value, places),
                 "std": number(f.std, places),
-                "nominal": NONE if before is None else number(before.value, places),
-                "belief": NONE if before is None else number(before.std, places),
+                "nominal": NONE if p is None else number(p.value * factor, places),
+                "belief": NONE if p is None or p.std is None else number(p.std * factor, places),
                 "unfixed": name in d.unfixed,
             }
         )
