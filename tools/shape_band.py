@@ -3,8 +3,8 @@
     twin generate finger --samples 60000 --seed 1 --out shapes/
     python -m tools.shape_band shapes/ [--fingers 30]
 
-Prints the value for BAND in twin/shape/physics.py, and coverage by how hard the strains say the hand presses. The trained estimators
-find theirs when they are trained, on the same fingers. No bench day plays a part.
+Prints the value for BAND in twin/shape/physics.py, and coverage by how hard the strains say the hand presses. The trained
+estimators find theirs when they are trained, on the same fingers. No bench day plays a part.
 """
 
 from __future__ import annotations

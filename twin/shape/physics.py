@@ -36,7 +36,7 @@ SETTLED = 0.02  # of a step in a
 LONGEST = 4.0  # of a step in a
 OUTSIDE = 4.0  # standard deviations of the residual strain, or of a push, that the twin does not explain
 FREEDOM = 1.0  # as widely as the factory's hands differ in strength: with it gentle and hard pushes are covered alike
-BAND = 0.94  # so that 1.645 std holds 90 % of the points of held-out factory fingers: python -m tools.shape_band
+BAND = 0.96  # so that 1.645 std holds 90 % of the points of held-out factory fingers: python -m tools.shape_band
 
 
 class Physics(Estimator):

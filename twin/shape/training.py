@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import json
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -123,7 +124,7 @@ def train(lesson: Lesson, checkpoint: Checkpoint, progress: Callable[[str], None
     chosen, held = np.flatnonzero(~data.held), np.flatnonzero(data.held)
     held = held[:: -(-len(held) // JUDGED)]
     seen = torch.from_numpy(_held_out(lesson, held, way.seed))
-    state: dict[str, Any] = {"epoch": 0, "best": np.inf, "at": 0, "weights": None}
+    state: dict[str, Any] = {"epoch": 0, "best": math.inf, "at": 0, "weights": None}
     if (found := checkpoint.read()) is not None:
         state = {name: found[name] for name in state}
         net.load_state_dict(found["net"])
@@ -155,7 +156,7 @@ def _epoch(
     steps = len(chosen) // size
     for b in range(steps):
         pick = order[b * size : (b + 1) * size]
-        optimizer.param_groups[0]["lr"] = lesson.rate * 0.5 * (1.0 + np.cos(np.pi * (begun + share * b / steps)))
+        optimizer.param_groups[0]["lr"] = lesson.rate * 0.5 * (1.0 + math.cos(math.pi * (begun + share * b / steps)))
         loss = lesson.loss(net, torch.from_numpy(shown(rng, lesson.data, pick)), pick, rng)
         optimizer.zero_grad()
         loss.backward()
