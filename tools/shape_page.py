@@ -158,7 +158,7 @@ def surfaces(names: Sequence[str], frames: dict[str, list[Frames]]) -> go.Figure
             tx, ty, tz = f.true[frame][: RINGS * AROUND].T
             dots = {"size": 1.5, "color": "black"}
             page.add_scatter3d(x=tx, y=ty, z=tz, mode="markers", marker=dots, hoverinfo="skip", showlegend=False, row=row, col=col)
-    page.update_scenes(aspectmode="data", camera_eye={"x": 1.6, "y": 1.2, "z": 0.3})
+    page.update_scenes(aspectmode="data", camera_eye={"x": 2.0, "y": 1.5, "z": 0.4})
     bar = {"colorscale": "Viridis", "cmin": 0.0, "cmax": 3.0, "colorbar_title": "error, mm"}
     return page.update_layout(height=900, coloraxis=bar, title="Estimated surfaces, coloured by error; true ones: dots")
 
