@@ -106,7 +106,7 @@ class _Walk:
                 break
         moved = self.owner.weights @ (self.shape.u + (response @ step).reshape(-1, 3))
         G = np.einsum("pn,nck->pck", self.owner.weights, response.reshape(-1, 3, RANK))
-        strength = (FREEDOM + self.a @ self.a + ((wrong / noise) ** 2).sum()) / (FREEDOM + len(felt))
+        strength = (FREEDOM + self.a @ self.a + ((wrong / noise) ** 2).sum()) / (FREEDOM + len(felt)) if found else 1.0
         variance = np.einsum("pck,kl,pcl->p", G, covariance, G, optimize=True) * strength * BAND**2 + own_error(moved) ** 2
         far = not found or np.abs(self.a).max() > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
         return moved, np.sqrt(variance), bool(far)
