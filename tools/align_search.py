@@ -14,7 +14,7 @@ from twin.measurements import Recording
 from twin.sensors import Cords, strain
 from twin.shape.cloud_fit import BEYOND, CLOUD
 from twin.shape.estimator import Felt
-from twin.shape.modal import FILE, Network, read_weights
+from twin.shape.modal import Network
 from twin.shape.sensing import sense
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody
@@ -30,7 +30,7 @@ def search(recording: Recording, twin: Twin, seed: int = 1) -> tuple[dict[str, f
     body = twin.body()
     assert isinstance(body, SoftBody)
     free = [p for p in twin.robot.nuisance if p.name.startswith(("sensors.", "mounting."))]
-    skin, net = Skin.of(body), Network(read_weights(twin.robot.folder / FILE))
+    skin, net = Skin.of(body), Network.of(twin.robot)
     clouds = {t.name: t.clouds for t in recording.trials}
     frames = []
     for s in sense(recording, twin)[0]:

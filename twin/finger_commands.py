@@ -42,20 +42,25 @@ class Generate:
 
 @dataclass(frozen=True)
 class Train:
-    """Train the network of the `modal` estimator on shapes that `twin generate` made. Needs torch (extra `learn`)."""
+    """Train an estimator of a finger's shape on shapes that `twin generate` made. Needs torch (extra `learn`).
 
-    data: Positional[Annotated[Path, arg(help="folder of shards")]]
-    out: Annotated[Path, arg(help="the weights to write; they ship beside a robot's robot.toml as modal.npz")]
+    Writes the weights and, beside them, a card (.json). After a stop the same command goes on from the last whole epoch.
+    """
+
+    estimator: Positional[Annotated[str, arg(help="which estimator; a wrong name lists those there are")]]
+    data: Annotated[Path, arg(help="folder of shards")]
+    out: Annotated[Path, arg(help="the weights to write; they ship beside a robot's robot.toml as ESTIMATOR.npz")]
     robot: Annotated[str, arg(help="a robot's name or the path to its folder")] = "finger"
-    epochs: Annotated[int, arg(help="passes over the data")] = 100
+    epochs: Annotated[int, arg(help="passes over the data, at most")] = 100
     seed: Annotated[int, arg(help="draws first weights, batches and noise")] = 0
 
     def run(self) -> None:
         from twin.robots import load
-        from twin.shape.training import write_trained
+        from twin.shape.training import Way, digest, write_trained
 
-        with working(f"training on {self.data}") as progress:
-            card = write_trained(load(self.robot), self.data, self.out, self.epochs, self.seed, progress)
+        way = Way(self.estimator, digest(self.data), self.epochs, self.seed)
+        with working(f"training {self.estimator} on {self.data}") as progress:
+            card = write_trained(way, load(self.robot), self.data, self.out, progress)
         out.print(f"weights: {self.out}; error on held-out fingers {card['held_out_mm']:.2f} mm", highlight=False, markup=False)
 
 

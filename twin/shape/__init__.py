@@ -5,8 +5,10 @@ tensions.py    load cells, and tendon displacements where they are known, to mar
 Strain sensors to the surface of a soft finger, one estimator per file, found by themselves:
 
 physics.py     the twin's equilibrium under the likeliest push         estimator.py  what an estimator is
-modal.py       a small network onto the twin's deformation modes       training.py   and how that one is trained (torch)
-constant_curvature.py  the baseline
+modal.py       a small network onto the twin's deformation modes       learned.py    what one with weights is; weights.py
+folding.py     KineSoft's decoder, a baseline                          training.py   how those are trained (torch): lesson.py what
+deepsoro.py    a decoder trained by chamfer distance, a baseline                     differs between them, judge.py their bands
+constant_curvature.py  an arc, a baseline
 
 sensing.py     a trial to strains and displacements                    align.py      R0, kappa and mounting angle from clouds
 predict.py     a recording's shapes as a file                          cloud_fit.py, sensor_fit.py, skin.py  what it is made of

@@ -24,7 +24,7 @@ from twin.quantities import Fitted
 from twin.sensors import strain
 from twin.shape.cloud_fit import BEYOND, CLOUD, CloudFit
 from twin.shape.estimator import Felt
-from twin.shape.modal import FILE, Network, read_weights
+from twin.shape.modal import Network
 from twin.shape.sensing import Sensed, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
 from twin.shape.skin import Skin, distances, facing
@@ -80,7 +80,7 @@ def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) ->
     progress("turning the finger onto its clouds")
     before = _misfit(skin, shown, body.turn)
     angle, angle_std = _angle(skin, shown, twin)
-    net = Network(read_weights(twin.robot.folder / FILE))
+    net = Network.of(twin.robot)
     fitted: dict[str, Fitted] = {"mounting.angle": Fitted(angle, angle_std, "rad")}
     statics = SoftStatics(body)
     for sweep in range(2):

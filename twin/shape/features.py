@@ -1,4 +1,5 @@
-"""What learned estimators are given of what is felt: strains, which of them are there, and tendon displacements."""
+"""What learned estimators are given of what is felt: strains, which of them are there, tendon displacements, and whether something
+may press."""
 
 from __future__ import annotations
 
@@ -8,9 +9,8 @@ STRAIN, LENGTH = 0.04, 5e-3  # sizes that count as one
 SLACK = -12e-3  # m: a tendon paid out further holds nothing
 
 
-def features(strain: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """(n, 2 s + t) of strains (n, s), NaN where missing, and displacements (n, t) m."""
-    there = np.isfinite(strain)
-    return np.concatenate(
-        [np.where(there, strain, 0.0) / STRAIN, there, np.maximum(displacement, SLACK) / LENGTH], axis=1, dtype=np.float64
-    )
+def features(strain: np.ndarray, displacement: np.ndarray, pushed: np.ndarray | bool) -> np.ndarray:
+    """(n, 2 s + t + 1) of strains (n, s), NaN where missing, displacements (n, t) m and `pushed` (n,)."""
+    there, pressed = np.isfinite(strain), np.broadcast_to(pushed, len(strain))[:, None]
+    parts = [np.where(there, strain, 0.0) / STRAIN, there, np.maximum(displacement, SLACK) / LENGTH, pressed]
+    return np.concatenate(parts, axis=1, dtype=np.float64)

@@ -3,86 +3,111 @@
     (z, log std z) = MLP(features),       vertices = mean + basis z,      std^2 = sum_k (basis_k std z_k)^2 + rest^2
 
 Trained on the factory's shapes alone: of all the ways in which hands may have made these strains it gives the mean, and their
-spread. A strain pattern is outside what it knows where its distance from the factory's patterns, a Mahalanobis distance, is beyond
-theirs.
+spread.
 """
 
 from __future__ import annotations
 
-import zipfile
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from twin.errors import DataError
-from twin.shape.estimator import Estimator, Felt, Shapes
+from twin.robots import Robot
+from twin.shape.estimator import Felt
 from twin.shape.features import features
-from twin.shape.modes import Habit, Modes
+from twin.shape.learned import Learned
+from twin.shape.lesson import Data, Lesson, layers_of, torch_perceptron
+from twin.shape.modes import COUNT, Habit, Modes
+from twin.shape.weights import pack, perceptron, read_weights, unpack
 from twin.twin import Twin
 
-FILE, FORMAT = "modal.npz", "twin-modal/1"
+if TYPE_CHECKING:
+    import torch
+
+WIDTH, LAYERS = 192, 3
+LEAST, MOST = -8.0, 3.0  # of log std z over the spread of z
+REST = 1e-4  # m, what the modes leave out
 
 
-class Modal(Estimator):
+class Modal(Learned):
     """Remembers nothing."""
 
     about = "a small network onto the twin's deformation modes"
 
-    def __init__(self, twin: Twin) -> None:
-        super().__init__(twin)
-        self.net = Network(read_weights(twin.robot.folder / FILE))
+    def __init__(self, twin: Twin, arrays: dict[str, Any] | None = None) -> None:
+        super().__init__(twin, arrays)
+        self.net = Network(self.arrays)
         weights = self.body.lattice.weights(self.points.rest)
         self._mean, basis = self.net.modes.mean.reshape(-1, 3), self.net.modes.basis.reshape(len(self.net.modes.basis), -1, 3)
         if self._mean.shape[0] != weights.shape[1]:
-            raise DataError(f"{twin.robot.folder / FILE} was trained for another lattice; train it again: twin train")
+            raise DataError(f"{twin.robot.folder / self.file()} was trained for another lattice; train it again: twin train")
         self._basis = np.einsum("pn,knc->kpc", weights, basis)
         self._mean = weights @ self._mean
 
-    def estimate(self, felt: Felt) -> Shapes:
+    @classmethod
+    def lesson(cls, data: Data) -> Lesson:
+        return ModalLesson(data)
+
+    def decode(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
         z, std = self.net(felt)
         k, p = self._basis.shape[:2]
         moved = self._mean + (z @ self._basis.reshape(k, -1)).reshape(-1, p, 3)
-        variance = std**2 @ (self._basis**2).sum(axis=2) + self.net.rest**2
-        return Shapes(moved, np.sqrt(variance), self.net.outside(felt))
+        return moved, np.sqrt(std**2 @ (self._basis**2).sum(axis=2) + REST**2)
 
 
 class Network:
-    """The trained network: layers, modes and what it knows; `habit`: how its modes go together where
-    hands push a finger whose tendons are paid out."""
+    """The trained network: layers and modes; `habit`: how its modes go together where hands push a finger whose tendons are paid
+    out."""
 
     def __init__(self, arrays: dict[str, Any]) -> None:
-        self.layers = [(arrays[f"weight_{i}"], arrays[f"bias_{i}"]) for i in range(int(arrays["layers"]))]
+        self.layers = unpack("net", arrays)
         self.modes = Modes(arrays["mean"], arrays["basis"], arrays["spread"])
-        self.rest, self.widen = float(arrays["rest"]), arrays["widen"]
         self.habit = Habit(arrays["habit"], arrays["habit_inverse"], self.modes.spread)
-        self._centre, self._inverse, self._far = arrays["known_mean"], arrays["known_inverse"], float(arrays["known_far"])
+
+    @staticmethod
+    def of(robot: Robot) -> Network:
+        """The one beside a robot's description. Raises DataError for weights that are not there, truncated or foreign."""
+        return Network(read_weights(robot.folder / Modal.file(), Modal.form()))
 
     def __call__(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (n, k) m of the modes and their standard deviations."""
-        x = features(felt.strain, felt.displacement)
-        for weight, bias in self.layers[:-1]:
-            x = x @ weight.T + bias
-            x = x / (1.0 + np.exp(-x))  # SiLU
-        weight, bias = self.layers[-1]
-        mean, log_std = np.split(x @ weight.T + bias, 2, axis=1)
-        return mean * self.modes.spread, np.exp(np.clip(log_std, -8.0, 3.0)) * self.modes.spread * self.widen
-
-    def outside(self, felt: Felt) -> np.ndarray:
-        """(n,) whether strains, as far as they are there, lie further out than all but one in a thousand of those trained on."""
-        x = np.where(np.isfinite(felt.strain), felt.strain, self._centre) - self._centre
-        return np.einsum("ni,ij,nj->n", x, self._inverse, x) > self._far
+        mean, log_std = np.split(perceptron(features(felt.strain, felt.displacement, felt.pushed), self.layers), 2, axis=1)
+        return mean * self.modes.spread, np.exp(np.clip(log_std, LEAST, MOST)) * self.modes.spread
 
 
-def read_weights(path: Path) -> dict[str, Any]:
-    """The arrays of a weights file. Raises DataError for a missing, truncated or foreign file."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        if str(arrays["format"]) != FORMAT:
-            raise DataError(f"{path}: format {arrays['format']}; {FORMAT} is needed, train it again: twin train")
-    except FileNotFoundError:
-        raise DataError(f"{path}: no weights there; train them: twin train") from None
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as fault:
-        raise DataError(f"{path}: no weights of this program ({fault}); train them again: twin train") from None
-    return {name: a.astype(float) if a.dtype == np.float32 else a for name, a in arrays.items()}
+class ModalLesson(Lesson):
+    """Squared error of the vertices, and the likelihood of what is left of each coordinate for its std."""
+
+    batch, rate = 1024, 2e-3
+
+    def __init__(self, data: Data) -> None:
+        super().__init__(data)
+        nodes = data.nodes.astype(float)
+        self.modes = Modes.of(nodes[~data.held], data.weights, COUNT)
+        self.z = self.modes.coordinates(nodes, data.weights)
+        self.target = (self.z / self.modes.spread).astype(np.float32)
+
+    def network(self) -> torch.nn.Module:
+        import torch
+
+        return torch_perceptron([self.inputs, *[WIDTH] * LAYERS, 2 * COUNT], torch.nn.SiLU)
+
+    def loss(self, net: torch.nn.Module, x: torch.Tensor, pick: np.ndarray, rng: np.random.Generator) -> torch.Tensor:
+        import torch
+
+        spread = torch.tensor(self.modes.spread, dtype=torch.float32)
+        mean, log_std = net(x).split(COUNT, dim=1)
+        error, log_std = (mean - torch.from_numpy(self.target[pick])) ** 2, log_std.clamp(LEAST, MOST)
+        likelihood = (0.5 * error.detach() * torch.exp(-2.0 * log_std) + log_std).mean()
+        return 100.0 * (error * (spread / spread[0]) ** 2).sum(dim=1).mean() + 0.02 * likelihood
+
+    def missed(self, net: torch.nn.Module, x: torch.Tensor, pick: np.ndarray) -> np.ndarray:
+        away = (net(x)[:, :COUNT].numpy() - self.target[pick]) * self.modes.spread
+        return np.sqrt((away**2).sum(axis=1) / len(self.data.weights))
+
+    def arrays(self, net: torch.nn.Module) -> dict[str, Any]:
+        slack = self.data.kind == "pushed"
+        coefficient, inverse = Habit.fit(self.z[slack], self.modes.spread)
+        modes = {"mean": self.modes.mean, "basis": self.modes.basis.astype(np.float32), "spread": self.modes.spread}
+        return pack("net", layers_of(net)) | modes | {"habit": coefficient, "habit_inverse": inverse}

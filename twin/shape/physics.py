@@ -3,9 +3,16 @@
     max over a   -|a|^2 - |(eps(u(a)) - eps_felt) / sigma|^2,       push on the nodes f = B a,  a ~ N(0, 1)
 
 B is the root of the covariance of the factory's hands, so that a is a Gaussian process of smooth loads on the skin; u(a) is the
-equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before; the covariance of the last
-step, G (1 - J' (J J' + sigma^2)^-1 J) G', G = dx/da, J = deps/da, is the error bar. Without a push u is what the tendons make of
-it.
+equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before. Without a push u is what the
+tendons make of it.
+
+Hands press gently or hard, so that (a, strain error) are normal given a strength of which little is known: together a t
+distribution of FREEDOM degrees. What m strains leave open is then wider the harder the likeliest push,
+
+    C = (FREEDOM + q) / (FREEDOM + m)  G (1 - J' (J J' + sigma^2)^-1 J) G',      G = dx/da,  J = deps/da,
+
+q = |a|^2 + |(eps - eps_felt) / sigma|^2 (Kotz and Nadarajah 2004, sec. 1.11), and the error bar is BAND of its root and the twin's
+own error.
 """
 
 from __future__ import annotations
@@ -16,7 +23,7 @@ import numpy as np
 
 from twin.factory.draw import PUSHES, draw_pushes
 from twin.factory.solve import Surface, hang, march, surface, weight_of
-from twin.shape.estimator import Estimator, Felt, Shapes
+from twin.shape.estimator import Estimator, Felt, Shapes, own_error
 from twin.soft import Cone, SoftStatics
 from twin.soft.solid import Solid
 from twin.soft.statics import single_thread
@@ -28,8 +35,8 @@ ROUNDS = 4
 SETTLED = 0.02  # of a step in a
 LONGEST = 4.0  # of a step in a
 OUTSIDE = 4.0  # standard deviations of the residual strain, or of a push, that the twin does not explain
-OWN = 1.5e-4  # m, the twin's own error at a point
-FEWER = 0.7  # of the error bar, to hold 90 % of the factory's points: hands press in fewer places than a normal prior has
+FREEDOM = 1.0  # as widely as the factory's hands differ in strength: with it gentle and hard pushes are covered alike
+BAND = 0.96  # so that 1.645 std holds 90 % of the points of held-out factory fingers: python -m tools.shape_band
 
 
 class Physics(Estimator):
@@ -80,7 +87,7 @@ class _Walk:
         if strain is None or not there.any():
             found = self._march(displacement, np.zeros(RANK))
             moved = self.owner.weights @ self.shape.u
-            return moved, np.full(len(moved), OWN), not found
+            return moved, own_error(moved), not found
         felt, covariance, wrong, step = strain[there], np.eye(RANK), np.zeros(1), np.zeros(RANK)
         noise, response, found = np.hypot(STRAIN, GAIN * felt), np.zeros((self.shape.u.size, RANK)), True
         for _ in range(ROUNDS):
@@ -99,7 +106,8 @@ class _Walk:
                 break
         moved = self.owner.weights @ (self.shape.u + (response @ step).reshape(-1, 3))
         G = np.einsum("pn,nck->pck", self.owner.weights, response.reshape(-1, 3, RANK))
-        variance = np.einsum("pck,kl,pcl->p", G, covariance, G, optimize=True) * FEWER**2 + OWN**2
+        strength = (FREEDOM + self.a @ self.a + ((wrong / noise) ** 2).sum()) / (FREEDOM + len(felt)) if found else 1.0
+        variance = np.einsum("pck,kl,pcl->p", G, covariance, G, optimize=True) * strength * BAND**2 + own_error(moved) ** 2
         far = not found or np.abs(self.a).max() > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
         return moved, np.sqrt(variance), bool(far)
 

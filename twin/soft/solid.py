@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numba import typeof
 
 from twin.soft.cables import Pulled
 from twin.soft.newton import Parts, State, Way, settle
@@ -55,7 +56,7 @@ class Solid:
     """A body's parts, and room to work in. One instance serves one thread."""
 
     def __init__(self, parts: Parts) -> None:
-        self.parts, self._room = parts, room_for(parts, False)
+        self.parts, self._room, self._compiled = parts, room_for(parts, False), False
 
     @property
     def pulled(self) -> Pulled:
@@ -76,11 +77,20 @@ class Solid:
             np.array([shape.inverse is not None]),
         )  # fmt: skip
         way = Way(
-            pull.tension[None].copy(), pull.free[None].copy(), pull.held, pull.stretch[None].copy(), burden.force, burden.wall, one,
-            pull.mu, pull.presliding, np.zeros(1), nothing, nothing, close, False,
+            pull.tension[None].copy(), pull.free[None].copy(), _plain(pull.held), pull.stretch[None].copy(), _plain(burden.force),
+            _plain(burden.wall), one, float(pull.mu), float(pull.presliding), np.zeros(1), nothing, nothing, close, False,
         )  # fmt: skip
-        if not settle(self.parts, way, 0, state, self._room):
+        problem = self.parts, way, 0, state, self._room
+        if not self._compiled:  # else numba takes what it compiled before for other arrays, and the last bits depend on that
+            settle.compile(tuple(map(typeof, problem)))
+            self._compiled = True
+        if not settle(*problem):
             return False
         shape.u, shape.tension, shape.slip, shape.beyond = state.u.reshape(-1, 3), state.tension, state.slip, state.beyond
         shape.inverse = state.inverse if state.has[0] else None
         return True
+
+
+def _plain(array: np.ndarray) -> np.ndarray:
+    """The array by rows and writable: one kind of array, one compiled function."""
+    return np.require(array, requirements=["C", "W"])

@@ -1,0 +1,76 @@
+"""Estimators that are trained on the factory's shapes: their weights, how wide their band is, and what they know.
+
+    std^2 = (widen spread)^2 + own^2,      `widen` (2, P): of each point, where something may press and where nothing does
+
+so that 1.645 widen spread holds 90 % of its places on held-out factory fingers; own is the error of the twin that made these. A
+strain pattern is outside what they know where its distance from the factory's patterns, a Mahalanobis distance, is beyond all but
+one in a thousand of those.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from twin.shape.estimator import Estimator, Felt, Shapes, own_error
+from twin.shape.weights import read_weights
+from twin.twin import Twin
+
+if TYPE_CHECKING:
+    from twin.shape.lesson import Data, Lesson
+
+
+class Learned(Estimator):
+    """Base of all estimators with weights. Remembers nothing."""
+
+    unknown: str = ""  # what it does not know besides what every trained estimator does not
+
+    def __init__(self, twin: Twin, arrays: dict[str, Any] | None = None) -> None:
+        """`arrays`: weights other than those beside the robot. Raises DataError for a robot or weights that do not go together."""
+        super().__init__(twin)
+        self.arrays = read_weights(twin.robot.folder / self.file(), self.form()) if arrays is None else arrays
+
+    @classmethod
+    def file(cls) -> str:
+        """Name of the weights' file beside robot.toml."""
+        return f"{cls.__module__.rpartition('.')[2]}.npz"
+
+    @classmethod
+    def form(cls) -> str:
+        return f"twin-{cls.__module__.rpartition('.')[2]}/2"
+
+    @classmethod
+    @abstractmethod
+    def lesson(cls, data: Data) -> Lesson:
+        """How its network is trained."""
+
+    @abstractmethod
+    def decode(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
+        """Displacements (n, P, 3) m of the points and how widely (n, P) m they are spread, before it is widened."""
+
+    def estimate(self, felt: Felt) -> Shapes:
+        moved, spread = self.decode(felt)
+        std = np.hypot(spread * self.arrays["widen"][0 if felt.pushed else 1], own_error(moved))
+        return Shapes(moved, std, self._outside(felt))
+
+    def _outside(self, felt: Felt) -> np.ndarray:
+        """(n,) over the strains that are there."""
+        centre = self.arrays["known_mean"]
+        x = np.where(np.isfinite(felt.strain), felt.strain, centre) - centre
+        return np.einsum("ni,ij,nj->n", x, self.arrays["known_inverse"], x) > float(self.arrays["known_far"])
+
+
+class Pointwise(Learned):
+    """One that says nothing about its error itself: (share (n, 1) |moved|)^2 + rest^2 of `error`, as held-out fingers have it."""
+
+    @abstractmethod
+    def moved(self, felt: Felt) -> np.ndarray:
+        """Displacements (n, P, 3) m of the points."""
+
+    def decode(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
+        moved = self.moved(felt)
+        moved[:, self.points.rest[:, 2] <= self.body.cone.clamp] = 0.0
+        share, rest = self.arrays["error"]
+        return moved, np.hypot(share * np.linalg.norm(moved, axis=2), rest)

@@ -1,0 +1,131 @@
+"""What training needs to know of an estimator, and the factory's samples as it is given them (torch inside).
+
+Every chain of samples is a finger of its own, with its own E; one chain in ten is held out. What is felt is disturbed by the errors
+that sensors and their alignment leave, anew whenever a sample is shown.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from twin.errors import DataError
+from twin.factory import Points, named_points, shard
+from twin.factory.draw import LENGTH as CHAIN
+from twin.robots import Robot
+from twin.shape.features import features
+from twin.shape.skin import Skin
+from twin.shape.weights import Layers
+from twin.soft import SoftBody
+
+if TYPE_CHECKING:
+    import torch
+
+HELD_OUT = 10  # one chain in so many
+STRAIN_NOISE, GAIN_NOISE, OFFSET_NOISE = 1.5e-4, 0.01, 2e-4  # what sensors and their alignment leave
+LENGTH_NOISE = 2e-5  # m
+DEAD = 0.15  # of the samples have one sensor missing
+DOUBT = 0.3  # of the free motions are shown as if something might press
+
+
+@dataclass(frozen=True)
+class Data:
+    """Converged samples: strain (n, s), displacement (n, t) m, free nodes' displacements (n, 3 n_free) m, whether a hand is on the
+    finger (n,), which are held out (n,); and of the finger its points, their weights (P, n_free) and its skin."""
+
+    strain: np.ndarray
+    displacement: np.ndarray
+    nodes: np.ndarray
+    kind: np.ndarray
+    held: np.ndarray
+    points: Points
+    weights: np.ndarray
+    skin: Skin
+
+    @property
+    def pushed(self) -> np.ndarray:
+        return self.kind != "free"
+
+
+def load(folder: Path, robot: Robot) -> Data:
+    """From the shards in `folder`. Raises DataError where they cannot be read, are too few, or the robot is no finger."""
+    body = robot.build()
+    if not isinstance(body, SoftBody):
+        raise DataError(f"robot {robot.name!r} is no soft body; shape is learned of fingers")
+    points = named_points(robot)
+    weights = body.lattice.weights(points.rest)
+    d = shard.read(folder, ["sample", "converged", "nodes", "strain", "command", "kind"])
+    if d["nodes"].shape[1] != 3 * weights.shape[1]:
+        raise DataError(f"{folder}: shapes of another body than robot {robot.name!r}; make them with twin generate")
+    good = d["converged"].astype(bool)
+    held = (d["sample"] // CHAIN)[good] % HELD_OUT == HELD_OUT - 1
+    if not held.any():
+        raise DataError(f"{folder}: fewer than {HELD_OUT} fingers of {CHAIN} samples; none can be held out, ask for more samples")
+    nodes, kind = d["nodes"][good].astype(np.float32), d["kind"][good].astype(str)
+    return Data(d["strain"][good], d["command"][good], nodes, kind, held, points, weights, Skin.of(body))
+
+
+def disturbed(rng: np.random.Generator, data: Data, pick: np.ndarray, dead: float = DEAD) -> tuple[np.ndarray, np.ndarray]:
+    """Strains (b, s) and displacements (b, t) m of samples as they would be felt, some sensors missing."""
+    strain, s = data.strain[pick], data.strain.shape[1]
+    strain = strain * (1.0 + GAIN_NOISE * rng.normal(size=strain.shape)) + OFFSET_NOISE * rng.normal(size=strain.shape)
+    strain = strain + STRAIN_NOISE * rng.normal(size=strain.shape)
+    lost = rng.uniform(size=len(pick)) < dead
+    strain[lost, rng.integers(0, s, int(lost.sum()))] = np.nan
+    return strain, data.displacement[pick] + LENGTH_NOISE * rng.normal(size=data.displacement[pick].shape)
+
+
+def shown(rng: np.random.Generator, data: Data, pick: np.ndarray) -> np.ndarray:
+    """Features (b, f) of samples to learn from, in single precision."""
+    pressed = data.pushed[pick] | (rng.uniform(size=len(pick)) < DOUBT)
+    return features(*disturbed(rng, data, pick), pressed).astype(np.float32)
+
+
+class Lesson(ABC):
+    """How one estimator's network is trained on `data`."""
+
+    batch: int
+    rate: float  # of the first steps; it falls to nothing by a cosine
+
+    def __init__(self, data: Data) -> None:
+        self.data = data
+        self.inputs = 2 * data.strain.shape[1] + data.displacement.shape[1] + 1
+
+    @abstractmethod
+    def network(self) -> torch.nn.Module:
+        """With its first weights, from torch's generator."""
+
+    @abstractmethod
+    def loss(self, net: torch.nn.Module, x: torch.Tensor, pick: np.ndarray, rng: np.random.Generator) -> torch.Tensor:
+        """Of features x (b, f) of samples `pick` (b,)."""
+
+    @abstractmethod
+    def missed(self, net: torch.nn.Module, x: torch.Tensor, pick: np.ndarray) -> np.ndarray:
+        """(b,) m: the error by which training is stopped, of each sample."""
+
+    @abstractmethod
+    def arrays(self, net: torch.nn.Module) -> dict[str, Any]:
+        """The network as its estimator reads it."""
+
+
+def torch_perceptron(sizes: Sequence[int], bend: type[torch.nn.Module]) -> torch.nn.Sequential:
+    """Linear layers of these sizes with `bend` between them."""
+    import torch
+
+    parts: list[torch.nn.Module] = []
+    for a, b in pairwise(sizes):
+        parts += [torch.nn.Linear(a, b), bend()]
+    return torch.nn.Sequential(*parts[:-1])
+
+
+def layers_of(net: torch.nn.Module) -> Layers:
+    import torch
+
+    linear = (m for m in net.modules() if isinstance(m, torch.nn.Linear))
+    return [(m.weight.detach().numpy(), m.bias.detach().numpy()) for m in linear]
