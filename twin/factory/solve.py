@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from twin.effects import Route
 from twin.factory.draw import LENGTH, STEPS, Chain, Pushes
 from twin.soft import Cone, SoftBody, SoftStatics, lattice
 from twin.soft.solid import Burden, Pull, Shape, Solid
@@ -14,6 +15,7 @@ from twin.soft.solid import Burden, Pull, Shape, Solid
 SMALLEST = 1 / 64  # of a step between two samples
 RINGS, AROUND, FACE = 36, 32, 8  # points of the skin that carry a push: rings on the mantle, rings on the tip's face
 NO_WALL = np.zeros(5)
+PLAIN = Route()
 
 
 @dataclass(frozen=True)
@@ -102,15 +104,18 @@ def hang(solid: Solid, shape: Shape, weight: np.ndarray) -> np.ndarray:
 State = tuple[np.ndarray, np.ndarray]  # tendon displacements (t,) m, forces on the free nodes (n_free, 3) N
 
 
-def march(solid: Solid, shape: Shape, hanging: np.ndarray, start: State, goal: State) -> tuple[Shape, bool]:
+def march(
+    solid: Solid, shape: Shape, hanging: np.ndarray, start: State, goal: State, route: Route = PLAIN
+) -> tuple[Shape, bool]:  # fmt: skip
     """From one state to another in ever smaller parts where Newton's method is lost; the last shape found, and whether it is the
     goal's."""
     nt, done, part = len(hanging), 0.0, 1.0
-    held, zero = np.ones(nt, bool), np.zeros(nt)
+    held, zero, stretch = np.ones(nt, bool), np.zeros(nt), np.full(nt, route.stretch)
     while done < 1.0:
         trial, to = shape.copy(), min(1.0, done + part)
         at, force = (a + to * (b - a) for a, b in zip(start, goal, strict=True))
-        if solid.settle(trial, Pull(zero, held, hanging - at, zero, 0.0, 1.0), Burden(force, NO_WALL), close=1e-7):
+        pull = Pull(zero, held, hanging - at, stretch, route.mu, route.presliding)
+        if solid.settle(trial, pull, Burden(force, NO_WALL), close=1e-7):
             shape, done, part = trial, to, 2.0 * part
             continue
         part, shape.inverse = 0.5 * part, None
