@@ -52,18 +52,17 @@ def distance(plant: HeldFinger, wanted: HeldFinger) -> float:
 
 
 def test_the_response_is_that_of_small_pulls(bent: HeldFinger) -> None:
-    """Central differences over 0.2 mm of shortening; the kept tangent is some steps old, which 2 % allow for."""
-    finger, there = HeldFinger(TWIN), bent.shortening
+    """Central differences over 40 mN of each tendon; the kept tangent is some steps old, which 2 % allow for."""
+    finger, there, h = HeldFinger(TWIN), bent.shortening, 0.02
     finger.hold(there)
-    response, h = finger.response(), 1e-4
+    response = finger.response()
     for t in range(4):
         ends = []
         for sign in (1.0, -1.0):
-            finger.hold(there + sign * h * np.eye(4)[t])
+            finger.hold(there - sign * h * response.length[:, t])
             ends.append((finger.points(), finger.strain(), finger.tension))
-        slopes = [(up - down) / (2.0 * h) for up, down in zip(*ends, strict=True)]
-        pull = np.linalg.solve(-response.length, np.eye(4)[t])
-        for found, true in zip((response.points @ pull, response.strain @ pull, pull), slopes, strict=True):
+        moved, felt, pull = ((up - down) / (2.0 * h) for up, down in zip(*ends, strict=True))
+        for found, true in ((response.points[..., t], moved), (response.strain[:, t], felt), (np.eye(4)[t], pull)):
             assert np.abs(found - true).max() < 0.02 * np.abs(true).max()
 
 
@@ -73,7 +72,7 @@ def test_a_reachable_shape_is_reached(bent: HeldFinger) -> None:
     assert distance(plant, bent) < 5e-6
     assert done[-1].reason is None
     assert done[-1].residual == pytest.approx(done[-1].error, abs=1e-6)
-    assert done[0].error > 5e-3
+    assert done[0].error > 2.5e-3
     assert done[0].residual < 0.5 * done[0].error
 
 
@@ -136,9 +135,10 @@ def test_a_twist_is_not_reachable_and_said() -> None:
 
 
 def test_baselines_reach_what_they_look_at(bent: HeldFinger) -> None:
-    """Strains and the tip's centre to their own tolerance; constant directions leave a shape that differs in contraction."""
+    """Strains and the tip to what preferring the least pull leaves, as above (1e-5 of strain was seen); constant directions leave a
+    shape that differs in contraction."""
     plant, _ = follow(StrainTracking(TWIN), bent.strain())
-    assert np.abs(plant.strain() - bent.strain()).max() < 1e-5
+    assert np.abs(plant.strain() - bent.strain()).max() < 3e-5
     face = bent.rest[:, 2] > bent.rest[:, 2].max() - 1e-6
     plant, _ = follow(TipTracking(TWIN), base(bent.points()))
     assert np.linalg.norm((plant.points() - bent.points())[face].mean(axis=0)) < 1e-5
