@@ -14,8 +14,8 @@ from twin.errors import SolveError
 from twin.robots import load
 from twin.soft import SoftBody, SoftDynamics, SoftPath, SoftStatics
 from twin.soft import dynamics as moving
-from twin.soft.dynamics import Started, compiled, step_for
-from twin.soft.flex import flex, place
+from twin.soft.dynamics import Moving, Started, step_for
+from twin.soft.flex import flex
 from twin.soft.room import parts_of
 from twin.soft.silicone import forces
 
@@ -54,20 +54,21 @@ def stood(problem: Problem, body: SoftBody | None = None) -> SoftPath:
 def test_the_flex_is_the_lattice() -> None:
     """Nodes, mass, and, for small displacements, MuJoCo's own elastic force."""
     body = finger()
-    parts, placed = parts_of(body), []
-    model, data = compiled(flex(body, parts, 1e-3), lambda m: placed.append(place(m, body, parts)))
+    started = Started.of(body, Problem(np.zeros(1), np.zeros((1, 4)), Loads(np.zeros(3)), drives=HELD))
+    made = Moving.of(flex(body, started.parts, 1e-3), [started], [""], ["it"])
+    model, data, dof = made.model, made.data, made.limbs[0].dof
     weight = body.density * body.lattice.quadrature[1].sum()
     clamped = body.density * body.lattice.quadrature[1].sum() - body.density * body.lattice.volume.sum()
     np.testing.assert_allclose(model.body_mass.sum(), weight - clamped, rtol=1e-9)
-    u = 1e-7 * np.random.default_rng(0).normal(size=placed[0].dof.size)
-    data.qpos[placed[0].dof] = u
-    softer = SoftBody(**{**vars(body), "bulk": 0.3 * body.bulk})  # flex.BULK: what MuJoCo's own element has of it
+    u = 1e-7 * np.random.default_rng(0).normal(size=dof.size)
+    data.qpos[dof] = u
+    softer = SoftBody(**{**vars(body), "bulk": 0.3 * body.bulk, "poisson": 0.47})  # flex.BULK: what MuJoCo's own element has of it
     mujoco.mj_forward(model, data)
     f, p = np.empty(u.size), np.zeros((body.cells, 4))
     whole = np.vstack([np.zeros((9, 3)), u.reshape(-1, 3)])
     forces(whole, parts_of(softer).cells, np.empty((0, 0, 6)), f, p)
     # of strains of 1e-5: second order, and the turn of the cell's frame
-    np.testing.assert_allclose(-data.qfrc_spring[placed[0].dof], f, atol=1e-4 * np.abs(f).max())
+    np.testing.assert_allclose(-data.qfrc_spring[dof], f, atol=1e-4 * np.abs(f).max())
     # its skin lies on the cone, but for the depth at which the mesh is put, at facets' corners
     x = data.flexvert_xpos[np.hypot(*data.flexvert_xpos[:, :2].T) > 1e-3]
     np.testing.assert_allclose(np.hypot(x[:, 0], x[:, 1]), body.cone.radius(x[:, 2]) - 5e-4, atol=1e-6)

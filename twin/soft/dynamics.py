@@ -5,7 +5,7 @@ and takes a sample where a motion takes the time between two."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -103,6 +103,18 @@ class Moving:
         )  # fmt: skip
         self._warned = self._warnings()
 
+    @staticmethod
+    def of(spec: mujoco.MjSpec, started: Sequence[Started], prefixes: Sequence[str], names: Sequence[str]) -> Moving:
+        """Of a spec that holds what `flex` makes of each body under its prefix."""
+        model = spec.compile()
+        placed = [
+            place(model, s.body, s.parts, prefix, s.problem.loads.payload) for s, prefix in zip(started, prefixes, strict=True)
+        ]
+        data = mujoco.MjData(model)
+        mujoco.mj_setConst(model, data)
+        mujoco.mj_resetData(model, data)
+        return Moving(model, data, started, placed, names)
+
     @property
     def step(self) -> float:
         return float(self.model.opt.timestep)
@@ -152,16 +164,6 @@ def step_for(body: SoftBody) -> float:
     return min(LONGEST, max(SHORTEST, PER_DAMPING * body.damping))
 
 
-def compiled(spec: mujoco.MjSpec, put: Callable[[mujoco.MjModel], None]) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A model of `flex` bodies, each `put` in its place."""
-    model = spec.compile()
-    put(model)
-    data = mujoco.MjData(model)
-    mujoco.mj_setConst(model, data)
-    mujoco.mj_resetData(model, data)
-    return model, data
-
-
 class SoftDynamics:
     """A silicone body ready to be moved."""
 
@@ -180,53 +182,60 @@ class SoftDynamics:
         Where the motion is lost `ended` says how; samples from there on are NaN.
         """
         started = Started.of(self.body, problem)
-        loads, body, placed = problem.loads, started.body, []
-        spec = flex(body, started.parts, step_for(body))
-        spec.option.gravity = loads.gravity @ turned(body.turn)
-        model, data = compiled(spec, lambda m: placed.append(place(m, body, started.parts, payload=loads.payload)))
-        return followed(started, Moving(model, data, [started], placed, ["the finger"]), problem)
+        spec = flex(started.body, started.parts, step_for(self.body))
+        spec.option.gravity = problem.loads.gravity @ turned(self.body.turn)
+        moving = Moving.of(spec, [started], [""], ["the finger"])
+        return followed(moving, problem.time, np.array(problem.command, float)[:, None])[0]
 
 
-def followed(started: Started, moving: Moving, problem: Problem) -> SoftPath:
-    """One body's motion, seen at the problem's samples."""
-    n, nt = problem.command.shape
-    u, tension, length = np.full((n, moving.limbs[0].dof.size), np.nan), np.full((n, nt), np.nan), np.full((n, nt), np.nan)
-    command, time, h, ended, now, i = np.array(problem.command, float)[:, None], problem.time, moving.step, "", 0, 0
-    relaxed = Relaxed(started, problem)
-    try:
-        for i in range(n):
-            steps = int((time[i] - time[0]) / h + 1e-6) - now
+def followed(moving: Moving, time: np.ndarray, command: np.ndarray) -> list[SoftPath]:
+    """The motion of each body under commands (n, body, t), seen at times (n,) s."""
+    n, b, nt = command.shape
+    u = [np.full((n, limb.dof.size), np.nan) for limb in moving.limbs]
+    tension, length = np.full((2, b, n, nt), np.nan)
+    relaxed = [Relaxed(s) for s in moving.started]
+    h, now, taken, ended = moving.step, 0, n, ""
+    for i in range(n):
+        steps = int((time[i] - time[0]) / h + 1e-6) - now
+        try:
             if steps:
-                share = (now * h - (time[i - 1] - time[0])) / (time[i] - time[i - 1])
-                far = ((now + steps) * h - (time[i - 1] - time[0])) / (time[i] - time[i - 1])
+                before, after = ((k * h - (time[i - 1] - time[0])) / (time[i] - time[i - 1]) for k in (now, now + steps))
                 way = command[i] - command[i - 1]
-                moving.run(command[i - 1] + share * way, command[i - 1] + far * way, steps)
-                now += steps
-            u[i] = moving.u(0, time[i] - time[0] - now * h).ravel()
-            tension[i], length[i] = moving.limbs[0].tension, moving.lengths(0)
-            relaxed.on(moving, u[i], time[i] - time[max(0, i - 1)])
-        i = n
-    except SolveError as lost:
-        ended = str(lost)
-    statics = started.statics
-    shapes = u.reshape(n, -1, 3)
+                moving.run(command[i - 1] + before * way, command[i - 1] + after * way, steps)
+        except SolveError as lost:
+            taken, ended = i, str(lost)
+            break
+        now += steps
+        for k, limb in enumerate(moving.limbs):
+            u[k][i] = moving.u(k, time[i] - time[0] - now * h).ravel()
+            tension[k, i], length[k, i] = limb.tension, moving.lengths(k)
+            relaxed[k].on(limb, u[k][i], time[i] - time[max(0, i - 1)])
+    status = np.where(np.arange(n) < taken, DIRECT, NOT_FOUND)
+    return [_path(s, u[k], tension[k], length[k], status, ended) for k, s in enumerate(moving.started)]
+
+
+def _path(
+    started: Started, u: np.ndarray, tension: np.ndarray, length: np.ndarray, status: np.ndarray, ended: str
+) -> SoftPath:  # fmt: skip
+    statics, shapes = started.statics, u.reshape(len(u), -1, 3)
     return SoftPath(
         tension=tension, path=length - started.trial.hanging + statics.straight_path, markers=statics.markers(shapes), ended=ended,
-        status=np.where(np.arange(n) < i, DIRECT, NOT_FOUND), q=u, others=statics.sensed(shapes),
+        status=status, q=u, others=statics.sensed(shapes),
     )  # fmt: skip
 
 
 class Relaxed:
     """Creep between samples, as in statics: the relaxed stress that the limb's room holds."""
 
-    def __init__(self, started: Started, problem: Problem) -> None:
+    def __init__(self, started: Started) -> None:
+        creep = started.problem.creep
         self.parts, self.taken = started.parts, started.trial.state.taken
-        self.amplitude, self.lag = np.array(problem.creep.amplitude, float), np.array(problem.creep.time, float)
+        self.amplitude, self.lag = np.array(creep.amplitude, float), np.array(creep.time, float)
         self.whole = np.zeros((started.parts.clamped + started.body.lattice.n_free, 3))
 
-    def on(self, moving: Moving, u: np.ndarray, dt: float) -> None:
+    def on(self, limb: Limb, u: np.ndarray, dt: float) -> None:
         """Advance by dt (s) at nodal displacements u (nq,)."""
         if self.amplitude.size:
             self.whole[self.parts.clamped :] = u.reshape(-1, 3)
             relax_for(self.whole, self.parts.cells, self.amplitude, self.lag, dt, self.taken)
-            moving.limbs[0].room.relaxed[:] = self.taken.sum(axis=0)
+            limb.room.relaxed[:] = self.taken.sum(axis=0)

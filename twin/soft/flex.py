@@ -28,7 +28,8 @@ AROUND, LAYERS = 16, 2  # of the mesh that touches: points around, layers a cell
 WEDGE = ((0, 1, 2, 5), (0, 1, 4, 5), (0, 3, 4, 5))  # corners of three tetrahedra; lowest corner first, so that neighbours fit
 SKIN = 5e-4  # m: the mesh lies that far inside the skin, and touches at that distance
 RUBBER = (0.93, 0.9, 0.82, 1.0)
-NAME = "silicone"
+NAME, BASE = "silicone", "base"
+FINGER, THING = 1, 2  # who touches whom: fingers touch things, not each other
 TOUCHED = 1e-9  # weight of a node by which a tendon does not move
 OPEN = 1e3  # m: a dead band without end
 MARGIN, BULK = 1.5, 0.3  # of the metric's bulk modulus over the least that is stable; the least share of the force's that is taken
@@ -78,14 +79,15 @@ def flex(body: SoftBody, parts: Parts, step: float) -> mujoco.MjSpec:
     points, tetrahedra = mesh(body)
     side = float(body.cone.radius(body.cone.clamp))
     box = np.array([[x, y, z] for x in (-side, side) for y in (-side, side) for z in (body.cone.clamp, body.cone.length)])
-    spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{step:.9g}" integrator="discrete" solver="Newton"/><worldbody>
+    spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{step:.9g}" integrator="discrete" solver="Newton"/>
+<worldbody><body name="{BASE}">
 <flexcomp name="{NAME}" type="direct" dim="3" dof="quadratic" cellcount="1 1 {body.cells}" radius="{SKIN}" mass="1"
  point="{_words(np.vstack([points, box]))}" element="{_words(tetrahedra)}" rgba="{_words(np.array(RUBBER))}">
-<contact selfcollide="none"/><elasticity young="1e5" poisson="0.3" damping="1"/><pin gridrange="0 0 0 2 2 0"/></flexcomp>
-</worldbody></mujoco>""")
+<contact selfcollide="none" contype="{FINGER}" conaffinity="{THING}"/><elasticity young="1e5" poisson="0.3" damping="1"/><pin gridrange="0 0 0 2 2 0"/></flexcomp>
+</body></worldbody></mujoco>""")
     even = np.linspace(body.cone.clamp, body.cone.length, body.cells + 1)
     joints: list[tuple[int, list[str]]] = []
-    for node in spec.bodies[1:]:
+    for node in spec.body(BASE).bodies:
         x, y, z = node.pos
         unknown = _nearest(body, np.array([[x, y, np.interp(z, even, body.lattice.edges)]]))[0]
         for axis, joint in zip("xyz", node.joints, strict=True):
@@ -107,13 +109,15 @@ def place(model: mujoco.MjModel, body: SoftBody, parts: Parts, prefix: str = "",
     """
     grid, f = body.lattice, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, prefix + NAME)
     nodes = slice(model.flex_nodeadr[f], model.flex_nodeadr[f] + model.flex_nodenum[f])
-    at = model.flex_node0[nodes].copy()
+    held = model.flex_nodebodyid[nodes]
+    pinned = model.body_jntnum[held] == 0
+    at = np.where(pinned[:, None], model.flex_node[nodes], model.body_pos[held])  # in the body's own frame
+    moved = model.flex_node0[nodes][0] - at[0]
     at[:, 2] = np.interp(at[:, 2], np.linspace(body.cone.clamp, body.cone.length, body.cells + 1), grid.edges)
-    model.flex_node0[nodes] = at
-    free, held = np.flatnonzero(at[:, 2] > body.cone.clamp), model.flex_nodebodyid[nodes]
-    unknown, bodies = _nearest(body, at[free]), held[free]
+    model.flex_node0[nodes] = at + moved
+    unknown, bodies = _nearest(body, at[~pinned]), held[~pinned]
     tip = grid.weights(np.array([[0.0, 0.0, body.cone.length]]))[0]
-    model.body_pos[bodies] = at[free]
+    model.body_pos[bodies] = at[~pinned]
     model.body_mass[bodies] = (body.density * grid.volume + payload * tip)[unknown]
     dof = np.zeros((grid.n_free, 3), np.int64)
     dof[unknown] = model.jnt_dofadr[model.body_jntadr[bodies]][:, None] + np.arange(3)
