@@ -83,7 +83,8 @@ def flex(body: SoftBody, parts: Parts, step: float) -> mujoco.MjSpec:
 <worldbody><body name="{BASE}">
 <flexcomp name="{NAME}" type="direct" dim="3" dof="quadratic" cellcount="1 1 {body.cells}" radius="{SKIN}" mass="1"
  point="{_words(np.vstack([points, box]))}" element="{_words(tetrahedra)}" rgba="{_words(np.array(RUBBER))}">
-<contact selfcollide="none" contype="{FINGER}" conaffinity="{THING}"/><elasticity young="1e5" poisson="0.3" damping="1"/><pin gridrange="0 0 0 2 2 0"/></flexcomp>
+<contact selfcollide="none" contype="{FINGER}" conaffinity="{THING}"/><elasticity young="1e5" poisson="0.3" damping="1"/>
+<pin gridrange="0 0 0 2 2 0"/></flexcomp>
 </body></worldbody></mujoco>""")
     even = np.linspace(body.cone.clamp, body.cone.length, body.cells + 1)
     joints: list[tuple[int, list[str]]] = []

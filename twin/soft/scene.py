@@ -1,8 +1,7 @@
 """A hand among rigid things that it may touch, hold and move: one MuJoCo model, driven by its servos.
 
-A servo drives a pair of antagonist tendons: it pulls the first in by as much as it pays the second out. Fingers touch things, things
-touch each other and the table; fingers do not touch each other.
-"""
+A servo drives a pair of antagonist tendons: it pulls the first in by as much as it pays the second out. Fingers touch things,
+things touch each other and the table; fingers do not touch each other."""
 
 from __future__ import annotations
 
@@ -15,9 +14,10 @@ import numpy as np
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route
 from twin.errors import DataError, SolveError
-from twin.soft.flex import THING
+from twin.soft.flex import FINGER, THING
 from twin.soft.hand import HandBody, moving, stand
 
+SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
 SHAPES = {
     "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
     "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, 2),
@@ -53,15 +53,15 @@ class Thing:
         size = [*self.size, 0.0, 0.0][:3]
         body.add_geom(
             name=self.name, type=SHAPES[self.shape][0], size=size, mass=self.mass, friction=[self.friction, 5e-3, 1e-4],
-            contype=THING, conaffinity=THING | 1, rgba=[0.2, 0.45, 0.7, 1.0],
+            contype=THING, conaffinity=THING | FINGER, priority=1, solref=[SETTLES, 1.0], rgba=[0.2, 0.45, 0.7, 1.0],
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Sight:
-    """An instant: time (s); servos (finger, pair) m; tensions (finger, tendon) N; nodes' displacements (finger, n_free, 3) m in each
-    finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that is free its place (thing, 3) m,
-    turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the hand touch something."""
+    """An instant: time (s); servos (finger, pair) m; tensions (finger, tendon) N; nodes' displacements (finger, n_free, 3) m in
+    each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that is free its place (thing,
+    3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the hand touch something."""
 
     time: float
     servos: np.ndarray
@@ -79,8 +79,11 @@ class Scene:
     """A hand and things, at rest with all servos at zero when it is made or reset."""
 
     def __init__(self, body: HandBody, things: Sequence[Thing], gravity: np.ndarray, route: Route | None = None) -> None:
-        """`gravity` (3,) m/s^2 in the palm's frame; `route` gives the tendons' friction. Raises DataError for things of one name and
-        for fingers whose tendons are no pairs, SolveError where the hand has no equilibrium."""
+        """`gravity` (3,) m/s^2 in the palm's frame; `route` gives the tendons' friction.
+
+        Raises DataError for things of one name and for fingers whose tendons are no pairs, SolveError where the hand has no
+        equilibrium.
+        """
         tendons = len(body.fingers[0].paths)
         if tendons % 2 or len({t.name for t in things}) < len(things):
             raise DataError("a scene needs fingers with pairs of tendons, and things of different names")
@@ -92,6 +95,7 @@ class Scene:
             thing.add(spec)
         self.moving = moving(started, spec)
         self.model, self.data = self.moving.model, self.moving.data
+        self.model.opt.solver = mujoco.mjtSolver.mjSOL_CG  # Newton factorises 816 unknowns at every step: half as fast
         joints = [self.model.joint(t.name) for t in things if not t.fixed]
         self._at = np.array([j.qposadr[0] + np.arange(7) for j in joints], int).reshape(-1, 7)
         self._speed = np.array([j.dofadr[0] + np.arange(6) for j in joints], int).reshape(-1, 6)
@@ -111,7 +115,8 @@ class Scene:
     def step(self, servos: np.ndarray, seconds: float) -> Sight:
         """On for some time (at least a step) while the servos (finger, pair) m go straight to where they are told.
 
-        Raises DataError for a command that is not finite, SolveError naming the finger, or the thing, and the time where it is lost.
+        Raises DataError for a command that is not finite, SolveError naming the finger, or the thing, and the time where it is
+        lost.
         """
         servos = np.asarray(servos, float).reshape(self._servos.shape)
         if not np.isfinite(servos).all():
