@@ -12,12 +12,14 @@ from twin.body import Problem
 from twin.effects import Drive, Loads, Route, named
 from twin.errors import SolveError
 from twin.robots import load
+from twin.rollout import Drawing, drawn, rollout
 from twin.soft import SoftBody, SoftDynamics, SoftPath, SoftStatics
 from twin.soft import dynamics as moving
 from twin.soft.dynamics import Moving, Started, step_for
 from twin.soft.flex import flex
 from twin.soft.room import parts_of
-from twin.soft.silicone import forces
+from twin.soft.silicone import Tangent, forces, stiffness
+from twin.twin import Twin
 
 HANGING = np.array([0.0, 0.0, 9.81])
 OUT = -6e-3  # m: paid out, slack
@@ -131,8 +133,6 @@ def test_a_free_swing_has_the_frequency_and_damping_of_its_tangent() -> None:
     command = np.zeros((len(time), 4))
     command[0, 0] = 0.1
     x = moved(Problem(time, command, Loads(np.zeros(3)), drives=(Drive.TENSION,) * 4), body).markers[:, -1, 0]
-    from twin.soft.silicone import Tangent, stiffness
-
     n = 3 * body.lattice.n_free
     tangent = Tangent(np.empty((n, n)), np.zeros((body.cells, 4, 81)), np.zeros((body.cells, 4)))
     stiffness(np.zeros((n // 3 + 9, 3)), parts.cells, np.empty((0, 0, 6)), tangent)
@@ -180,3 +180,12 @@ def test_what_is_not_stepped_says_so(law: str) -> None:
     loads = effect.surround(Loads(HANGING))
     with pytest.raises(SolveError, match=r"static equilibria|remove that effect"):
         Started.of(finger(), Problem(np.zeros(1), np.zeros((1, 4)), loads, effect.route(), drives=HELD))
+
+
+def test_rollouts_are_the_same_bit_for_bit_from_one_worker_and_from_two() -> None:
+    twin = Twin.of("finger")
+    controls = drawn(twin, 2, 3, Drawing(seconds=0.6, rate=50.0, drive=Drive.DISPLACEMENT))
+    one, two = (rollout(twin, controls, jobs=jobs) for jobs in (1, 2))
+    assert not one.ended
+    assert "MuJoCo steps" in one.recording.source
+    assert one.recording.data_hash() == two.recording.data_hash()

@@ -32,7 +32,7 @@ NAME, BASE = "silicone", "base"
 FINGER, THING = 1, 2  # who touches whom: fingers touch things, not each other
 TOUCHED = 1e-9  # weight of a node by which a tendon does not move
 OPEN = 1e3  # m: a dead band without end
-MARGIN, BULK = 1.5, 0.3  # of the metric's bulk modulus over the least that is stable; the least share of the force's that is taken
+MARGIN, BULK = 2.5, 0.3  # of the metric's bulk modulus over the least that is stable; the least share of the force's that is taken
 
 
 class Wraps(NamedTuple):
