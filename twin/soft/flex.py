@@ -7,8 +7,9 @@ lattice has them, carry the silicone's mass, and each cell's stiffness K is the 
     M + h D + h^2 K = M + b K,        D = (b - h) K,        b: Rayleigh's coefficient of the silicone
 
 since an implicit step h damps by itself as a coefficient of h would, and that is taken off (where b < h it stays). What is left of
-the error of a step is of second order. A stiffness K' of the force is stable while K' < 2 K b / h, and MuJoCo's iterative solve of
-the metric is the slower the less compressible K is: its bulk modulus is therefore less than the force's by as much as that allows.
+the error of a step is of second order. A stiffness K' of the force is stable while K' < 2 K b / h; and MuJoCo's iterative solve of
+the metric is the slower the less compressible K is: its bulk modulus, and with it the damping of changes of volume, is half of the
+force's, more only where the step needs it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ NAME, BASE = "silicone", "base"
 FINGER, THING = 1, 2  # who touches whom: fingers touch things, not each other
 TOUCHED = 1e-9  # weight of a node by which a tendon does not move
 OPEN = 1e3  # m: a dead band without end
-MARGIN, BULK = 2.5, 0.3  # of the metric's bulk modulus over the least that is stable; the least share of the force's that is taken
+MARGIN, BULK = 2.5, 0.5  # of the metric's bulk modulus over the least that is stable; and its least share of the force's
 
 
 class Wraps(NamedTuple):
