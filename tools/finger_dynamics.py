@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -21,7 +22,7 @@ from twin.body import Path as Answer
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route
 from twin.robots import load
-from twin.soft import HandBody, SoftBody, SoftDynamics, SoftStatics, dynamics
+from twin.soft import HandBody, HandDynamics, HandStatics, SoftBody, SoftDynamics, SoftStatics, dynamics
 from twin.soft.scene import Scene, Thing
 
 FULL = 0.0741  # strain at 2 N
@@ -88,6 +89,11 @@ def finger(repeats: int) -> None:
 def hand(repeats: int, picture: Path | None) -> None:
     body = load("hand").build()
     assert isinstance(body, HandBody)
+    one = problem(eased, seconds=0.4, hold=0.6)
+    asked = replace(one, command=np.tile(one.command, (1, 3)), drives=one.drives * 3)
+    ends = [solver.solve(asked).markers[-1] for solver in (HandDynamics(body), HandStatics(body))]
+    apart = 1e3 * np.linalg.norm(ends[0] - ends[1], axis=1).max()
+    print(f"hand, every finger eased to 9 mm: at rest within {apart:.3f} mm of statics")
     scene = Scene(body, [BALL, TABLE], HANGING)
     free, held = [], []
     for _ in range(repeats):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route
@@ -78,7 +79,7 @@ class Sight:
 class Scene:
     """A hand and things, at rest with all servos at zero when it is made or reset."""
 
-    def __init__(self, body: HandBody, things: Sequence[Thing], gravity: np.ndarray, route: Route | None = None) -> None:
+    def __init__(self, body: HandBody, things: Sequence[Thing], gravity: ArrayLike, route: Route | None = None) -> None:
         """`gravity` (3,) m/s^2 in the palm's frame; `route` gives the tendons' friction.
 
         Raises DataError for things of one name and for fingers whose tendons are no pairs, SolveError where the hand has no
@@ -89,7 +90,9 @@ class Scene:
             raise DataError("a scene needs fingers with pairs of tendons, and things of different names")
         self.pairs, self.things = tendons // 2, tuple(things)
         n = tendons * len(body.fingers)
-        rest = Problem(np.zeros(1), np.zeros((1, n)), Loads(gravity), route or Route(), (Drive.DISPLACEMENT,) * n)
+        rest = Problem(
+            np.zeros(1), np.zeros((1, n)), Loads(np.asarray(gravity, float)), route or Route(), (Drive.DISPLACEMENT,) * n
+        )
         started, spec = stand(body, rest)
         for thing in things:
             thing.add(spec)
@@ -112,20 +115,18 @@ class Scene:
         mujoco.mj_forward(self.model, self.data)
         return self.see()
 
-    def step(self, servos: np.ndarray, seconds: float) -> Sight:
+    def step(self, servos: ArrayLike, seconds: float) -> Sight:
         """On for some time (at least a step) while the servos (finger, pair) m go straight to where they are told.
 
         Raises DataError for a command that is not finite, SolveError naming the finger, or the thing, and the time where it is
         lost.
         """
-        servos = np.asarray(servos, float).reshape(self._servos.shape)
-        if not np.isfinite(servos).all():
-            raise DataError(
-                f"servo {int(np.flatnonzero(~np.isfinite(servos))[0]) + 1} is told {servos.tolist()}; a number is needed"
-            )
+        told = np.asarray(servos, float).reshape(self._servos.shape)
+        if not np.isfinite(told).all():
+            raise DataError(f"servo {int(np.flatnonzero(~np.isfinite(told))[0]) + 1} is told {told.tolist()}; a number is needed")
         steps = max(1, round(seconds / self.moving.step))
-        self.moving.run(self._tendons(self._servos), self._tendons(servos), steps)
-        self._servos = servos.copy()
+        self.moving.run(self._tendons(self._servos), self._tendons(told), steps)
+        self._servos = told.copy()
         lost = ~np.isfinite(self.data.qpos[self._at]).all(axis=1)
         if lost.any():
             name = [t.name for t in self.things if not t.fixed][int(np.argmax(lost))]
