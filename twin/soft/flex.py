@@ -46,7 +46,8 @@ class Wraps(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Where a body is in a compiled model: coordinates (nq,) of its unknowns in `qpos`, and its tendons."""
+    """Where a body is in a compiled model: coordinates (nq,) of its unknowns, in `qpos` and `qvel` alike (free joints come after it),
+    and its tendons."""
 
     dof: np.ndarray
     wraps: Wraps

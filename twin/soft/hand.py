@@ -111,7 +111,7 @@ class HandStatics:
 
 
 def stand(body: HandBody, problem: Problem) -> tuple[list[Started], mujoco.MjSpec]:
-    """The fingers at rest under the first command, and a model of all of them, to which more may be added."""
+    """The fingers at rest under the first command, and a model of all of them, to which more may be added after."""
     started = [Started.of(finger, body.share(k, problem)) for k, finger in enumerate(body.fingers)]
     step = min(step_for(finger) for finger in body.fingers)
     spec = mujoco.MjSpec()
