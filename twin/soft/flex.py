@@ -46,7 +46,7 @@ class Wraps(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Where a body is in a compiled model: coordinates (nq,) of its unknowns, in `qpos` and `qvel` alike (free joints come after it),
+    """Where a body is in a compiled model: coordinates (nq,) of its unknowns, in `qpos` and `qvel` alike (free joints come later),
     and its tendons."""
 
     dof: np.ndarray
