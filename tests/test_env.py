@@ -128,8 +128,9 @@ def test_actions_that_are_refused_and_clipped(recwarn: pytest.WarningsRecorder) 
 def test_bad_options_are_told_with_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"interval.*randomise.*did you mean 'payload'"):
         gymnasium.make("twin/ContinuumReach-v0", paylod=(0.0, 0.1))
-    with pytest.raises(DataError, match="no dynamics"):
-        gymnasium.make("twin/ContinuumReach-v0", twin="two_link")
+    for name in ("two_link", "finger"):
+        with pytest.raises(DataError, match="no dynamics"):
+            gymnasium.make("twin/ContinuumReach-v0", twin=name)
     newer = tmp_path / "twin.toml"
     newer.write_text(DIAGNOSED.replace("twin/1", "twin/2"))
     with pytest.raises(DataError, match="'twin/2'; this program reads 'twin/1'"):

@@ -87,7 +87,12 @@ def test_nothing_is_returned_where_no_rollout_got_anywhere() -> None:
 
 @pytest.mark.parametrize(
     ("robot", "drive", "steps"),
-    [("continuum", Drive.TENSION, True), ("continuum", Drive.DISPLACEMENT, False), ("finger", Drive.TENSION, False)],
+    [
+        ("continuum", Drive.TENSION, True),
+        ("continuum", Drive.DISPLACEMENT, False),
+        ("finger", Drive.DISPLACEMENT, True),
+        ("two_link", Drive.TENSION, False),
+    ],
 )
 def test_who_is_stepped_and_who_is_not(robot: str, drive: Drive, steps: bool) -> None:
     twin = Twin.of(robot)

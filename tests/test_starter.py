@@ -74,7 +74,7 @@ def test_a_name_that_cannot_be_one_is_refused(name: str, tmp_path: Path) -> None
 
 
 def test_an_unknown_family_lists_those_there_are(tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="available: continuum, soft, transmission"):
+    with pytest.raises(UnknownNameError, match="available: continuum, hand, soft, transmission"):
         write_starter("snake", "continum", tmp_path)
 
 

@@ -10,6 +10,7 @@ from twin.body import Body, Port
 from twin.effects import Drive, Drives, Loads, Signals, driven_by
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
+from twin.measurements.channels import meaning
 from twin.robots import Robot
 
 CONTACT = "external_contact"  # a trial's condition: a hand deforms the robot
@@ -92,6 +93,7 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
     """The bench of a recording. Raises DataError where the inputs do not determine the robot, or no output is predictable."""
     recording, notices = _undisturbed(recording)
     body = robot.build()
+    _check_fingers(recording, robot, body)
     driven = _drives(recording, robot, body)
     names = [channel.name for channel, _ in driven]
     notices += [
@@ -123,6 +125,17 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
         measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return Bench(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
+
+
+def _check_fingers(recording: Recording, robot: Robot, body: Body) -> None:
+    """Raises DataError for a channel of a finger that a hand has not."""
+    fingers = {meaning(name).finger for name in body.senses} - {None}
+    stray = [c.name for c in recording.channels if fingers and c.finger not in (*fingers, None)]
+    if stray:
+        raise DataError(
+            f"{_where(recording)}: robot {robot.name!r} has {len(fingers)} fingers, and {', '.join(stray[:3])}"
+            f"{', ...' if len(stray) > 3 else ''} are of another; remove them, or name the right finger"
+        )
 
 
 def _undisturbed(recording: Recording) -> tuple[Recording, list[str]]:

@@ -68,12 +68,13 @@ class Frame:
 class Body:
     """A robot as an editable MuJoCo model.
 
-    `drives`: for each of its drives the ports it may be driven through. `senses`: what it can show, by channel. `loads`: inputs
-    that load it, by channel, and which of `Loads` each is. `parts`: what an effect may need to act on: "weight", "elasticity" (one
-    stiffness for all of it), "backbone" (hinges that may rest bent), "markers", "load cells", "strain sensors", "antagonists"; and
-    what it offers to change: "planes" of bending and stiffness along its "length" (`bend_unequally`, `grade`), "holes" (`reroute`),
-    a "surface" that may touch, "viscosity" that may creep. `antagonists` as in `Signals`; `frame` is that of
-    the markers; `tendons` are the sites each tendon passes, base to tip, and `markers` those that are seen.
+    `drives`: for each of its drives the ports it may be driven through, `stepped` those that its dynamics take. `senses`: what it
+    can show, by channel. `loads`: inputs that load it, by channel, and which of `Loads` each is. `parts`: what an effect may need
+    to act on: "weight", "elasticity" (one stiffness for all of it), "backbone" (hinges that may rest bent), "markers", "load
+    cells", "strain sensors", "antagonists"; and what it offers to change: "planes" of bending and stiffness along its "length"
+    (`bend_unequally`, `grade`), "holes" (`reroute`), a "surface" that may touch, "viscosity" that may creep. `antagonists` as in
+    `Signals`; `frame` is that of the markers; `tendons` are the sites each tendon passes, base to tip, and `markers` those that are
+    seen.
     """
 
     spec: mujoco.MjSpec
@@ -81,6 +82,7 @@ class Body:
     parts: frozenset[str]
     drives: tuple[tuple[Port, ...], ...]
     senses: Mapping[str, Sense]
+    stepped: frozenset[Drive] = frozenset({Drive.TENSION})
     loads: Mapping[str, str] = field(default_factory=dict)
     antagonists: bool = False
     frame: Frame = field(default_factory=Frame)

@@ -17,10 +17,10 @@ import numpy as np
 from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.compiled import assign, dot, jit
 from twin.effects import Loads
+from twin.engine import mj_step
 from twin.equilibrium import ChainPath, Equilibrium
 from twin.equilibrium.chain import State, laid, lay, lever, pass_on, shorter
 from twin.equilibrium.elastic import COUPLING, bendings, springs
-from twin.equilibrium.engine import mj_step
 from twin.equilibrium.newton import place
 from twin.equilibrium.trial import Slow, rested
 from twin.equilibrium.trial import creep as advance_creep

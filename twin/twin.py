@@ -14,7 +14,9 @@ from twin.errors import SolveError
 from twin.laws import Laws
 from twin.measurements import Recording
 from twin.quantities import Values
-from twin.robots import Robot, load
+from twin.robots import Robot, family, load
+
+READINGS = 30.0  # of a drive (`Drive.reading`): a smaller range of commands moves a robot too little to excite it
 
 
 @dataclass(frozen=True)
@@ -80,10 +82,11 @@ class Trace:
 def is_dynamic(bench: Bench) -> bool:
     """Whether a recording is too fast for static equilibria.
 
-    It is where its samples resolve the motion and some tension crosses its range (10 to 90 %, noise smoothed away) within one
-    period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static motion.
+    It is where its samples resolve the motion and some tension or displacement crosses its range (10 to 90 %, noise smoothed away)
+    within one period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static
+    motion.
     """
-    if _is_held(bench):
+    if not can_step(bench):
         return False
     period = 1.0 / bench.robot.build().first_mode()
     for trial in bench.inputs:
@@ -94,14 +97,14 @@ def is_dynamic(bench: Bench) -> bool:
         smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(width) / width, "valid"), 0, trial.command)  # noqa: B023
         span = np.ptp(smooth, axis=0)
         slope = np.abs(np.gradient(smooth, np.median(dt), axis=0)).max(axis=0)
-        if np.any((span > 0.3) & (slope > 0.8 * span / period)):
+        if np.any((span > READINGS * bench.reading) & (slope > 0.8 * span / period)):
             return True
     return False
 
 
-def _is_held(bench: Bench) -> bool:
-    """Whether motors or springs hold some tendon's length, which static solves alone do."""
-    return any(d is not Drive.TENSION for d in bench.drives)
+def can_step(bench: Bench) -> bool:
+    """Whether the robot has dynamics that take what drives it here; the rest is solved by statics alone."""
+    return family(bench.robot.family).dynamics is not None and set(bench.drives) <= bench.robot.build().stepped
 
 
 @dataclass(frozen=True)
@@ -124,7 +127,7 @@ def simulate(
     SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
     """
     way, laws, body = way or Way(), twin.laws, twin.body()
-    solver, creep = twin.robot.solver(body, dynamic=dynamic and not _is_held(bench)), laws.creep
+    solver, creep = twin.robot.solver(body, dynamic=dynamic and set(bench.drives) <= body.stepped), laws.creep
     wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.n_slow))

@@ -15,6 +15,7 @@ from twin.body import Problem
 from twin.dynamics import Dynamics, Moving
 from twin.effects import Drive, Loads, Signals
 from twin.errors import DataError, SolveError
+from twin.hinges import HingeChain
 from twin.robots.family import family
 from twin.twin import Twin
 
@@ -35,9 +36,9 @@ class Plant:
     def __init__(self, twin: Twin, interval: float, payload: float = 0.0) -> None:
         """At rest, slack, under its own gravity and `payload` (kg). Raises DataError for a robot without dynamics, SolveError where
         the load has no equilibrium."""
-        if family(twin.robot.family).dynamics is None:
-            raise DataError(f"robot {twin.robot.name!r} has no dynamics: give a twin of a backbone pulled by tendons")
         self.twin, self.interval, self.body = twin, interval, twin.body()
+        if family(twin.robot.family).dynamics is None or not isinstance(self.body, HingeChain):
+            raise DataError(f"robot {twin.robot.name!r} has no dynamics here: give a twin of a backbone pulled by tendons")
         laws = self._laws = twin.laws
         n = twin.robot.n_tendon
         dynamics = cast(Dynamics, twin.robot.solver(self.body, dynamic=True))

@@ -16,8 +16,8 @@ import numpy as np
 
 from twin.compiled import assign, dot, inner, jit, part
 from twin.effects.tendon_friction import slip_state
+from twin.engine import mj_com_pos, mj_kinematics
 from twin.equilibrium.chain import balance, become, copied, settle
-from twin.equilibrium.engine import mj_com_pos, mj_kinematics
 from twin.equilibrium.linear import factorise, substitute
 
 CONTRACTION = 0.25  # a chord step that shrinks the residual less than this asks for a fresh tangent

@@ -8,10 +8,11 @@ import mujoco
 import numpy as np
 
 from twin.body import Sense, marker_senses, tendon_ports
+from twin.effects import Drive
 from twin.quantities import each
 from twin.robots.soft_schema import SCHEMA, Soft
 from twin.sensors import Cords
-from twin.soft import Cone, SoftBody, SoftStatics, lattice, straight
+from twin.soft import Cone, SoftBody, SoftDynamics, SoftStatics, lattice, straight
 
 __all__ = ["SCHEMA", "build", "dynamics", "statics"]
 
@@ -36,6 +37,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
             {"weight", "elasticity", "markers", "load cells", "strain sensors", "planes", "length", "holes", "surface", "viscosity"}
         ),
         drives=tuple(ports[:2] for ports in tendon_ports(nt)),
+        stepped=frozenset({Drive.TENSION, Drive.DISPLACEMENT}),
         senses={
             **{f"tendon_{i}_{kind}": Sense(kind, i - 1) for i in range(1, nt + 1) for kind in ("tension", "displacement")},
             **{f"sensor_{i}_resistance": Sense("sensor", i - 1) for i in range(1, ns + 1)},
@@ -54,6 +56,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
         youngs_modulus=values["silicone.youngs_modulus"],
         poisson=values["silicone.poisson_ratio"],
         density=values["silicone.density"],
+        damping=values["silicone.damping"],
         shear=np.ones(cells.shape),
         bulk=np.ones(shape.cells),
     )
@@ -96,4 +99,5 @@ def statics(body: SoftBody) -> SoftStatics:
     return SoftStatics(body)
 
 
-dynamics = None  # what is logged of it is quasi-static
+def dynamics(body: SoftBody) -> SoftDynamics:
+    return SoftDynamics(body)

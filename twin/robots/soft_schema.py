@@ -68,6 +68,7 @@ ROWS = (
     Row("silicone.youngs_modulus", "Pa", "kPa", "Young's modulus E at small strain (neo-Hookean)", 1e3, 1e8),
     Row("silicone.poisson_ratio", "1", "1", "Poisson's ratio nu; silicone hardly changes its volume", 0.4, 0.498),
     Row("silicone.density", "kg/m^3", "kg/m^3", "density", 500.0, 3000.0),
+    Row("silicone.damping", "s", "ms", "Rayleigh's coefficient: damping over stiffness, in dynamics", 0.0, 1.0, default=0.01),
     Row(
         "tendons.azimuth",
         "rad",

@@ -10,11 +10,9 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from twin.bench import prepare
-from twin.effects import Drive
 from twin.errors import DataError, SolveError
 from twin.measurements import Recording, Trial
-from twin.robots.family import family
-from twin.twin import Twin
+from twin.twin import Twin, can_step
 
 LEAST = 2  # samples that are worth a trial
 
@@ -36,9 +34,8 @@ class Rollouts:
 
 
 def is_dynamic(twin: Twin, controls: Recording) -> bool:
-    """Whether MuJoCo can step the controls: the family has dynamics, and tensions drive every tendon."""
-    tensions = all(d is Drive.TENSION for d in prepare(controls, twin.robot).drives)
-    return tensions and family(twin.robot.family).dynamics is not None
+    """Whether MuJoCo can step the controls: the family has dynamics, and they take what drives the tendons."""
+    return can_step(prepare(controls, twin.robot))
 
 
 def rollout(
@@ -57,7 +54,7 @@ def rollout(
     if dynamic and not able:
         raise DataError(
             f"robot {twin.robot.name!r} has no dynamics under these controls: MuJoCo steps need a family with dynamics and "
-            "tensions that drive; leave --dynamic out for static equilibria"
+            "controls that they take; leave --dynamic out for static equilibria"
         )
     steps = able if dynamic is None else dynamic
     single = [replace(controls, trials=(t,)) for t in controls.trials]

@@ -20,7 +20,7 @@ class SoftBody(Body):
     `paths` (t, p, 3) and `cord_paths` (s, p, 3) m: points that tendons and cords run straight between, at rest; `seen` (m, 3) m:
     markers at rest. All in the finger's own frame, which is turned about z by `turn` (rad) against the base frame. A tendon's last
     point pulls at the silicone from `anchor` (m) to the tip. `shear` (c, q) and `bulk` (c,) are the moduli over those of the
-    described silicone, of E `youngs_modulus` (Pa), nu `poisson` and `density` (kg/m^3).
+    described silicone, of E `youngs_modulus` (Pa), nu `poisson`, `density` (kg/m^3) and Rayleigh's coefficient `damping` (s).
     """
 
     cone: Cone
@@ -34,12 +34,23 @@ class SoftBody(Body):
     youngs_modulus: float
     poisson: float
     density: float
+    damping: float
     shear: np.ndarray
     bulk: np.ndarray
 
     @property
     def lattice(self) -> Lattice:
         return lattice(self.cone, self.cells)
+
+    def first_mode(self) -> float:
+        """Rayleigh's quotient of a tapered cantilever, shaped as a uniform one bends under its own weight."""
+        z, w = np.polynomial.legendre.leggauss(8)
+        s, w = 0.5 * (z + 1.0), 0.5 * w  # from clamp to tip
+        free = self.cone.length - self.cone.clamp
+        r = self.cone.radius(self.cone.clamp + s * free)
+        bent, curved = s**2 * (6.0 - 4.0 * s + s**2), 12.0 * (1.0 - s) ** 2 / free**2
+        stiff = self.youngs_modulus * w @ (0.25 * r**4 * curved**2)
+        return float(np.sqrt(stiff / (self.density * w @ (r**2 * bent**2)))) / (2.0 * np.pi)
 
     def bend_unequally(self, along: float, across: float) -> None:
         """Bending stiffnesses EI (1 + e) and EI (1 - e) about the principal axes, e cos 2 alpha = `along` and e sin 2 alpha =

@@ -62,19 +62,19 @@ class SoftStatics:
         if problem.route.stiffening > 0.0 or problem.heating is not None:
             raise SolveError("tendons that stiffen and SMA springs are not solved for a silicone body; remove that effect or drive")
         with single_thread():
-            trial, near = _Trial(self, problem), problem.near
+            trial, near = Trial(self, problem), problem.near
             asked = trial.asked()
             if isinstance(near, SoftPath) and near.of == asked != b"":
                 u = near.q.reshape(len(near.q), -1, 3)  # what differs is only how it is seen and sensed
-                return replace(near, markers=self._markers(u), others=self.sensed(u))
+                return replace(near, markers=self.markers(u), others=self.sensed(u))
             cold = asked != b"" and near is None and not problem.keep
             if cold and (found := _SOLVED.get((asked, problem.tolerance))) is not None:
                 u = found.q.reshape(len(found.q), -1, 3)
-                return replace(found, markers=self._markers(u), others=self.sensed(u))
+                return replace(found, markers=self.markers(u), others=self.sensed(u))
             trial.run()
         u = trial.found.u.reshape(len(trial.found.u), -1, 3)
         path = SoftPath(
-            tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self._markers(u),
+            tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self.markers(u),
             status=trial.status, q=trial.found.u, others=self.sensed(u), LU=trial.found.inverse,
             of=asked if trial.status.all() else b"",
         )  # fmt: skip
@@ -84,7 +84,7 @@ class SoftStatics:
                 _SOLVED.pop(next(iter(_SOLVED)), None)
         return path
 
-    def _markers(self, u: np.ndarray) -> np.ndarray:
+    def markers(self, u: np.ndarray) -> np.ndarray:
         """(n, m + 1, 3) m in the base frame: the markers, and the tip."""
         tip = self.tip @ u + [0.0, 0.0, self.body.cone.length]
         own = np.concatenate([self.body.seen + self._seen @ u, tip[:, None]], axis=1)
@@ -124,7 +124,7 @@ def turned(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-class _Trial:
+class Trial:
     """One way through a problem's commands. Loads and tensions count over the stiffness, `scale` (n,) of that described."""
 
     def __init__(self, statics: SoftStatics, problem: Problem) -> None:

@@ -1,0 +1,191 @@
+"""The soft finger in motion: it comes to rest where statics stands, half a step changes nothing, friction loses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from twin.body import Problem
+from twin.effects import Drive, Loads, Route, named
+from twin.errors import SolveError
+from twin.robots import load
+from twin.rollout import Drawing, drawn, rollout
+from twin.soft import SoftBody, SoftDynamics, SoftPath, SoftStatics
+from twin.soft import dynamics as moving
+from twin.soft.dynamics import Moving, Started, step_for
+from twin.soft.flex import flex
+from twin.soft.room import parts_of
+from twin.soft.silicone import Tangent, forces, stiffness
+from twin.twin import Twin
+
+HANGING = np.array([0.0, 0.0, 9.81])
+OUT = -6e-3  # m: paid out, slack
+HELD = (Drive.DISPLACEMENT,) * 4
+
+
+def finger(**values: float) -> SoftBody:
+    found = load("finger").build({name.replace("__", "."): v for name, v in values.items()})
+    assert isinstance(found, SoftBody)
+    return found
+
+
+def eased(amount: float, ramp: float, hold: float, rate: float = 50.0) -> tuple[np.ndarray, np.ndarray]:
+    """Times, and commands that bring tendon 1 to `amount` on a smooth way, the others slack."""
+    time = np.arange(round((ramp + hold) * rate) + 1) / rate
+    s = np.minimum(1.0, time / ramp)
+    command = np.full((len(time), 4), OUT)
+    command[:, 0] = amount * s**2 * (3.0 - 2.0 * s)
+    return time, command
+
+
+def moved(problem: Problem, body: SoftBody | None = None) -> SoftPath:
+    path = SoftDynamics(body or finger()).solve(problem)
+    assert path.status.all(), path.ended
+    return path
+
+
+def stood(problem: Problem, body: SoftBody | None = None) -> SoftPath:
+    path = SoftStatics(body or finger()).solve(problem)
+    assert path.status.all()
+    return path
+
+
+def test_the_flex_is_the_lattice() -> None:
+    """Nodes, mass, and, for small displacements, MuJoCo's own elastic force."""
+    body = finger()
+    started = Started.of(body, Problem(np.zeros(1), np.zeros((1, 4)), Loads(np.zeros(3)), drives=HELD))
+    made = Moving.of(flex(body, started.parts, 1e-3), [started], [""], ["it"])
+    model, data, dof = made.model, made.data, made.limbs[0].dof
+    weight = body.density * body.lattice.quadrature[1].sum()
+    clamped = body.density * body.lattice.quadrature[1].sum() - body.density * body.lattice.volume.sum()
+    np.testing.assert_allclose(model.body_mass.sum(), weight - clamped, rtol=1e-9)
+    u = 1e-7 * np.random.default_rng(0).normal(size=dof.size)
+    data.qpos[dof] = u
+    softer = SoftBody(**{**vars(body), "bulk": 0.5 * body.bulk, "poisson": 0.47})  # flex.BULK: what MuJoCo's own element has of it
+    mujoco.mj_forward(model, data)
+    f, p = np.empty(u.size), np.zeros((body.cells, 4))
+    whole = np.vstack([np.zeros((9, 3)), u.reshape(-1, 3)])
+    forces(whole, parts_of(softer).cells, np.empty((0, 0, 6)), f, p)
+    # of strains of 1e-5: second order, and the turn of the cell's frame
+    np.testing.assert_allclose(-data.qfrc_spring[dof], f, atol=1e-4 * np.abs(f).max())
+    # its skin lies on the cone, but for the depth at which the mesh is put, at facets' corners
+    x = data.flexvert_xpos[np.hypot(*data.flexvert_xpos[:, :2].T) > 1e-3]
+    np.testing.assert_allclose(np.hypot(x[:, 0], x[:, 1]), body.cone.radius(x[:, 2]) - 5e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("drive", "gravity"), [("held", HANGING), ("tension", np.array([9.81, 0.0, 0.0]))], ids=["shortened", "pulled, sideways"]
+)
+def test_it_comes_to_rest_where_statics_stands(drive: str, gravity: np.ndarray) -> None:
+    time, command = eased(9e-3, 0.3, 0.5)
+    drives = HELD
+    if drive == "tension":
+        command, drives = np.maximum(command, 0.0) * (1.5 / 9e-3), (Drive.TENSION,) * 4
+    problem = Problem(time, command, Loads(gravity), drives=drives)
+    path, still = moved(problem), stood(replace(problem, time=time[-2:], command=command[-2:]))
+    # m, of 27 mm: a held tendon's 10 um, Poisson's ratio 0.47 for 0.49, and what is left of the swing; the bar is 5e-4
+    np.testing.assert_allclose(path.markers[-1], still.markers[-1], rtol=0, atol=2e-4)
+    np.testing.assert_allclose(path.others["strain"][-1], still.others["strain"][-1], rtol=0, atol=2e-3 * 0.0741)
+    np.testing.assert_allclose(path.tension[-1], still.tension[-1], rtol=0, atol=0.02)
+
+
+def test_half_a_step_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One way and back within a second, antagonists exchanged, with friction; the bar is 0.3 mm."""
+    time = np.arange(41) / 50.0
+    command = np.full((len(time), 4), OUT)
+    command[:, 0] = 6e-3 * np.sin(2.0 * np.pi * time)
+    command[:, 2] = -command[:, 0]
+    problem = Problem(time, command, Loads(HANGING), Route(mu=0.3), drives=HELD)
+    step = step_for(finger())
+    whole = moved(problem)
+    monkeypatch.setattr(moving, "step_for", lambda body: 0.5 * step)
+    half = moved(problem)
+    assert np.ptp(whole.markers[:, -1, 0]) > 0.02
+    # m: second order but for where tendons become taut
+    np.testing.assert_allclose(whole.markers, half.markers, rtol=0, atol=1.5e-4)
+
+
+def test_friction_loses() -> None:
+    """Pull and release of the same lengths: the base tension of a rubbing tendon is higher on the way in, lower on the way out."""
+    time = np.arange(61) / 50.0
+    command = np.full((len(time), 4), OUT)
+    command[:, 0] = 4e-3 * (1.0 - np.cos(2.0 * np.pi * time / 1.2))
+    plain, rubbing = (moved(Problem(time, command, Loads(HANGING), Route(mu=mu), drives=HELD)) for mu in (0.0, 0.4))
+    still = stood(Problem(time, command, Loads(HANGING), Route(mu=0.4), drives=HELD))
+    work = [float((0.5 * (p.tension[1:] + p.tension[:-1]) * np.diff(command, axis=0)).sum()) for p in (plain, rubbing, still)]
+    lag = rubbing.tension[15, 0] - rubbing.tension[45, 0]
+    assert rubbing.tension[15, 0] > 1.03 * plain.tension[15, 0] > 1.06 * rubbing.tension[45, 0]
+    # N: the loop is friction's, as statics has it; the silicone's own damping adds the plain one's
+    swing = plain.tension[15, 0] - plain.tension[45, 0]
+    assert lag - swing == pytest.approx(still.tension[15, 0] - still.tension[45, 0], abs=0.02)
+    assert 0.0 < work[0] < 0.5 * work[1]  # J: dissipated
+    assert work[1] - work[0] == pytest.approx(work[2], rel=0.1)
+
+
+def test_a_free_swing_has_the_frequency_and_damping_of_its_tangent() -> None:
+    """Let go from a bend of 3 mm: against the lowest eigenvalue of the rest tangent and the nodes' masses, that is closed form."""
+    body = finger(silicone__damping=4e-3)
+    parts = parts_of(replace(body, poisson=0.47))
+    time = np.arange(151) / 250.0
+    command = np.zeros((len(time), 4))
+    command[0, 0] = 0.1
+    x = moved(Problem(time, command, Loads(np.zeros(3)), drives=(Drive.TENSION,) * 4), body).markers[:, -1, 0]
+    n = 3 * body.lattice.n_free
+    tangent = Tangent(np.empty((n, n)), np.zeros((body.cells, 4, 81)), np.zeros((body.cells, 4)))
+    stiffness(np.zeros((n // 3 + 9, 3)), parts.cells, np.empty((0, 0, 6)), tangent)
+    mass = np.repeat(body.density * body.lattice.volume, 3)
+    omega = np.sqrt(np.linalg.eigvalsh(tangent.K / np.sqrt(np.outer(mass, mass)))[0])
+    up = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    crossing = time[up] - x[up] * (time[1] - time[0]) / (x[up + 1] - x[up])
+    period = np.diff(crossing).mean()
+    assert 2.0 * np.pi / period == pytest.approx(omega, rel=0.02)  # a tenth of a per cent of damping, higher modes, the step
+    assert body.first_mode() == pytest.approx(omega / (2.0 * np.pi), rel=0.1)  # Rayleigh's beam has no shear
+    peaks = np.array([np.abs(x[(time >= a) & (time < a + 0.5 * period)]).max() for a in crossing[:-1]])
+    decay = np.log(peaks[:-1] / peaks[1:]).mean() / (2.0 * np.pi)
+    assert decay == pytest.approx(0.5 * 4e-3 * omega, rel=0.1)
+
+
+def test_gravity_pulls_where_it_points() -> None:
+    """Weightless and slack it stays; let go sideways it falls that way, and a payload with it."""
+    time = np.linspace(0.0, 0.6, 7)
+    slack = np.full((7, 4), OUT)
+    for gravity in (np.array([0.0, 9.81, 0.0]), np.array([-9.81, 0.0, 0.0])):
+        problem = Problem(time, slack, Loads(gravity, payload=2e-3), drives=HELD)
+        path = moved(problem)
+        np.testing.assert_allclose(path.markers, stood(problem).markers, rtol=0, atol=5e-5)  # m: it starts at rest
+        sag = path.markers[-1, -1, :2] @ gravity[:2] / 9.81
+        assert sag > 2e-3
+    still = moved(Problem(time, slack, Loads(np.zeros(3)), drives=HELD))
+    np.testing.assert_allclose(still.markers, still.markers[:1].repeat(7, axis=0), rtol=0, atol=1e-9)
+
+
+def test_a_cell_inside_out_is_named_with_its_time() -> None:
+    time = np.array([0.0, 0.1, 0.2, 0.3])
+    path = SoftDynamics(finger()).solve(
+        Problem(time, np.outer([0.0, 0.0, 1.0, 1.0], [60.0, 0.0, 60.0, 0.0]), Loads(HANGING), drives=(Drive.TENSION,) * 4)
+    )
+    assert path.status.tolist() == [1, 1, 0, 0]
+    assert np.isnan(path.markers[2:]).all()
+    assert "the finger is lost at t = 0.1" in path.ended
+    assert "inside out" in path.ended or "no finite speed" in path.ended
+
+
+@pytest.mark.parametrize("law", ["contact", "tendon_elasticity"])
+def test_what_is_not_stepped_says_so(law: str) -> None:
+    values = {"contact": {"stiffness": 50.0}, "tendon_elasticity": {"stretch": 1e-5, "stiffening": 0.2}}[law]
+    effect = named(law)(values, n_tendon=4)
+    loads = effect.surround(Loads(HANGING))
+    with pytest.raises(SolveError, match=r"static equilibria|remove that effect"):
+        Started.of(finger(), Problem(np.zeros(1), np.zeros((1, 4)), loads, effect.route(), drives=HELD))
+
+
+def test_rollouts_are_the_same_bit_for_bit_from_one_worker_and_from_two() -> None:
+    twin = Twin.of("finger")
+    controls = drawn(twin, 2, 3, Drawing(seconds=0.6, rate=50.0, drive=Drive.DISPLACEMENT))
+    one, two = (rollout(twin, controls, jobs=jobs) for jobs in (1, 2))
+    assert not one.ended
+    assert "MuJoCo steps" in one.recording.source
+    assert one.recording.data_hash() == two.recording.data_hash()

@@ -1,0 +1,233 @@
+"""The hand: three fingers turned, in what they are solved, calibrated and stepped by; and the things it touches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from twin.bench import prepare
+from twin.body import Problem
+from twin.calibrate import Fit
+from twin.diagnose import Settings, calibration
+from twin.effects import Drive, Loads, Route
+from twin.errors import DataError, SolveError
+from twin.measurements import Channel, Recording, Trial, read
+from twin.robots import load
+from twin.robots.robot import models_folder
+from twin.soft import HandBody, HandDynamics, HandStatics, SoftStatics
+from twin.soft.scene import Scene, Sight, Thing
+from twin.soft.statics import turned
+from twin.twin import Twin
+
+HANGING = np.array([0.0, 0.0, 9.81])
+OUT = -6e-3  # m: paid out, slack
+HELD = (Drive.DISPLACEMENT,) * 12
+BALL = Thing("ball", "sphere", (0.025,), 0.03, (0.0, 0.0, 0.092))
+TABLE = Thing("table", "box", (0.1, 0.1, 0.005), 1.0, (0.0, 0.0, 0.122), fixed=True)
+
+
+def hand(**values: float) -> HandBody:
+    found = load("hand").build({name.replace("__", "."): v for name, v in values.items()})
+    assert isinstance(found, HandBody)
+    return found
+
+
+def bends(n: int, seconds: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Times and commands: finger 1 bends by tendon 1, finger 2 by its 2 and 3, finger 3 not at all."""
+    s = np.linspace(0.0, 1.0, n)
+    command = np.full((n, 12), OUT)
+    for tendon, amount in ((0, 6e-3), (5, 5e-3), (6, 3e-3)):
+        command[:, tendon] = amount * s**2 * (3.0 - 2.0 * s)
+    return seconds * s, command
+
+
+@pytest.mark.parametrize("gravity", [HANGING, np.array([5.0, -3.0, 2.0])], ids=["hanging", "oblique"])
+def test_at_rest_it_is_three_fingers_turned(gravity: np.ndarray) -> None:
+    """Each finger's own statics under gravity as its frame has it, turned by its frame and moved to its place: to rounding."""
+    time, command = bends(5)
+    path = HandStatics(hand(mounting__angle_2=0.1)).solve(Problem(time, command, Loads(gravity), drives=HELD))
+    assert path.status.all()
+    for k in range(3):
+        a = 2.0 * np.pi * k / 3
+        frame, place = turned(a + np.pi), 0.05 * np.array([np.cos(a), np.sin(a), 0.0])
+        one = load("finger").build({"mounting.angle": 0.1 if k == 1 else 0.0})
+        own = SoftStatics(one).solve(
+            Problem(time, command[:, 4 * k : 4 * k + 4], Loads(frame.T @ gravity), drives=(Drive.DISPLACEMENT,) * 4)
+        )
+        np.testing.assert_allclose(path.markers[:, 11 * k : 11 * k + 11], own.markers @ frame.T + place, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(path.tension[:, 4 * k : 4 * k + 4], own.tension, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(path.others["sensor"][:, 4 * k : 4 * k + 4], own.others["sensor"], rtol=1e-12)
+
+
+def test_tendon_1_closes_the_hand() -> None:
+    """Each first tendon bends its finger towards the palm's axis."""
+    command = np.full((2, 12), OUT)
+    command[1, ::4] = 5e-3
+    tips = HandStatics(hand()).solve(Problem(np.arange(2.0), command, Loads(HANGING), drives=HELD)).markers[:, 10::11]
+    radius = np.hypot(tips[..., 0], tips[..., 1])
+    np.testing.assert_allclose(radius[0], 0.05, atol=1e-6)
+    assert (radius[1] < 0.04).all()
+    np.testing.assert_allclose(radius[1], radius[1, 0], atol=1e-6)
+
+
+def test_in_motion_it_comes_to_rest_where_statics_stands() -> None:
+    """In one model, under oblique gravity, with friction: each finger where its statics has it; the bar is 0.5 mm."""
+    time, command = bends(21, 0.4)
+    time, command = np.append(time, 0.7), np.vstack([command, command[-1:]])
+    problem = Problem(time, command, Loads(np.array([3.0, -2.0, 9.0])), Route(mu=0.2), drives=HELD)
+    moved, still = HandDynamics(hand()).solve(problem), HandStatics(hand()).solve(problem)
+    assert moved.status.all(), moved.ended
+    np.testing.assert_allclose(moved.markers[-1], still.markers[-1], rtol=0, atol=2e-4)
+    np.testing.assert_allclose(moved.tension[-1], still.tension[-1], rtol=0, atol=0.02)
+
+
+def test_a_finger_that_is_lost_is_named() -> None:
+    command = np.zeros((3, 12))
+    command[1:, [4, 6]] = 60.0  # N
+    path = HandDynamics(hand()).solve(Problem(np.array([0.0, 0.1, 0.2]), command, Loads(HANGING), drives=(Drive.TENSION,) * 12))
+    assert "finger 2 is lost at t = 0.0" in path.ended
+    assert path.status.tolist() == [1, 0, 0]
+
+
+# ---- measurement sets ------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def day() -> Recording:
+    """A few samples of two trials of a finger on the finite element bench, felt by its cords."""
+    recording = read(models_folder() / "finger/samples/drift")
+    channels = tuple(c for c in recording.channels if c.role == "input" or "resistance" in c.name)
+    trials = tuple(
+        replace(t, time=t.time[::7], values={c.name: t.values[c.name][::7] for c in channels})
+        for t in recording.trials
+        if t.name.startswith("pair")
+    )
+    return replace(recording, channels=channels, trials=trials)
+
+
+@cache
+def three_days() -> Recording:
+    """The same finger three times, as a hand would log it."""
+    one, fingers = day(), (1, 2, 3)
+    channels = tuple(replace(c, name=f"finger_{k}_{c.name}") for k in fingers for c in one.channels)
+    trials = (replace(t, values={f"finger_{k}_{n}": v for k in fingers for n, v in t.values.items()}) for t in one.trials)
+    return replace(one, robot="hand", channels=channels, trials=tuple(trials))
+
+
+def fitted(recording: Recording) -> Fit:
+    return calibration(recording, Twin.of(recording.robot), Settings(jobs=1))[0]
+
+
+def test_a_hand_s_set_is_calibrated_finger_by_finger() -> None:
+    """The same finger's days three times over, from other finite elements: each finger's numbers come out as the finger's alone."""
+    one, three = fitted(day()), fitted(three_days())
+    own = {f.label: v * f.parameter.step for f, v in zip(one.model.free, one.model.vector(), strict=True)}
+    spread = {f.label: s * f.parameter.step for f, s in zip(one.model.free, one.std(), strict=True)}
+    for f, v in zip(three.model.free, three.model.vector(), strict=True):
+        row, _, index = f.label.rpartition("_")
+        label = f"{row}_{(int(index) - 1) % 4 + 1}" if row.startswith("sensors.") else row
+        # a tenth of its standard error: noise and derivatives are estimated from other numbers of trials and channels
+        assert v * f.parameter.step == pytest.approx(own[label], abs=0.1 * spread[label] + 1e-9), f.label
+
+
+def test_a_hand_s_set_is_predicted() -> None:
+    """Measured resistances, of cords that are good to 20 %, beside those of the hand as described."""
+    seen = Twin.of("hand").predict(three_days())
+    for measured, predicted in zip(three_days().trials, seen.trials, strict=True):
+        for name, values in predicted.values.items():
+            if "resistance" in name:
+                np.testing.assert_allclose(values, measured.values[name], rtol=0.3)
+    assert [c.name for c in seen.outputs()] == [c.name for c in three_days().outputs()]
+
+
+def test_a_finger_that_is_not_there_is_refused_by_name() -> None:
+    one = three_days()
+    stray = Channel("finger_4_sensor_1_resistance", "output", "ohm", 0.3)
+    trials = tuple(Trial(t.name, t.time, {**t.values, stray.name: np.ones(len(t.time))}, t.conditions) for t in one.trials)
+    with pytest.raises(DataError, match="'hand' has 3 fingers, and finger_4_sensor_1_resistance"):
+        prepare(replace(one, channels=(*one.channels, stray), trials=trials), load("hand"))
+
+
+def test_uneven_fingers_are_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    text = (models_folder() / "hand/robot.toml").read_text("utf-8")
+    (tmp_path / "odd").mkdir()
+    (tmp_path / "odd/robot.toml").write_text(text.replace("sensors = 12", "sensors = 11"), "utf-8")
+    with pytest.raises(DataError, match="sensors = 11 cannot be shared evenly by 3 fingers"):
+        load("odd", relative_to=tmp_path)
+
+
+# ---- contact ---------------------------------------------------------------------------------------------------------------------
+
+
+def depth(scene: Scene, seen: Sight, radius: float) -> float:
+    """How far the skin (the mesh, and its rim of 0.5 mm) is inside a ball, m."""
+    points = scene.data.flexvert_xpos
+    return radius + 5e-4 - float(np.linalg.norm(points - seen.place[0], axis=1).min())
+
+
+def close(scene: Scene, to: float, seconds: float = 0.6) -> list[Sight]:
+    """All fingers by their first servo, on a smooth way."""
+    s = np.linspace(0.0, 1.0, 16)[1:]
+    return [scene.step(np.tile([to * x**2 * (3.0 - 2.0 * x), 0.0], (3, 1)), seconds / 15) for x in s]
+
+
+def test_a_ball_rests_on_a_table() -> None:
+    scene = Scene(hand(), [replace(BALL, place=(0.0, 0.0, 0.0915)), TABLE], HANGING)
+    for _ in range(20):
+        seen = scene.step(np.zeros((3, 2)), 0.02)
+    assert seen.touching == 0
+    np.testing.assert_allclose(seen.place[0], [0.0, 0.0, 0.092], atol=3e-4)  # m: it sinks in as far as its weight says
+    assert np.abs(seen.velocity).max() < 1e-3
+
+
+def test_a_finger_pushes_a_ball_away_and_not_through() -> None:
+    """Finger 1 alone pushes along its x axis, towards -x of the palm; without weight the ball moves on, by Newton's third law."""
+    scene = Scene(hand(), [replace(BALL, place=(0.0, 0.0, 0.08), friction=0.2)], np.zeros(3))
+    worst, seen = 0.0, scene.see()
+    for k in range(1, 31):
+        seen = scene.step(np.array([[9e-3 * min(1.0, k / 25), 0.0], [0.0, 0.0], [0.0, 0.0]]), 0.02)
+        worst = max(worst, depth(scene, seen, 0.025))
+    x, y, _ = seen.place[0]
+    assert x < -2e-3
+    assert abs(y) < 1e-3
+    assert seen.velocity[0, 0] < -5e-3
+    assert worst < 1.5e-3  # m, of a finger 20 mm thick
+
+
+def test_three_fingers_hold_a_ball_against_its_weight() -> None:
+    """Squeezed, then the table's gravity is turned off its side: it is held within millimetres, and does not fall through."""
+    scene = Scene(hand(), [BALL, TABLE], HANGING)
+    seen = close(scene, 8e-3)[-1]
+    assert seen.touching >= 6
+    assert depth(scene, seen, 0.025) < 1e-3
+    free = close(Scene(hand(), [], HANGING), 8e-3)[-1]
+    assert np.linalg.norm(seen.nodes - free.nodes, axis=2).max() > 3e-3  # the ball keeps the fingers apart
+    assert (seen.tension[:, 0] > free.tension[:, 0] + 0.1).all()
+    scene.model.opt.gravity[:] = [0.0, 3.0, 0.0]
+    for _ in range(10):
+        seen = scene.step(np.tile([8e-3, 0.0], (3, 1)), 0.02)
+    assert np.linalg.norm(seen.place[0] - [0.0, 0.0, 0.092]) < 5e-3  # let go it would be 60 mm away
+
+
+def test_reset_and_repeat_are_the_same_bit_for_bit() -> None:
+    scene = Scene(hand(), [BALL, TABLE], HANGING, Route(mu=0.2))
+    first = close(scene, 8e-3, 0.3)[-1]
+    scene.reset()
+    second = close(scene, 8e-3, 0.3)[-1]
+    for name in ("nodes", "tension", "place", "turn", "velocity", "resistance"):
+        assert np.array_equal(getattr(first, name), getattr(second, name)), name
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(DataError, match="no shape 'cone'; allowed: sphere, cylinder, box"):
+        Thing("x", "cone", (0.1,), 1.0, (0.0, 0.0, 0.0))
+    with pytest.raises(DataError, match="2 sizes"):
+        Thing("x", "cylinder", (0.1,), 1.0, (0.0, 0.0, 0.0))
+    scene = Scene(hand(), [], HANGING)
+    with pytest.raises(DataError, match="servo 4"):
+        scene.step(np.array([[0.0, 0.0], [0.0, np.nan], [0.0, 0.0]]), 0.02)
+    with pytest.raises(SolveError, match=r"finger 1 is lost at t = "):
+        scene.step(np.array([[0.09, 0.0], [0.0, 0.0], [0.0, 0.0]]), 0.1)

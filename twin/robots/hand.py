@@ -1,0 +1,81 @@
+"""Silicone fingers evenly around a palm, parallel to its axis, each with its own tendons and strain-sensing cords.
+
+Finger k of n stands at the angle 2 pi (k - 1) / n; its x axis, where its tendon 1 is, points at the palm's axis, its z axis is the
+palm's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from twin.body import Port, Sense
+from twin.robots import soft
+from twin.robots.hand_schema import SCHEMA, Hand, of_finger
+from twin.soft import HandBody, HandDynamics, HandStatics
+from twin.soft.statics import turned
+
+__all__ = ["SCHEMA", "build", "dynamics", "statics"]
+
+PALM = [0.35, 0.37, 0.4, 1.0]
+THICK = 5e-3  # m, of the drawn palm
+
+
+def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HandBody:
+    """The hand of `structure` and `values` (SI, by parameter name) that SCHEMA allows."""
+    shape = Hand.model_validate(dict(structure))
+    one, n = shape.finger().model_dump(), shape.fingers
+    fingers = tuple(soft.build(one, of_finger(k, shape, values)) for k in range(n))
+    angle = 2.0 * np.pi * np.arange(n) / n
+    places = values["palm.radius"] * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+    turns = np.stack([turned(a + np.pi) for a in angle])
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[values["palm.radius"], THICK, 0], pos=[0, 0, -THICK], rgba=PALM, contype=0,
+        conaffinity=0,
+    )  # fmt: skip
+    for k, finger in enumerate(fingers):
+        quat = [np.cos(0.5 * (angle[k] + np.pi)), 0.0, 0.0, np.sin(0.5 * (angle[k] + np.pi))]
+        spec.attach(finger.spec, prefix=_prefix(k), frame=spec.worldbody.add_frame(pos=places[k], quat=quat))
+    first = fingers[0]
+    return HandBody(
+        spec=spec,
+        n_tendon=shape.tendons,
+        parts=first.parts,
+        drives=tuple(tuple(_port(k, port, n) for port in ports) for k, finger in enumerate(fingers) for ports in finger.drives),
+        stepped=first.stepped,
+        senses={
+            _prefix(k) + name: _sense(k, sense, shape) for k, finger in enumerate(fingers) for name, sense in finger.senses.items()
+        },
+        tendons=tuple(tuple(_prefix(k) + site for site in sites) for k, finger in enumerate(fingers) for sites in finger.tendons),
+        markers=tuple(_prefix(k) + site for k, finger in enumerate(fingers) for site in finger.markers),
+        fingers=fingers,
+        places=places,
+        turns=turns,
+    )
+
+
+def _prefix(k: int) -> str:
+    return f"finger_{k + 1}_"
+
+
+def _port(k: int, port: Port, n: int) -> Port:
+    pull = np.zeros((n, len(port.pull)))
+    pull[k] = port.pull
+    return Port(_prefix(k) + port.channel, port.drive, tuple(pull.ravel()))
+
+
+def _sense(k: int, sense: Sense, shape: Hand) -> Sense:
+    one = shape.finger()
+    each = {"tension": one.tendons, "displacement": one.tendons, "sensor": one.sensors, "marker": one.markers + 1}[sense.group]
+    return Sense(sense.group, k * each + sense.index, sense.axis)
+
+
+def statics(body: HandBody) -> HandStatics:
+    return HandStatics(body)
+
+
+def dynamics(body: HandBody) -> HandDynamics:
+    return HandDynamics(body)

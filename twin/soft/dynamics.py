@@ -1,0 +1,241 @@
+"""Silicone bodies in motion: MuJoCo's steps under the law of the statics, one body or several in one model.
+
+A motion starts at rest in equilibrium. It has mass, damping and contact, which statics lacks; statics has walls, tangents for fits,
+and takes a sample where a motion takes the time between two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from twin.body import DIRECT, NOT_FOUND, Problem
+from twin.effects import Drive
+from twin.errors import SolveError
+from twin.soft.body import SoftBody
+from twin.soft.creep import relax_for
+from twin.soft.flex import Placed, flex, place
+from twin.soft.newton import Parts
+from twin.soft.room import room_for
+from twin.soft.statics import SoftPath, SoftStatics, Trial, single_thread, turned
+from twin.soft.stepping import DONE, FASTEST, INVERTED, Engine, Limb, advance, shape
+
+LONGEST, SHORTEST, PER_DAMPING = (
+    4e-3,
+    5e-4,
+    0.4,
+)  # s, s, 1: a step is that share of the silicone's damping coefficient, within these
+TURNS = 400  # that solve's turns; some hundred do
+STIFFNESS = 2e5  # N/m, of a held tendon that does not stretch: 10 um at 2 N
+POISSON = 0.47  # at most: MuJoCo's solve of what is less compressible takes twice as long; it moves the tip by 0.03 mm
+SOLVED = 1e-3  # MuJoCo's tolerance for the metric's solve; with a tenth of it shapes are the same to 0.01 mm
+
+
+@dataclass(frozen=True)
+class Started:
+    """A body at rest in equilibrium, ready to be moved: what was asked of it, its statics and its first equilibrium."""
+
+    body: SoftBody
+    statics: SoftStatics
+    problem: Problem
+    trial: Trial
+
+    @staticmethod
+    def of(body: SoftBody, problem: Problem) -> Started:
+        """Under the problem's loads and first command. The body's stiffness counts with its mean: temperature changes little in a
+        motion. Raises SolveError where there is no such equilibrium, and for what is not stepped here."""
+        if problem.loads.wall[4] > 0.0:
+            raise SolveError("a silicone body's motion against a soft wall is not stepped here; use static equilibria")
+        if problem.route.stiffening > 0.0 or problem.heating is not None:
+            raise SolveError("tendons that stiffen and SMA springs do not move a silicone body here; remove that effect or drive")
+        scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
+        body = replace(body, youngs_modulus=scale * body.youngs_modulus, poisson=min(body.poisson, POISSON))
+        statics = SoftStatics(body)
+        first = replace(
+            problem, time=problem.time[:1], command=problem.command[:1], stiffness=None, near=None, keep=False, once=False
+        )
+        with single_thread():
+            trial = Trial(statics, first)
+            trial.run()
+        if not trial.status.all():
+            pull = ", ".join(f"{d.shown[1] * c:.3g} {d.shown[0]}" for d, c in zip(first.drives, first.command[0], strict=True))
+            raise SolveError(f"no equilibrium to start from under {pull or np.round(first.command[0], 3).tolist()}")
+        return Started(body, statics, problem, trial)
+
+    @property
+    def parts(self) -> Parts:
+        return self.statics.parts
+
+    def limb(self, model: mujoco.MjModel, placed: Placed) -> Limb:
+        """The body as it is stepped. Its tendons' stiffness is set in the model."""
+        problem, trial, state = self.problem, self.trial, self.trial.state
+        held = problem.which(Drive.DISPLACEMENT)
+        stiffness = np.full(len(held), 1.0 / (problem.route.stretch + 1.0 / STIFFNESS))
+        model.tendon_stiffness[placed.wraps.tendon] = np.where(held, stiffness, 0.0)
+        force = np.outer(self.statics.tip, problem.loads.force @ turned(self.body.turn)).ravel()
+        return Limb(
+            self.parts, room_for(self.parts, len(problem.creep.amplitude) > 0), placed.dof, placed.wraps, held, stiffness,
+            trial.hanging, state.slip, state.beyond, state.tension, force, float(problem.route.mu), float(problem.route.presliding),
+        )  # fmt: skip
+
+
+class Moving:
+    """Bodies in one MuJoCo model, from rest in equilibrium on.
+
+    `model` is compiled of what `flex` makes of each, `placed` says where each is in it, `names` what each is called.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, started: Sequence[Started], placed: Sequence[Placed], names: Sequence[str]
+    ) -> None:
+        model.opt.tolerance, model.opt.iterations = SOLVED, TURNS
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a state that is lost must be seen as such
+        self.model, self.data, self.names, self.started = model, data, tuple(names), tuple(started)
+        self.limbs = tuple(s.limb(model, p) for s, p in zip(started, placed, strict=True))
+        for s, limb in zip(started, self.limbs, strict=True):
+            data.qpos[limb.dof] = s.trial.state.u
+        mujoco.mj_forward(model, data)
+        self._engine = Engine(
+            model._address, data._address, data.qpos, data.qvel, data.qfrc_spring, data.qfrc_applied, model.wrap_prm,
+            data.ten_length, model.tendon_lengthspring,
+        )  # fmt: skip
+        self._warned = self._warnings()
+
+    @staticmethod
+    def of(spec: mujoco.MjSpec, started: Sequence[Started], prefixes: Sequence[str], names: Sequence[str]) -> Moving:
+        """Of a spec that holds what `flex` makes of each body under its prefix."""
+        model = spec.compile()
+        placed = [
+            place(model, s.body, s.parts, prefix, s.problem.loads.payload) for s, prefix in zip(started, prefixes, strict=True)
+        ]
+        data = mujoco.MjData(model)
+        mujoco.mj_setConst(model, data)
+        mujoco.mj_resetData(model, data)
+        return Moving(model, data, started, placed, names)
+
+    @property
+    def step(self) -> float:
+        return float(self.model.opt.timestep)
+
+    def run(self, start: np.ndarray, end: np.ndarray, n: int) -> None:
+        """n steps while the commands go straight from `start` to `end` (body, t), N or m.
+
+        Raises SolveError naming the body and the time where a cell turns inside out, a state is not finite or MuJoCo warns.
+        """
+        how, which = advance(self.limbs, self._engine, start, end, n)
+        if how != DONE:
+            what = (
+                "a cell of its silicone has turned inside out"
+                if how == INVERTED
+                else f"a node has no finite speed below {FASTEST:g} m/s"
+            )
+            pull = ", ".join(f"{T:.3g}" for T in self.limbs[which].tension)
+            raise SolveError(
+                f"{self.names[which]} is lost at t = {self.data.time:.4g} s: {what}, under tensions {pull} N; smoother or smaller "
+                "commands, or a shorter step, may keep it"
+            )
+        warned = self._warnings()
+        if (warned > self._warned).any():
+            kind = mujoco.mjtWarning(int(np.argmax(warned - self._warned))).name
+            raise SolveError(
+                f"{', '.join(self.names)}: MuJoCo warns ({kind}) at t = {self.data.time:.4g} s; smoother commands or a shorter "
+                "step may help"
+            )
+
+    def u(self, k: int, ahead: float = 0.0) -> np.ndarray:
+        """(n_free, 3) m, displacements of body k's nodes, carried on straight for `ahead` (s)."""
+        dof = self.limbs[k].dof
+        return (self.data.qpos[dof] + ahead * self.data.qvel[dof]).reshape(-1, 3)
+
+    def lengths(self, k: int) -> np.ndarray:
+        """(t,) m, path lengths of body k's tendons."""
+        limb = self.limbs[k]
+        shape(limb, self._engine)
+        return limb.room.pulled.length.copy()
+
+    def _warnings(self) -> np.ndarray:
+        return np.array([w.number for w in self.data.warning])
+
+
+def step_for(body: SoftBody) -> float:
+    """s: half of it moves the tip by less than 0.1 mm (tools/finger_dynamics.py)."""
+    return min(LONGEST, max(SHORTEST, PER_DAMPING * body.damping))
+
+
+class SoftDynamics:
+    """A silicone body ready to be moved."""
+
+    def __init__(self, body: SoftBody) -> None:
+        self.body = body
+        self.statics = SoftStatics(body)
+        self.straight_path = self.statics.straight_path
+
+    @property
+    def n_slow(self) -> int:
+        return self.statics.n_slow
+
+    def solve(self, problem: Problem) -> SoftPath:
+        """The motion from rest in equilibrium under the first command. `near`, `keep`, `once` and `tolerance` are of statics only.
+
+        Where the motion is lost `ended` says how; samples from there on are NaN.
+        """
+        started = Started.of(self.body, problem)
+        spec = flex(started.body, started.parts, step_for(self.body))
+        spec.option.gravity = problem.loads.gravity @ turned(self.body.turn)
+        moving = Moving.of(spec, [started], [""], ["the finger"])
+        return followed(moving, problem.time, np.array(problem.command, float)[:, None])[0]
+
+
+def followed(moving: Moving, time: np.ndarray, command: np.ndarray) -> list[SoftPath]:
+    """The motion of each body under commands (n, body, t), seen at times (n,) s."""
+    n, b, nt = command.shape
+    u = [np.full((n, limb.dof.size), np.nan) for limb in moving.limbs]
+    tension, length = np.full((2, b, n, nt), np.nan)
+    relaxed = [Relaxed(s) for s in moving.started]
+    h, now, taken, ended = moving.step, 0, n, ""
+    for i in range(n):
+        steps = int((time[i] - time[0]) / h + 1e-6) - now
+        try:
+            if steps:
+                before, after = ((k * h - (time[i - 1] - time[0])) / (time[i] - time[i - 1]) for k in (now, now + steps))
+                way = command[i] - command[i - 1]
+                moving.run(command[i - 1] + before * way, command[i - 1] + after * way, steps)
+        except SolveError as lost:
+            taken, ended = i, str(lost)
+            break
+        now += steps
+        for k, limb in enumerate(moving.limbs):
+            u[k][i] = moving.u(k, time[i] - time[0] - now * h).ravel()
+            tension[k, i], length[k, i] = limb.tension, moving.lengths(k)
+            relaxed[k].on(limb, u[k][i], time[i] - time[max(0, i - 1)])
+    status = np.where(np.arange(n) < taken, DIRECT, NOT_FOUND)
+    return [_path(s, u[k], tension[k], length[k], status, ended) for k, s in enumerate(moving.started)]
+
+
+def _path(
+    started: Started, u: np.ndarray, tension: np.ndarray, length: np.ndarray, status: np.ndarray, ended: str
+) -> SoftPath:  # fmt: skip
+    statics, shapes = started.statics, u.reshape(len(u), -1, 3)
+    return SoftPath(
+        tension=tension, path=length - started.trial.hanging + statics.straight_path, markers=statics.markers(shapes), ended=ended,
+        status=status, q=u, others=statics.sensed(shapes),
+    )  # fmt: skip
+
+
+class Relaxed:
+    """Creep between samples, as in statics: the relaxed stress that the limb's room holds."""
+
+    def __init__(self, started: Started) -> None:
+        creep = started.problem.creep
+        self.parts, self.taken = started.parts, started.trial.state.taken
+        self.amplitude, self.lag = np.array(creep.amplitude, float), np.array(creep.time, float)
+        self.whole = np.zeros((started.parts.clamped + started.body.lattice.n_free, 3))
+
+    def on(self, limb: Limb, u: np.ndarray, dt: float) -> None:
+        """Advance by dt (s) at nodal displacements u (nq,)."""
+        if self.amplitude.size:
+            self.whole[self.parts.clamped :] = u.reshape(-1, 3)
+            relax_for(self.whole, self.parts.cells, self.amplitude, self.lag, dt, self.taken)
+            limb.room.relaxed[:] = self.taken.sum(axis=0)

@@ -1,0 +1,157 @@
+"""A hand among rigid things that it may touch, hold and move: one MuJoCo model, driven by its servos.
+
+A servo drives a pair of antagonist tendons: it pulls the first in by as much as it pays the second out. Fingers touch things,
+things touch each other and the table; fingers do not touch each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twin.body import Problem
+from twin.effects import Drive, Loads, Route
+from twin.errors import DataError, SolveError
+from twin.soft.flex import FINGER, THING
+from twin.soft.hand import HandBody, moving, stand
+
+SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
+SHAPES = {
+    "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
+    "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, 2),
+    "box": (mujoco.mjtGeom.mjGEOM_BOX, 3),
+}
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A rigid body: `shape` is sphere (size: radius), cylinder (radius, half length) or box (three half lengths), m; `mass` kg, its
+    place (3,) m and how it is turned, (4,) w x y z, in the palm's frame; its coefficient of friction. One that is `fixed` stays."""
+
+    name: str
+    shape: str
+    size: tuple[float, ...]
+    mass: float
+    place: tuple[float, float, float]
+    turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    friction: float = 1.0
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.shape not in SHAPES:
+            raise DataError(f"thing {self.name!r}: no shape {self.shape!r}; allowed: {', '.join(SHAPES)}")
+        needed = SHAPES[self.shape][1]
+        if len(self.size) != needed or not min(self.size) > 0.0 or not self.mass > 0.0:
+            raise DataError(f"thing {self.name!r}: {needed} sizes and a mass above zero are needed of a {self.shape}")
+
+    def add(self, spec: mujoco.MjSpec) -> None:
+        body = spec.worldbody.add_body(name=self.name, pos=self.place, quat=self.turn)
+        if not self.fixed:
+            body.add_freejoint(name=self.name)
+        size = [*self.size, 0.0, 0.0][:3]
+        body.add_geom(
+            name=self.name, type=SHAPES[self.shape][0], size=size, mass=self.mass, friction=[self.friction, 5e-3, 1e-4],
+            contype=THING, conaffinity=THING | FINGER, priority=1, solref=[SETTLES, 1.0], rgba=[0.2, 0.45, 0.7, 1.0],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Sight:
+    """An instant: time (s); servos (finger, pair) m; tensions (finger, tendon) N; nodes' displacements (finger, n_free, 3) m in
+    each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that is free its place (thing,
+    3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the hand touch something."""
+
+    time: float
+    servos: np.ndarray
+    tension: np.ndarray
+    nodes: np.ndarray
+    strain: np.ndarray
+    resistance: np.ndarray
+    place: np.ndarray
+    turn: np.ndarray
+    velocity: np.ndarray
+    touching: int
+
+
+class Scene:
+    """A hand and things, at rest with all servos at zero when it is made or reset."""
+
+    def __init__(self, body: HandBody, things: Sequence[Thing], gravity: ArrayLike, route: Route | None = None) -> None:
+        """`gravity` (3,) m/s^2 in the palm's frame; `route` gives the tendons' friction.
+
+        Raises DataError for things of one name and for fingers whose tendons are no pairs, SolveError where the hand has no
+        equilibrium.
+        """
+        tendons = len(body.fingers[0].paths)
+        if tendons % 2 or len({t.name for t in things}) < len(things):
+            raise DataError("a scene needs fingers with pairs of tendons, and things of different names")
+        self.pairs, self.things = tendons // 2, tuple(things)
+        n = tendons * len(body.fingers)
+        rest = Problem(
+            np.zeros(1), np.zeros((1, n)), Loads(np.asarray(gravity, float)), route or Route(), (Drive.DISPLACEMENT,) * n
+        )
+        started, spec = stand(body, rest)
+        for thing in things:
+            thing.add(spec)
+        self.moving = moving(started, spec)
+        self.model, self.data = self.moving.model, self.moving.data
+        self.model.opt.solver = mujoco.mjtSolver.mjSOL_CG  # Newton factorises 816 unknowns at every step: half as fast
+        joints = [self.model.joint(t.name) for t in things if not t.fixed]
+        self._at = np.array([j.qposadr[0] + np.arange(7) for j in joints], int).reshape(-1, 7)
+        self._speed = np.array([j.dofadr[0] + np.arange(6) for j in joints], int).reshape(-1, 6)
+        self._servos = np.zeros((len(started), self.pairs))
+        self._kept = [self.data.qpos.copy(), *(a.copy() for a in self._memory())]
+
+    def reset(self) -> Sight:
+        """Back to rest, as it was made."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = self._kept[0]
+        for array, kept in zip(self._memory(), self._kept[1:], strict=True):
+            array[:] = kept
+        self._servos[:] = 0.0
+        mujoco.mj_forward(self.model, self.data)
+        return self.see()
+
+    def step(self, servos: ArrayLike, seconds: float) -> Sight:
+        """On for some time (at least a step) while the servos (finger, pair) m go straight to where they are told.
+
+        Raises DataError for a command that is not finite, SolveError naming the finger, or the thing, and the time where it is
+        lost.
+        """
+        told = np.asarray(servos, float).reshape(self._servos.shape)
+        if not np.isfinite(told).all():
+            raise DataError(f"servo {int(np.flatnonzero(~np.isfinite(told))[0]) + 1} is told {told.tolist()}; a number is needed")
+        steps = max(1, round(seconds / self.moving.step))
+        self.moving.run(self._tendons(self._servos), self._tendons(told), steps)
+        self._servos = told.copy()
+        lost = ~np.isfinite(self.data.qpos[self._at]).all(axis=1)
+        if lost.any():
+            name = [t.name for t in self.things if not t.fixed][int(np.argmax(lost))]
+            raise SolveError(
+                f"thing {name!r} is lost at t = {self.data.time:.4g} s; slower servos, or a heavier thing, may keep it"
+            )
+        return self.see()
+
+    def see(self) -> Sight:
+        """Where all is now."""
+        data, hand = self.data, self.moving
+        nodes = np.stack([hand.u(k) for k in range(len(hand.limbs))])
+        felt = [s.statics.sensed(u[None]) for s, u in zip(hand.started, nodes, strict=True)]
+        return Sight(
+            float(data.time), self._servos.copy(), np.stack([limb.tension for limb in hand.limbs]), nodes,
+            np.concatenate([f["strain"] for f in felt]), np.concatenate([f["sensor"] for f in felt]),
+            data.qpos[self._at[:, :3]], data.qpos[self._at[:, 3:]], data.qvel[self._speed], self._touching(),
+        )  # fmt: skip
+
+    def _tendons(self, servos: np.ndarray) -> np.ndarray:
+        return np.concatenate([servos, -servos], axis=1)
+
+    def _memory(self) -> list[np.ndarray]:
+        """What the fingers carry from step to step beside MuJoCo's state."""
+        return [a for limb in self.moving.limbs for a in (limb.slip, limb.beyond, limb.tension)]
+
+    def _touching(self) -> int:
+        return int((self.data.contact.flex >= 0).any(axis=1).sum()) if self.data.ncon else 0
