@@ -52,10 +52,16 @@ def distance(plant: HeldFinger, wanted: HeldFinger) -> float:
 
 
 def test_the_response_is_that_of_small_pulls(bent: HeldFinger) -> None:
-    """Central differences over 40 mN of each tendon; the kept tangent is some steps old, which 2 % allow for."""
-    finger, there, h = HeldFinger(TWIN), bent.shortening, 0.02
+    """Central differences over 10 mN of each tendon with the tangent made anew, to 0.5 % (0.05 % was seen); one that is kept from
+    some millimetres away is good to 5 %."""
+    finger, there, h = HeldFinger(TWIN), bent.shortening, 0.005
+    finger.hold(there)
+    kept = finger.response()
+    finger._shape.inverse = None
     finger.hold(there)
     response = finger.response()
+    for old, new in ((kept.points, response.points), (kept.strain, response.strain)):
+        assert 0.0 < np.abs(old - new).max() < 0.05 * np.abs(new).max()
     for t in range(4):
         ends = []
         for sign in (1.0, -1.0):
@@ -63,11 +69,11 @@ def test_the_response_is_that_of_small_pulls(bent: HeldFinger) -> None:
             ends.append((finger.points(), finger.strain(), finger.tension))
         moved, felt, pull = ((up - down) / (2.0 * h) for up, down in zip(*ends, strict=True))
         for found, true in ((response.points[..., t], moved), (response.strain[:, t], felt), (np.eye(4)[t], pull)):
-            assert np.abs(found - true).max() < 0.02 * np.abs(true).max()
+            assert np.abs(found - true).max() < 5e-3 * np.abs(true).max()
 
 
 def test_a_reachable_shape_is_reached(bent: HeldFinger) -> None:
-    """To 5 um: preferring the least pull costs (EASY / 1 mm/N)^2 of it, and less than 1 um was seen; equilibria are found to 0.1."""
+    """To 5 um: preferring the least pull costs some (EASY / 1 mm/N)^2 of 3 mm, 8 um at worst, and less was seen."""
     plant, done = follow(ShapeController(TWIN), base(bent.points()))
     assert distance(plant, bent) < 5e-6
     assert done[-1].reason is None
@@ -93,13 +99,13 @@ def test_felt_by_resistances_it_is_as_good_as_its_estimator(bent: HeldFinger) ->
 
 
 def test_limits_are_kept(bent: HeldFinger) -> None:
-    """The rate in every step; the least pull while moving, which the linear step misses by its curvature, and exactly in the end."""
+    """The rate in every step; pulls while moving, which the linear step misses by its curvature, and exactly in the end."""
     limits = Limits(least=0.2, most=0.6, rate=0.01)
     law = ShapeController(TWIN, limits=limits)
     tensions, held = [], law.finger.hold
 
-    def watch(shortening: np.ndarray) -> None:
-        held(shortening)
+    def watch(shortening: np.ndarray, close: float) -> None:
+        held(shortening, close)
         tensions.append(law.finger.tension.copy())
 
     law.finger.hold = watch  # type: ignore[method-assign]
@@ -124,7 +130,7 @@ def test_a_pull_that_is_not_allowed_is_said() -> None:
 
 
 def test_a_twist_is_not_reachable_and_said() -> None:
-    """Of a hanging finger turned by a about its axis a point at radius r is 2 r sin(a/2) away, across what any tendon of it does."""
+    """Of a hanging finger turned by a about its axis a point at radius r is 2 r sin(a/2) away, across what any tendon does."""
     finger, angle = HeldFinger(TWIN), 0.3
     wanted = finger.rest @ turned(angle).T
     _, done = follow(ShapeController(TWIN), base(wanted))

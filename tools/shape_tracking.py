@@ -2,15 +2,16 @@
 
     python -m tools.shape_tracking --seeds 41,42,43 [--days DIR] [--hand]
 
-The plant is a finger of the independent finite element bench (no code in common with the twin): its E, R0, kappa, mounting angle and
-tendon friction drawn by the seed, its resistances noisy, one equilibrium after another. The wanted shapes are what another built
+The plant is a finger of the independent finite element bench (no code in common with the twin): its E, R0, kappa, mounting angle
+and tendon friction drawn by the seed, its resistances noisy, one equilibrium after another. The wanted shapes are what another
 finger of that bench, drawn by seed + 1000 and clamped as the plant is (no tendon twists a finger), did under a slow wander of its
-tendons: its 609 named points in the base frame, and its readings. Before, the twin is aligned to a shape day of the plant (`twin align`, written to
---days DIR, some minutes, where it is not there yet). --hand pushes the plant while it follows. In the table:
+tendons: its 609 named points in the base frame, and its readings. Before, the twin is aligned to a shape day of the plant (as by
+`twin align`; written to --days DIR, some minutes, where it is not there yet). --hand pushes the plant while it follows, and then
+`modal` is told that something may press. Seed 31 was used to develop this; 41, 42 and 43 were scored once. In the table:
 
     shape             the controller, sensing by `modal`            shape, told       sensing replaced by the simulator's truth
-    strain            wanted strains of the wanted shape, by its own finger's strains, known; felt by the aligned cords
-    readings          the other finger's readings, both tared at rest, no kappa known: what a policy on raw strain would ask for
+    strain            strains: the other finger's true ones are wanted, felt by the aligned cords
+    readings          strains: the other finger's readings are wanted, both tared at rest, kappa not known: raw strain
     constant          the source's constant directions              tip               the tip only
     replay            the other finger's shortenings, no sensing
     ..., described    the same by the twin as described, not aligned; its R0 are those read at rest

@@ -15,7 +15,7 @@ import numpy as np
 
 from twin.errors import DataError, SolveError
 from twin.factory.points import named_points
-from twin.factory.solve import hang, march, weight_of
+from twin.factory.solve import CLOSE, hang, march, weight_of
 from twin.soft import SoftBody, SoftStatics
 from twin.soft.solid import Solid
 from twin.soft.statics import single_thread, turned
@@ -69,14 +69,14 @@ class HeldFinger:
         """Points (..., 3) of the base frame in the finger's own, which is turned by the mounting angle."""
         return points @ self._turn
 
-    def hold(self, shortening: np.ndarray) -> None:
-        """Move to tendons shortened by (t,) m from the hanging rest. Raises SolveError where no equilibrium is found on the way; it
-        then stays where it was."""
+    def hold(self, shortening: np.ndarray, close: float = CLOSE) -> None:
+        """Move to tendons shortened by (t,) m from the hanging rest, until Newton's steps are below `close` (m). Raises SolveError
+        where no equilibrium is found on the way; it then stays where it was."""
         start, goal = (self.shortening, self._burden), (np.asarray(shortening, float), self._burden)
         with single_thread():
-            shape, found = march(self._solid, self._shape, self._hanging, start, goal, self.route)
+            shape, found = march(self._solid, self._shape, self._hanging, start, goal, self.route, close)
             if not found:  # what the tendons do is known again where it stays
-                march(self._solid, self._shape, self._hanging, start, start, self.route)
+                march(self._solid, self._shape, self._hanging, start, start, self.route, close)
         if not found:
             raise SolveError(f"no equilibrium on the way to tendons shortened by {np.round(1e3 * goal[0], 2).tolist()} mm")
         self._shape, self.shortening = shape, goal[0].copy()

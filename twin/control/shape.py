@@ -5,9 +5,13 @@ At every step the shape is estimated from what the strain sensors read, and tens
     min over dT   mean |x* - x - dx/dT dT|^2 + EASY^2 |T + dT|^2,      least <= T + dT <= most,
 
 dx/dT each tendon's own shape change, by the twin's tangent at the present tendon lengths. All tendons pull by `least` or more, so
-that antagonists hold the finger between them; of what bends it alike the least pull is taken. The tendons are shortened by the share
+that antagonists hold the finger between them; of what bends it alike the least pull is taken. Tendons are shortened by the share
 1 - exp(-dt/SETTLE) of what would give these tensions, no faster than `rate`. Only the change of shape is the model's: what it is
-wrong about is made up for from step to step, as by an integral. What is left of the distances after dT is what tendons cannot reach.
+wrong about is made up for from step to step, as by an integral. What dT leaves of the distances is what tendons cannot reach.
+
+Tensions are the twin's own; nobody measures them. With all tendons taut their lengths are nearly redundant: pulling one pair and
+letting the other go takes 5 um/N, so that on a finger that is not quite the twin some pair may be slack, or pull tenths of a newton
+more than told.
 
 Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078) projects vertex errors onto constant directions (`shape_baselines.py`); the
 tangent, the limits and the residual are ours. Bounded least squares: Stark and Parker 1995, as in scipy.
@@ -31,6 +35,7 @@ from twin.twin import Twin
 SETTLE = 0.05  # s, in which all but a third is done: noise of one reading moves the tendons by a fifth of it at 100 Hz
 EASY = 5e-5  # m/N: pulling 1 N harder has to bring the points nearer by that; they move by 1 mm/N and more where they are pulled
 WITHIN = 1e-3  # m, mean distance: less is what a shape is estimated to
+CLOSE = 1e-5  # m, of Newton's last step: the next control step goes on with what it leaves, and a tangent serves longer
 STILL = 1e-4  # m: tendons asked for less than this have arrived
 
 
@@ -76,8 +81,8 @@ class ShapeController:
         self.cords, self.hanging = self.finger.body.cords, self.finger.response()
 
     def step(self, wanted: np.ndarray, resistance: np.ndarray, dt: float, *, truth: np.ndarray | None = None) -> Step:
-        """Towards points `wanted` (P, 3) m in the base frame, from resistances (s,) ohm read now, for `dt` seconds. `truth` (P, 3) m
-        stands for the estimated shape where a simulator tells it. Raises SolveError where the twin finds no equilibrium; the
+        """Towards points `wanted` (P, 3) m in the base frame, from resistances (s,) ohm read now, for `dt` seconds. `truth` (P, 3)
+        m stands for the estimated shape where a simulator tells it. Raises SolveError where the twin finds no equilibrium; the
         shortenings then stay."""
         finger, limits = self.finger, self.limits
         response, T, loose = finger.response(), finger.tension, finger.loose
@@ -86,7 +91,7 @@ class ShapeController:
         share = 1.0 - np.exp(-dt / SETTLE)
         change = loose - share * (response.length @ dT)
         full = float(np.abs(change).max())
-        finger.hold(finger.shortening + change * min(1.0, limits.rate * dt / max(full, 1e-12)))
+        finger.hold(finger.shortening + change * min(1.0, limits.rate * dt / max(full, 1e-12)), CLOSE)
         left = apart - slope @ dT
         error, residual = (float(np.linalg.norm(a, axis=-1).mean()) for a in (apart, left))
         reason = self._reason(T + dT, residual) if full < STILL and residual > WITHIN else None
@@ -117,5 +122,5 @@ def _pulls(apart: np.ndarray, slope: np.ndarray, tension: np.ndarray, limits: Li
     n, nt = apart.size // apart.shape[-1], len(tension)
     S = slope.reshape(-1, nt)
     R = cholesky(S.T @ S / n + EASY**2 * np.eye(nt))
-    b = solve_triangular(R, S.T @ apart.ravel() / n - EASY**2 * tension, trans="T")
+    b = solve_triangular(R, S.T @ apart.ravel() / n - EASY**2 * tension, trans=1)
     return lsq_linear(R, b, (limits.least - tension, limits.most - tension), method="bvls").x

@@ -16,6 +16,7 @@ SMALLEST = 1 / 64  # of a step between two samples
 RINGS, AROUND, FACE = 36, 32, 8  # points of the skin that carry a push: rings on the mantle, rings on the tip's face
 NO_WALL = np.zeros(5)
 PLAIN = Route()
+CLOSE = 1e-7  # m
 
 
 @dataclass(frozen=True)
@@ -105,17 +106,17 @@ State = tuple[np.ndarray, np.ndarray]  # tendon displacements (t,) m, forces on 
 
 
 def march(
-    solid: Solid, shape: Shape, hanging: np.ndarray, start: State, goal: State, route: Route = PLAIN
+    solid: Solid, shape: Shape, hanging: np.ndarray, start: State, goal: State, route: Route = PLAIN, close: float = CLOSE
 ) -> tuple[Shape, bool]:  # fmt: skip
     """From one state to another in ever smaller parts where Newton's method is lost; the last shape found, and whether it is the
-    goal's."""
+    goal's: to a last step of `close` (m)."""
     nt, done, part = len(hanging), 0.0, 1.0
     held, zero, stretch = np.ones(nt, bool), np.zeros(nt), np.full(nt, route.stretch)
     while done < 1.0:
         trial, to = shape.copy(), min(1.0, done + part)
         at, force = (a + to * (b - a) for a, b in zip(start, goal, strict=True))
         pull = Pull(zero, held, hanging - at, stretch, route.mu, route.presliding)
-        if solid.settle(trial, pull, Burden(force, NO_WALL), close=1e-7):
+        if solid.settle(trial, pull, Burden(force, NO_WALL), close=close):
             shape, done, part = trial, to, 2.0 * part
             continue
         part, shape.inverse = 0.5 * part, None
