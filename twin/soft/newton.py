@@ -24,6 +24,7 @@ LONGEST = 6e-3  # m, of a step at any node
 SHRINKS = 0.6  # a tangent is kept while a step leaves less than this of the one before
 SLACK = 1e-9  # m: a gap below this is none
 STALE = 5  # steps after which a tangent that is to be kept is made anew
+NONE, OWN, NEAR = 0, 1, 2  # whose inverse tangent serves: none yet, the state's, or that of the neighbour's sample, used in place
 
 
 class Parts(NamedTuple):
@@ -65,17 +66,19 @@ class Kept(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Answers: u (n, nq) m, tensions (n, t) N, path lengths (n, t) m, inverse tangents, if they are to be kept."""
+    """Answers: u (n, nq) m, tensions (n, t) N, path lengths (n, t) m; inverse tangents, if they are to be kept, but for the samples
+    that were found by the neighbour's, `borrowed` (n,)."""
 
     u: np.ndarray
     tension: np.ndarray
     length: np.ndarray
     inverse: np.ndarray
+    borrowed: np.ndarray
 
 
 class State(NamedTuple):
     """Where the body is: u (nq,) m, tensions (t,) N over the stiffness, slip states (t, p - 2) and lengths beyond, relaxed
-    stress (k, c, q, 6) Pa; the inverse of a tangent near it (nq, nq), if `has` (1,)."""
+    stress (k, c, q, 6) Pa; the inverse of a tangent near it (nq, nq), and whose serves, `has` (1,)."""
 
     u: np.ndarray
     tension: np.ndarray
@@ -104,20 +107,22 @@ class Room(NamedTuple):
 @jit
 def along(parts, way, kept, i, state, found, room):
     """From sample i on as far as it goes: fills `found`, advances `state`. Returns the first sample not found, n if all were."""
-    n = way.time.size
+    n, near = way.time.size, state.inverse
     while i < n:
         if kept.u.shape[0] > 0:
             state.u[:] = kept.u[i]
             state.tension[:] = kept.tension[i] / way.scale[i]
-            state.inverse[:] = kept.inverse[i]
-            state.has[0], room.foresees[0] = True, False
-        steps = settle(parts, way, i, state, room)
+            near = kept.inverse[i]
+            state.has[0], room.foresees[0] = NEAR, False
+        steps = settle(parts, way, i, state, room, near)
         if steps == 0:
             return i
         if found.inverse.shape[0] > 0:
             if steps > STALE:
                 renew(parts, way, i, state, room)
-            found.inverse[i] = state.inverse
+            found.borrowed[i] = state.has[0] == NEAR
+            if not found.borrowed[i]:
+                found.inverse[i] = state.inverse
         found.u[i], found.length[i] = state.u, room.pulled.length
         found.tension[i] = state.tension * way.scale[i]
         if state.taken.shape[0] > 0 and i + 1 < n:
@@ -128,8 +133,9 @@ def along(parts, way, kept, i, state, found, room):
 
 
 @jit
-def settle(parts, way, i, state, room):
-    """Bring `state` to equilibrium at sample i. Returns the steps it took; 0, and all as it was, where it is lost."""
+def settle(parts, way, i, state, room, near):
+    """Bring `state` to equilibrium at sample i; `near` (nq, nq) m/N is a neighbour's inverse tangent. Returns the steps it took; 0,
+    and all as it was, where it is lost."""
     u, T, last, fresh, fails = state.u.copy(), state.tension.copy(), 1e9, False, 0
     if room.relaxed.shape[0] > 0:
         room.relaxed[:] = state.taken.sum(axis=0)
@@ -138,12 +144,12 @@ def settle(parts, way, i, state, room):
             state.tension[t] = way.tension[i, t] / way.scale[i]
     du, dT = np.empty(u.size), np.empty(T.size)
     for step in range(STEPS):
-        if not (residual(parts, way, i, state, room) and (state.has[0] or renew(parts, way, i, state, room))):
+        if not (residual(parts, way, i, state, room) and (state.has[0] != NONE or renew(parts, way, i, state, room))):
             break
-        linear(way, i, state, room, du, dT)
+        linear(way, i, state, room, near if state.has[0] == NEAR else state.inverse, du, dT)
         length = np.abs(du).max()
         if not (length < SHRINKS * last or fresh or way.once):
-            state.has[0] = False
+            state.has[0] = NONE
             fails += 1
             if fails > STEPS // 4 or not np.isfinite(length):
                 break
@@ -159,11 +165,11 @@ def settle(parts, way, i, state, room):
             commit(parts, way, state, room)
             return step + 1
         if share < 1.0:
-            state.has[0] = False
+            state.has[0] = NONE
         last, fresh = length, False
     state.u[:] = u
     state.tension[:] = T
-    state.has[0] = False
+    state.has[0] = NONE
     return 0
 
 
@@ -187,7 +193,7 @@ def residual(parts, way, i, state, room):
 def renew(parts, way, i, state, room):
     """Invert the tangent at the state's shape, after `residual` there. False where it has no inverse."""
     K, tangent = room.tangent.K, room.tangent
-    if state.has[0] or not room.foresees[0]:
+    if state.has[0] != NONE or not room.foresees[0]:
         tangent.pressure[:] = room.p
     if stiffness(room.whole, parts.cells, room.relaxed, tangent) < LEAST:
         return False
@@ -199,23 +205,28 @@ def renew(parts, way, i, state, room):
     if not np.isfinite(K.sum()):
         return False
     state.inverse[:] = np.linalg.inv(K).astype(np.float32)
-    state.has[0] = room.foresees[0] = True
+    state.has[0], room.foresees[0] = OWN, True
     return True
 
 
 @inner
-def linear(way, i, state, room, du, dT):
+def linear(way, i, state, room, inverse, du, dT):
     """Changes of nodes du (nq,) and tensions dT (t,) that solve the linear problem; tendons fall slack or taut on the way."""
     p, T, reach, nt = room.pulled, state.tension, room.reach, state.tension.size
-    du[:] = -np.dot(state.inverse, room.f.astype(np.float32))
+    push = np.zeros((du.size, 1 + nt), np.float32)
+    push[:, 0] = -room.f
+    for t in range(nt):
+        if way.held[t]:
+            push[:, 1 + t] = p.pull[t]
+    moved = np.dot(inverse, push)
+    du[:] = moved[:, 0]
     gap, taut, had = np.empty(nt), np.zeros(nt, np.bool_), np.zeros(nt, np.bool_)
     for t in range(nt):
+        reach[t] = moved[:, 1 + t]
         if way.held[t]:
             gap[t] = p.length[t] - way.free[i, t] - way.stretch[i, t] * T[t] + np.dot(p.gradient[t], du)
             taut[t] = T[t] > 0.0 or gap[t] > 0.0
             had[t] = taut[t]
-            if taut[t]:
-                reach[t] = np.dot(state.inverse, p.pull[t].astype(np.float32))
     for _ in range(4 * nt):
         balance(way, i, state, room, gap, taut, had, dT)
         changed = False
@@ -230,7 +241,6 @@ def linear(way, i, state, room, du, dT):
                         left -= np.dot(p.gradient[t], reach[s]) * dT[s]
                 if left > SLACK:
                     taut[t], had[t], changed = True, True, True
-                    reach[t] = np.dot(state.inverse, p.pull[t].astype(np.float32))
         if not changed:
             break
     for t in range(nt):

@@ -7,7 +7,7 @@ import numpy as np
 from twin.soft.body import AROUND, SoftBody, skin_points
 from twin.soft.cables import Cables, unpulled
 from twin.soft.lattice import ACROSS
-from twin.soft.newton import Parts, Room, State
+from twin.soft.newton import NONE, Parts, Room, State
 from twin.soft.silicone import Cells, Tangent
 from twin.soft.wall import Skin
 
@@ -51,5 +51,5 @@ def undeformed(parts: Parts, taken: np.ndarray) -> State:
     nq, beyond = 3 * free, np.linalg.norm(np.diff(parts.cables.rest, axis=1), axis=2)[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
     return State(
         np.zeros(nq), np.zeros(nt), np.zeros((nt, points - 2)), np.ascontiguousarray(beyond), taken,
-        np.zeros((nq, nq), np.float32), np.zeros(1, bool),
+        np.zeros((nq, nq), np.float32), np.full(1, NONE),
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from numba import typeof
 
 from twin.soft.cables import Pulled
-from twin.soft.newton import Parts, State, Way, settle
+from twin.soft.newton import NONE, OWN, Parts, State, Way, settle
 from twin.soft.room import room_for, undeformed
 
 CLOSE = 2e-8  # m: a step after which a shape counts as found; with it goes some 1e-6 N
@@ -74,20 +74,20 @@ class Solid:
         inverse = np.zeros((nq, nq), np.float32) if shape.inverse is None else shape.inverse.copy()
         state = State(
             shape.u.ravel().copy(), shape.tension.copy(), shape.slip.copy(), shape.beyond.copy(), np.empty((0, 0, 0, 6)), inverse,
-            np.array([shape.inverse is not None]),
+            np.array([NONE if shape.inverse is None else OWN]),
         )  # fmt: skip
         way = Way(
             pull.tension[None].copy(), pull.free[None].copy(), _plain(pull.held), pull.stretch[None].copy(), _plain(burden.force),
             _plain(burden.wall), one, float(pull.mu), float(pull.presliding), np.zeros(1), nothing, nothing, close, False,
         )  # fmt: skip
-        problem = self.parts, way, 0, state, self._room
+        problem = self.parts, way, 0, state, self._room, inverse
         if not self._compiled:  # else numba takes what it compiled before for other arrays, and the last bits depend on that
             settle.compile(tuple(map(typeof, problem)))
             self._compiled = True
         if not settle(*problem):
             return False
         shape.u, shape.tension, shape.slip, shape.beyond = state.u.reshape(-1, 3), state.tension, state.slip, state.beyond
-        shape.inverse = state.inverse if state.has[0] else None
+        shape.inverse = state.inverse if state.has[0] == OWN else None
         return True
 
 

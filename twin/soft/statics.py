@@ -75,7 +75,7 @@ class SoftStatics:
         u = trial.found.u.reshape(len(trial.found.u), -1, 3)
         path = SoftPath(
             tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self.markers(u),
-            status=trial.status, q=trial.found.u, others=self.sensed(u), LU=trial.found.inverse,
+            status=trial.status, q=trial.found.u, others=self.sensed(u), LU=trial.inverses(),
             of=asked if trial.status.all() else b"",
         )  # fmt: skip
         if cold and path.of:
@@ -142,7 +142,11 @@ class Trial:
         self.room = room_for(self.parts, k > 0)
         nq = self.state.u.size
         self.found = Found(
-            np.zeros((n, nq)), np.zeros((n, nt)), np.zeros((n, nt)), np.empty((n if problem.keep else 0, nq, nq), np.float32)
+            np.zeros((n, nq)),
+            np.zeros((n, nt)),
+            np.zeros((n, nt)),
+            np.empty((n if problem.keep else 0, nq, nq), np.float32),
+            np.zeros(n, bool),
         )
         self.status = np.full(n, NOT_FOUND)
         self.hanging, self.at = np.zeros(nt), np.zeros(nt)
@@ -182,6 +186,16 @@ class Trial:
                 self.status[i] = DIRECT if self._in_parts(i) else NOT_FOUND
                 i += 1
 
+    def inverses(self) -> np.ndarray:
+        """(n, nq, nq) m/N of the tangents, those of the neighbour where they served; none where they are not to be kept."""
+        near, found = self.problem.near, self.found
+        if near is None or not found.borrowed.any() or not len(found.inverse):
+            return found.inverse
+        if found.borrowed.all():
+            return near.LU
+        found.inverse[found.borrowed] = near.LU[found.borrowed]
+        return found.inverse
+
     def _in_parts(self, i: int) -> bool:
         """From the last command to that of sample i, in ever smaller parts. False, with its shape as last found, where not."""
         start, goal, done, part = self.at, self.problem.command[i], 0.0, 0.5
@@ -203,7 +217,7 @@ class Trial:
         """To one command under the loads of sample i."""
         n, nt, nq = 1, len(command), self.state.u.size
         nothing = Kept(np.empty((0, nq)), np.empty((0, nt)), np.empty((0, nq, nq), np.float32))
-        found = Found(np.empty((n, nq)), np.empty((n, nt)), np.empty((n, nt)), nothing.inverse)
+        found = Found(np.empty((n, nq)), np.empty((n, nt)), np.empty((n, nt)), nothing.inverse, np.zeros(n, bool))
         return along(self.parts, self._way(slice(i, i + 1), command[None], held), nothing, 0, self.state, found, self.room) == 1
 
     def _way(self, rows: slice, command: np.ndarray, held: np.ndarray) -> Way:
