@@ -12,6 +12,7 @@ from twin.calibrate import Fit, prior_pull, prior_weight
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BLOCKS, WORSE
 from twin.evaluate import headline
+from twin.information import solve
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,11 @@ def left_out(study: Study, fit: Fit) -> LeftOut:
     parts = list(pairwise(_ends(study)))
     H = np.stack([J[a:b].T @ J[a:b] for a, b in parts])
     g = np.stack([J[a:b].T @ z[a:b] for a, b in parts])
-    together = np.linalg.solve(H.sum(axis=0) + prior, g.sum(axis=0) + pull)
+    together = solve(H.sum(axis=0) + prior, g.sum(axis=0) + pull)
     out = z.copy()
     for k, (a, b) in enumerate(parts):
         others = np.delete(H, k, axis=0).sum(axis=0) + prior  # summed, not subtracted: a trial may alone show something
-        without = np.linalg.solve(others, np.delete(g, k, axis=0).sum(axis=0) + pull)
+        without = solve(others, np.delete(g, k, axis=0).sum(axis=0) + pull)
         out[a:b] += J[a:b] @ (together - without)
     return LeftOut(study, out.reshape(study.evidence.present.shape))
 
