@@ -23,7 +23,7 @@ class JointFriction(Effect):
     id = "joint_friction"
     parameters = (
         Parameter("torque", 0.0, "N*m", 0.0, 1.0, "bearings, seals, pins of a small joint: 0.1-50 mN m", scale=2e-3),
-        Parameter("presliding", 1e-2, "rad", 1e-3, 0.3, "turn from sticking to sliding; ours", scale=5e-3),
+        Parameter("presliding", 1e-2, "rad", 4e-3, 0.3, "turn from sticking to sliding; ours", scale=5e-3),
     )
     shape = ("presliding",)
     akin = ("tendon_friction",)

@@ -18,9 +18,7 @@ class TendonElasticity(Effect):
     """
 
     id = "tendon_elasticity"
-    parameters = (
-        Parameter("stretch", 0.0, "m/N", 0.0, 1e-2, "ropes and lines of a metre: 0.01-1 mm/N", scale=2e-5),
-    )
+    parameters = (Parameter("stretch", 0.0, "m/N", 0.0, 1e-2, "ropes and lines of a metre: 0.01-1 mm/N", scale=2e-5),)
     guesses = ({"stretch": 5e-5},)
     moves_with = "tension against displacement"
 
