@@ -127,7 +127,7 @@ def test_antagonists_that_bed_in_follow_a_hyperbolic_tangent_and_then_hookes_law
 def test_the_loop_of_joint_friction_is_its_torque_times_the_compliance_whatever_load_and_pretension(torque: float) -> None:
     held, q = 0.01, sine()
     for pretension in (15.0, 30.0):
-        rubs = law("joint_friction", torque=held, presliding=2e-3)
+        rubs = law("joint_friction", torque=held, presliding=5e-3)
         a = solved({**ELASTIC, "tendons.pretension": pretension}, (rubs,), run(q, torque)).others["angle"][:, 1]
         assert width_of(a, q) == pytest.approx(2 * held * STRETCH / (2 * PULLEY**2), rel=1e-9)
 
@@ -233,10 +233,11 @@ def day(half: float, seed: int = 0) -> Recording:
 def test_a_diagnosis_names_friction_where_there_is_friction_and_nothing_where_there_is_none() -> None:
     half = np.deg2rad(2.0)
     found = diagnose(day(half), Twin.of(ROBOT), Settings(jobs=1))
-    # A play whose width no load changes is what either friction makes of it while both cables are taut; one is claimed.
+    # A play whose width no load changes is what either friction makes of it while both cables are taut: one is claimed, never both.
     (claim,) = found.claims
-    assert claim.effect in ("tendon_friction", "joint_friction")
-    assert {claim.effect} ^ {"tendon_friction", "joint_friction"} <= {e for rivals in found.ambiguous for e in rivals}
+    both = {"tendon_friction", "joint_friction"}
+    assert claim.effect in both
+    assert found.runners_up[0].effect in both
     mu, torque = (claim.parameters[n].value if n in claim.parameters else 0.0 for n in ("mu", "torque"))
     held = PRETENSION * np.tanh(mu * WRAP) + torque / abs(PULLEY) / 2  # N, half of what friction holds
     # rad: half the loop of the friction found, at the stretch that the loads show; both are known to a few per cent
