@@ -22,10 +22,11 @@ def bench(*trials: Any) -> Any:
 
 
 def test_trials_share_a_level_where_their_condition_is_alike() -> None:
-    two = bench(trial(torque=0.0101), trial(torque=0.05), trial(torque=0.0104), trial(torque=0.0502))
-    assert levels(two, range(4)) == {"load torque": [[0, 2], [1, 3]]}
-    paced = bench(trial(), trial(seconds=0.1), trial(seconds=1.1))
-    assert levels(paced, range(3)) == {"rate of pull": [[0, 2], [1]]}
+    loaded = bench(*(trial(torque=t) for t in (0.0101, 0.05, 0.0104, 0.09)))
+    assert levels(loaded, range(4)) == {"load torque": [[0, 2], [1], [3]]}
+    assert levels(loaded, range(3)) == {}, "two levels: one left out leaves no trend"
+    paced = bench(trial(), trial(seconds=0.1), trial(seconds=1.1), trial(seconds=20.0))
+    assert levels(paced, range(4)) == {"rate of pull": [[3], [0, 2], [1]]}
     assert levels(bench(trial(), trial(), trial()), range(3)) == {}, "one condition only"
     assert levels(bench(trial(), trial(0.01), trial(0.02)), range(3)) == {}, "a level of one trial is that trial left out"
 

@@ -39,11 +39,12 @@ def compare(folder: Path, asked: Sequence[int] = LOADS) -> list[Row]:
     lines = []
     for recording in cable_tool.read_all(folder):
         loads = sorted({percent(t.name) for t in recording.trials})
-        chosen = {min(loads, key=lambda x: abs(x - a)) for a in asked}
-        if len(chosen) < 2:
-            lines.append(Row(recording.title, "", "", f"loads {loads}: two are needed to fit", None))
-        else:
-            lines += judged(recording, chosen)
+        if len(loads) < 2:
+            lines.append(Row(recording.title, "", "", f"{loads[0]} % load alone: two loads are needed to fit", None))
+            continue
+        first = min(loads, key=lambda x: abs(x - asked[0]))
+        second = min((x for x in loads if x != first), key=lambda x: abs(x - asked[1]))
+        lines += judged(recording, {first, second})
     return lines
 
 

@@ -23,8 +23,8 @@ SHOWN = {"payload": "payload", "torque": "load torque", "rate": "rate of pull", 
 
 @dataclass(frozen=True)
 class Beyond:
-    """Of one condition: what it is, how many levels there are, the error (sigmas) on trials (`inside`) and on levels (`beyond`) left
-    out in turn, and which claimed effects lessen the one and enlarge the other."""
+    """Of one condition: what it is, how many levels there are, the error (sigmas) on trials (`inside`) and on levels (`beyond`)
+    left out in turn, and which claimed effects lessen the one and enlarge the other."""
 
     condition: str
     levels: int
@@ -61,9 +61,10 @@ def _each(final: Weighed, gated: Gated, added: Sequence[str]) -> dict[str, Weigh
 
 
 def levels(bench: Bench, trials: Sequence[int]) -> dict[str, list[list[int]]]:
-    """By condition the positions in `trials` that share a level, where there are several levels of several trials each.
+    """By condition the positions in `trials` that share a level, where there are three levels or more, not all of one trial.
 
-    Loads within a tenth of their range are one level, rates within half a decade; a level of one trial is that trial left out.
+    Loads within a tenth of their range are one level, rates within half a decade. Two levels would leave one, which shows no trend
+    to go on; and a level of one trial is that trial left out.
     """
     inputs = [bench.inputs[k] for k in trials]
     speed = [np.median(np.abs(np.diff(i.command, axis=0)).max(axis=1) / np.diff(i.time)) for i in inputs]
@@ -75,7 +76,7 @@ def levels(bench: Bench, trials: Sequence[int]) -> dict[str, list[list[int]]]:
     found = {name: _apart(v, 1.0 if name == "rate" else EDGE * np.ptp(v)) for name, v in values.items()}
     mounts = [tuple(np.round(i.loads.gravity, 3)) for i in inputs]
     found["mount"] = [[k for k, m in enumerate(mounts) if m == each] for each in dict.fromkeys(mounts)]
-    return {SHOWN[name]: groups for name, groups in found.items() if len(groups) > 1 and max(map(len, groups)) > 1}
+    return {SHOWN[name]: groups for name, groups in found.items() if len(groups) > 2 and max(map(len, groups)) > 1}
 
 
 def _apart(values: np.ndarray, gap: float) -> list[list[int]]:

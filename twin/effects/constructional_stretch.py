@@ -28,7 +28,7 @@ class ConstructionalStretch(Effect):
     )
     shape = ("tension",)
     needs = frozenset({"antagonists"})
-    guesses = ({"elongation": 1e-3, "tension": 1.0}, {"elongation": 5e-4, "tension": 2.0})
+    guesses = ({"elongation": 1e-3, "tension": 1.0}, {"elongation": 4e-4, "tension": 2.0})
     moves_with = "load that changes sides (soft around none), and loops that narrow under load"
 
     def route(self) -> Route:
