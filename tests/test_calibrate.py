@@ -18,6 +18,7 @@ from twin.diagnose import Settings, calibration
 from twin.diagnose.doubts import strained, unlikely
 from twin.diagnose.ranking import projected
 from twin.diagnose.split import split
+from twin.information import solve, untold
 from twin.measurements import Recording
 from twin.quantities import Parameter
 from twin.residual import Noise, Whitener
@@ -325,6 +326,23 @@ def test_a_thousandth_of_its_range_from_an_end_a_parameter_stands_there() -> Non
     for value, at in ((-49.95, True), (-49.85, False), (0.0, False), (49.85, False), (49.95, True)):
         moved = model.at(np.array([value / STEP, 0.0, 0.0, 0.0]))
         assert Fit(Evaluation(moved, [], [], np.zeros(5)), np.zeros((5, 4)), 0.0).at_bound().tolist() == [at, False, False, False]
+
+
+def test_twins_and_what_moves_nothing_are_said_to_be_untold_and_the_search_goes_on() -> None:
+    """Two numbers that move the data alike, in whole numbers so that no rounding saves it, and one that moves nothing."""
+    rng = np.random.default_rng(0)
+    A = np.zeros((100, 4))
+    A[:, 0] = A[:, 1] = 1e6 * rng.integers(1, 9, 100)
+    A[:, 2] = rng.normal(size=100) * LOOKS[2]
+    free = tuple(Free(None, replace(f.parameter, std=None)) for f in FREE)
+    found = fit(Linear(A, A[:, 0] + rng.normal(size=100)), Model(Twin.of(ROBOT), free))
+    assert found.unfixed() == ["p0", "p1", "p3"]
+    assert [f.std is None for f in found.fitted(None).values()] == [True, True, False, True]
+    assert found.effective_parameters() == pytest.approx(2.0)
+    together = found.model.vector()
+    assert together[0] + together[1] == pytest.approx(1.0, abs=1e-6)  # steps: what the data do tell of the twins
+    np.testing.assert_array_equal(untold(np.diag([1e-30, 1.0, 0.0])), [False, False, True])  # units do not decide
+    np.testing.assert_allclose(solve(np.diag([1e-30, 2.0, 0.0]), np.array([1e-30, 1.0, 0.0])), [1.0, 0.5, 0.0])
 
 
 def test_a_belief_that_data_hardly_narrow_is_called_unfixed() -> None:

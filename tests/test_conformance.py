@@ -25,7 +25,12 @@ FIXED = {
     "temperature_softening", "base_tilt", "camera_misalignment", "tip_payload", "contact", "load_cell_gain", "load_cell_bias",
     "load_cell_drift", "load_cell_crosstalk", "sensor_gain", "sensor_drift", "sensor_hysteresis",
 }  # fmt: skip
-NEW = {"backbone_ageing", "transmission_error"}  # identifiers of our own, beside those of the contract
+NEW = {
+    "backbone_ageing",
+    "transmission_error",
+    "constructional_stretch",
+    "joint_friction",
+}  # identifiers of our own, beside those of the contract
 
 laws = pytest.mark.parametrize("law", catalogue().values(), ids=catalogue().keys())
 
@@ -69,7 +74,23 @@ def bend(name: str, start: float, peak: float) -> Trial:
     )
 
 
+JAW = (
+    Channel("joint_1_angle", "input", "rad", 1e-3), Channel("joint_2_torque", "input", "N*m"),
+    Channel("joint_2_angle", "output", "rad", 1e-3),
+)  # fmt: skip
+
+
+def turned(name: str, start: float, torque: float) -> Trial:
+    """The drum of a jaw turned there and back under a load (N m)."""
+    n = 41
+    q = 0.5 * np.sin(2 * np.pi * np.arange(n) / (n - 1))
+    values = {"joint_1_angle": q, "joint_2_torque": np.full(n, torque), "joint_2_angle": np.zeros(n)}
+    return Trial(name, np.linspace(0.0, 20.0, n), values, start=start)
+
+
 def recording(*trials: Trial) -> Recording:
+    if "joint_1_angle" in trials[0].values:
+        return Recording("cable_tool", "conformance", "simulation", None, JAW, trials)
     felt, heated = "sensor_1_resistance" in trials[0].values, "sma_1_current" in trials[0].values
     robot = "finger" if felt else "continuum"
     return Recording(robot, "conformance", "simulation", np.array([0.0, 0.0, 9.81]), channels(heated, felt), trials)
@@ -79,6 +100,8 @@ def recording(*trials: Trial) -> Recording:
 def two_trials(law: type[Effect]) -> Recording:
     if is_of_sensors(law):
         return recording(bend("a.csv", 0.0, 6e-3), bend("b.csv", 160.0, 4e-3))
+    if is_of_antagonists(law):
+        return recording(turned("a.csv", 0.0, 0.02), turned("b.csv", 160.0, 0.05))
     heated = is_of_springs(law)
     return recording(cycle("a.csv", 0.0, 3.0, 0.0, heated), cycle("b.csv", 160.0, 2.0, 0.02, heated))
 
@@ -86,6 +109,11 @@ def two_trials(law: type[Effect]) -> Recording:
 def is_of_sensors(law: type[Effect]) -> bool:
     """Whether it needs strain-sensing cords, which a backbone has not."""
     return "strain sensors" in law.needs
+
+
+def is_of_antagonists(law: type[Effect]) -> bool:
+    """Whether it needs two tendons that pull against each other on a joint."""
+    return "antagonists" in law.needs
 
 
 def is_of_springs(law: type[Effect]) -> bool:
@@ -164,6 +192,8 @@ def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: R
         change = max(np.abs(a - b).max() for a, b in zip(plain, moved, strict=True))
         if is_of_sensors(law):
             assert 0.05 < change < 300.0  # ohm: more than a cord's last digit, less than a third of it
+        elif is_of_antagonists(law):
+            assert 1e-3 < change < 0.5  # rad: more than an encoder's count, less than the drum's turn
         else:
             assert 1e-6 < change < 0.05  # m: more than a micrometre, less than half the robot
 
@@ -182,7 +212,7 @@ def test_trials_are_independent_but_for_the_clock(law: type[Effect], two_trials:
 @laws
 def test_no_nan_at_the_corners_of_its_bounds(law: type[Effect]) -> None:
     one = bend("a.csv", 0.0, 4e-3) if is_of_sensors(law) else cycle("a.csv", 0.0, 2.0, 0.0, is_of_springs(law))
-    data = recording(one)
+    data = recording(turned("a.csv", 0.0, 0.02) if is_of_antagonists(law) else one)
     n = load(data.robot).n_tendon
     corners = itertools.product(*[(p.low, p.high) for p in law.declared(n)[:4]])
     solved = 0
@@ -204,21 +234,22 @@ def test_a_closed_cycle_takes_energy_and_gives_none(law: type[Effect]) -> None:
         pytest.skip("heat drives springs: what a loop of theirs takes is asked in test_sma.py")
     if is_of_sensors(law):
         pytest.skip("a sensor does no work")
-    once = cycle("a.csv", 0.0, 3.0, 0.0)
+    once = turned("a.csv", 0.0, 0.02) if is_of_antagonists(law) else cycle("a.csv", 0.0, 3.0, 0.0)
     time = np.concatenate([once.time, once.time[-1] + once.time[1:]])
     twice = replace(once, time=time, values={k: np.concatenate([v, v[1:]]) for k, v in once.values.items()})
     for effect in starts(law, recording(once))[:2]:
         if effect.acts_in("sense", "command"):
             pytest.skip("a sensor does no work")
-        twin = Twin(load("continuum"), {}, (effect,))
-        true = simulate(twin, prepare(recording(twice), twin.robot))[0].true
+        data = recording(twice)
+        twin = Twin(load(data.robot), {}, (effect,))
+        true = simulate(twin, prepare(data, twin.robot))[0].true
         n = len(once.time)
         T, d = true.tension[n - 1 :], true.displacement[n - 1 :]
         work = float((0.5 * (T[1:] + T[:-1]) * np.diff(d, axis=0)).sum())
         # An elastic loop closes to the trapezoid's error: 4e-6 J either way for a wall's kink between two of 40 samples (3e-7 with
         # 160, 1e-9 with 640), 1e-9 J for the others; friction and creep lose more.
         assert work > -5e-6
-        if law.id in ("tendon_friction", "backbone_creep"):
+        if law.id in ("tendon_friction", "joint_friction", "backbone_creep"):
             assert work > 1e-5
 
 

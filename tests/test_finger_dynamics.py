@@ -173,12 +173,10 @@ def test_a_cell_inside_out_is_named_with_its_time() -> None:
     assert "inside out" in path.ended or "no finite speed" in path.ended
 
 
-@pytest.mark.parametrize("law", ["contact", "tendon_elasticity"])
-def test_what_is_not_stepped_says_so(law: str) -> None:
-    values = {"contact": {"stiffness": 50.0}, "tendon_elasticity": {"stretch": 1e-5, "stiffening": 0.2}}[law]
-    effect = named(law)(values, n_tendon=4)
+def test_what_is_not_stepped_says_so() -> None:
+    effect = named("contact")({"stiffness": 50.0}, n_tendon=4)
     loads = effect.surround(Loads(HANGING))
-    with pytest.raises(SolveError, match=r"static equilibria|remove that effect"):
+    with pytest.raises(SolveError, match="static equilibria"):
         Started.of(finger(), Problem(np.zeros(1), np.zeros((1, 4)), loads, effect.route(), drives=HELD))
 
 

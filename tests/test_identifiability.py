@@ -114,7 +114,7 @@ def usual() -> dict[str, Visibility]:
 
 
 def test_every_effect_has_a_row_and_only_what_is_not_logged_is_never_seen(usual: dict[str, Visibility]) -> None:
-    backbone = {name for name, law in catalogue().items() if "strain sensors" not in law.needs}
+    backbone = {name for name, law in catalogue().items() if not law.needs & {"strain sensors", "antagonists"}}
     of_lengths = {name for name in backbone if all_effects()[name].by_length}  # tensions are commanded here
     of_springs = {name for name, law in catalogue().items() if law(n_tendon=3).acts_in("spring")}  # none pull here
     assert set(usual) == backbone - of_springs - of_lengths

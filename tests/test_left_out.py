@@ -54,6 +54,14 @@ def test_it_is_what_refits_without_each_trial_give() -> None:
     assert found.square > float(np.mean(fit.z**2)), "what is left out is predicted worse than what is fitted"
 
 
+def test_trials_of_one_condition_are_left_out_together() -> None:
+    study, fit, J, z0 = linear(np.random.default_rng(3))
+    found = left_out(study, fit, [[0, 2], [1]]).z.ravel()
+    apart = np.repeat([0, 1, 0], TRIALS) == 1
+    expected = np.where(apart, (z0 + J @ solved(J, z0, ~apart)), (z0 + J @ solved(J, z0, apart)))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
+
+
 def test_a_fit_that_has_not_converged_is_not_taken_further() -> None:
     """The step all trials together would take is no consequence of leaving one out: it stays in the residual."""
     study, fit, J, z0 = linear(np.random.default_rng(3), off=0.1)

@@ -19,6 +19,7 @@ from twin.bench import Bench
 from twin.body import TOLERANCE
 from twin.effects import Effect, named
 from twin.errors import SolveError
+from twin.information import solve, untold
 from twin.quantities import Fitted, Parameter
 from twin.residual import Whitener
 from twin.robots import Robot
@@ -188,13 +189,14 @@ class Fit:
     def effective_parameters(self) -> float:
         """How many parameters the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
         data = self.J.T @ self.J
-        return float(np.trace(np.linalg.solve(self.information() + 1e-12 * np.eye(len(data)), data)))
+        return float(np.trace(solve(self.information(), data)))
 
     def fitted(self, effect: str | None) -> dict[str, Fitted]:
-        """Values and standard errors of the robot's (None) or an effect's free parameters."""
+        """Values and standard errors of the robot's (None) or an effect's free parameters; no error where nothing tells."""
+        blind = untold(self.information())
         return {
-            f.parameter.name: Fitted(self.model.value(f), float(s), f.parameter.unit)
-            for f, s in zip(self.model.free, self.std(), strict=True)
+            f.parameter.name: Fitted(self.model.value(f), None if b else float(s), f.parameter.unit)
+            for f, s, b in zip(self.model.free, self.std(), blind, strict=True)
             if f.effect == effect
         }
 
@@ -204,10 +206,11 @@ class Fit:
         return np.array([min(x - p.low, p.high - x) < BOUND * (p.high - p.low) for x, p in at], bool)
 
     def unfixed(self) -> list[str]:
-        """Labels of the parameters the data do not fix: their standard error stays near their prior's."""
+        """Labels of the parameters the data do not fix: their standard error stays near their prior's, or nothing tells them, or
+        not from each other."""
         out = []
-        for f, s in zip(self.model.free, self.std(), strict=True):
-            if f.parameter.std is not None and s > UNFIXED * f.parameter.std:
+        for f, s, b in zip(self.model.free, self.std(), untold(self.information()), strict=True):
+            if b or (f.parameter.std is not None and s > UNFIXED * f.parameter.std):
                 out.append(f.label)
         return out
 
@@ -273,7 +276,7 @@ def fit(
 def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """argmin 1/2 d'Hd + g'd within low <= d <= high."""
     L = np.linalg.cholesky(H + 1e-12 * np.trace(H) * np.eye(len(g)))
-    d = -np.linalg.solve(H, g)
+    d = -solve(H, g)
     if np.all((d >= low) & (d <= high)):
         return d
     room = np.maximum(high - low, 1e-9)

@@ -7,7 +7,7 @@ Prediction, a loaded robot, controllers and rollouts all go through here:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,10 +62,15 @@ class Laws:
 
     @property
     def route(self) -> Route:
-        """Along the tendons: the first friction, and all stretch."""
+        """Along the tendons: the first friction of each kind, the first that beds in, and all stretch."""
         routes = [e.route() for e in self.effects]
-        rubbing = next((r for r in routes if r.mu > 0.0), Route())
-        return replace(rubbing, stretch=sum(r.stretch for r in routes), stiffening=sum(r.stiffening for r in routes))
+        rubbing, beds, bearing = (
+            next((r for r in routes if getattr(r, kind) > 0.0), Route()) for kind in ("mu", "bedding", "bearing")
+        )
+        return Route(
+            rubbing.mu, rubbing.presliding, sum(r.stretch for r in routes), beds.bedding, beds.bedding_tension,
+            bearing.bearing, bearing.bearing_presliding,
+        )  # fmt: skip
 
     @property
     def creep(self) -> Creep:

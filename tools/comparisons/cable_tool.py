@@ -25,6 +25,7 @@ from twin.robots import load
 from twin.twin import Twin
 
 FITTED = {("load20", "0.1Hz"), ("load30", "0.1Hz"), ("load20", "0.3Hz"), ("load30", "0.3Hz")}
+FRICTION = {"tendon_friction", "joint_friction"}  # while no cable falls slack no data tell one from the other
 TESTED_LOADS, TESTED_RATE = ("load10", "load40"), "0.5Hz"
 
 
@@ -44,7 +45,7 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
     worst = max(abs(modelled / measured - 1.0) for measured, modelled in widths.values())
     told = ", ".join(f"{name[4:]} %: {measured:.1f}/{modelled:.1f}" for name, (measured, modelled) in widths.items())
     claimed = {c.effect for c in found.claims}
-    named = "tendon_friction" in claimed and bool(claimed & {"tendon_elasticity", "tendon_backlash"})
+    named = bool(claimed & FRICTION) and bool(claimed & {"constructional_stretch", "tendon_elasticity", "tendon_backlash"})
     alone = ", ".join(f"{c.effect} {np.rad2deg(c.error):.2f}" for c in found.claims)
     return [
         Row(

@@ -8,11 +8,13 @@ speed is the power that goes in. It is context: most of it is friction before th
 from __future__ import annotations
 
 import gzip
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from tools.importers.importer import Dropped
+from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 
 TOOL = "Tool_4_Maryland_R_5"
@@ -23,6 +25,7 @@ START_UP = 1.0  # s
 MEAN = 40  # rows
 IN_TURN, OUT_TURN = 8192.0, 4000.0  # counts a turn, encoders at input and output
 TORQUE = 3.9811e-5  # N m a count, both cells
+FULL_LOAD = 0.116  # N m, 100 %: six loads of the three tools read here lie within 3 % of it, times their per cent
 # rad: how the output's loop repeats from rate to rate, 0.44-0.51 deg at the four loads, tested runs among them; a count is 0.09
 REPEATS = np.deg2rad(0.5)
 
@@ -41,8 +44,42 @@ def read_other(folder: Path, tool: str) -> Recording:
     return _recording(tool, [_run(folder, f"{tool}/{n}.TXT.gz", w, Dropped()) for n, w in zip(OTHERS[tool], labels, strict=True)])
 
 
+def read_all(folder: Path) -> list[Recording]:
+    """Every run below a folder (*.TXT or *.TXT.gz), a recording for each tool and pose.
+
+    A folder holds one tool; the last digit of a file's name is its load, and of three digits the others are a pose. Headers were
+    edited by hand and may be wrong: load and rate are told by torque and angle themselves. Raises DataError where there is no run.
+    """
+    found: dict[str, list[Path]] = {}
+    for path in sorted(p for p in folder.rglob("*") if p.name.lower().endswith((".txt", ".txt.gz"))):
+        stem = path.name.partition(".")[0]
+        if stem.isdigit():
+            pose = stem[:-1] if len(stem) > 2 else ""
+            found.setdefault(f"{path.parent.name} {pose}".strip(), []).append(path)
+    if not found:
+        raise DataError(f"{folder}: no runs; they are files of digits, as 203.TXT.gz")
+    return [_recording(tool, _named([_run(p.parent, p.name, p.name, Dropped()) for p in paths])) for tool, paths in found.items()]
+
+
+def _named(runs: list[Trial]) -> list[Trial]:
+    """Runs by load and rate, as measured, the lightest first; those that are alike are numbered."""
+    seen: dict[str, int] = {}
+    out = []
+    for run in sorted(runs, key=lambda r: abs(r.values["joint_2_torque"].mean())):
+        q = run.values["joint_1_angle"]
+        power = np.abs(np.fft.rfft((q - q.mean()) * np.hanning(len(q)), 16 * len(q)))
+        rate = np.fft.rfftfreq(16 * len(q), float(np.median(np.diff(run.time))))[int(power.argmax())]
+        load = 10 * round(abs(run.values["joint_2_torque"].mean()) / FULL_LOAD * 10)
+        label = f"load{load}_{rate:.1f}Hz"
+        seen[label] = seen.get(label, 0) + 1
+        again = f"_{seen[label]}" if seen[label] > 1 else ""
+        out.append(replace(run, name=f"{label}{again}.csv"))
+    return out
+
+
 def _run(folder: Path, name: str, label: str, dropped: Dropped) -> Trial:
-    with gzip.open(folder / name, "rt", encoding="latin-1") as file:
+    opened = gzip.open if name.endswith(".gz") else open
+    with opened(folder / name, "rt", encoding="latin-1") as file:
         rows = np.loadtxt(file, delimiter=",", comments="%")
     kept = rows[rows[:, 0] > START_UP]
     dropped.count(name, "start-up transient", len(rows) - len(kept), len(rows))
@@ -64,4 +101,4 @@ def _recording(tool: str, trials: list[Trial]) -> Recording:
         Channel("joint_2_angle", "output", "deg", float(REPEATS)), Channel("joint_1_torque", "context", "N*m"),
     )  # fmt: skip
     source = f"hardware: MRDLab/mis-tool-characterization, {tool}, ODbL (O'Neill, Stephens, Kowalewski, RA-L 2018)"
-    return Recording("cable_tool", "MRDLab cable tool", source, None, channels, tuple(trials))
+    return Recording("cable_tool", f"MRDLab {tool}", source, None, channels, tuple(trials))

@@ -41,8 +41,6 @@ class HeldFinger:
         if not isinstance(body, SoftBody):
             raise DataError(f"robot {twin.robot.name!r} is no silicone finger: only the family 'soft' is held by its shape")
         self.body, self.route = body, twin.laws.route
-        if self.route.stiffening > 0.0:
-            raise DataError("tendons that stiffen are not solved for a silicone body; remove that effect")
         self.statics = SoftStatics(body)
         self.rest = named_points(twin.robot).rest
         self._weights = body.lattice.weights(self.rest)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.diagnose.beyond import beyond
 from twin.diagnose.doubts import unlikely
 from twin.diagnose.gate import Gated
 from twin.diagnose.judge import Judgement
@@ -40,7 +41,8 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     words += "".join(undecided(d.effect, d.rival) for d in gated.doubts)
     z = final.fit.z.reshape(final.discrepancy.mean.shape)
     rebuilt = (mixed(study.bench, judged.rigs).strip(),) if judged.rigs else ()
-    notices = (*unlikely(final.fit), *judged.signs.strained, *rebuilt)
+    far = tuple(b.words() for b in beyond(study, final, gated))
+    notices = (*unlikely(final.fit), *judged.signs.strained, *rebuilt, *far)
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)
 
 

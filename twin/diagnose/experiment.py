@@ -15,6 +15,7 @@ from twin.calibrate import Evaluation, Fit, Objective
 from twin.diagnose.thresholds import CLEAR, HEAVIEST, HELD, LEAST_LOAD, MOST_RUNS
 from twin.effects import Drive
 from twin.errors import SolveError
+from twin.information import solve
 from twin.residual import Noise, Whitener
 
 
@@ -124,4 +125,4 @@ def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> 
     J = objective.jacobian(at, range(len(b.model.free)))
     inner = b.information() + J.T @ J
     u = J.T @ d
-    return float(max(0.0, d @ d - u @ np.linalg.solve(inner + 1e-9 * np.eye(len(u)), u)))
+    return float(max(0.0, d @ d - u @ solve(inner + 1e-9 * np.eye(len(u)), u)))

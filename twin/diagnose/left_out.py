@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -12,6 +13,7 @@ from twin.calibrate import Fit, prior_pull, prior_weight
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BLOCKS, WORSE
 from twin.evaluate import headline
+from twin.information import solve
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,9 @@ class LeftOut:
         return self.square > than.square or self.headline > WORSE**2 * than.headline
 
 
-def left_out(study: Study, fit: Fit) -> LeftOut:
-    """Residuals on trials left out in turn, to first order; a single trial by quarters.
+def left_out(study: Study, fit: Fit, groups: Sequence[Sequence[int]] | None = None) -> LeftOut:
+    """Residuals on trials left out in turn, to first order; a single trial by quarters. With `groups`, which part the trials by
+    their positions, those of a group are left out together.
 
     With g_k = J_k'z_k and p the priors' gradient, one step from the fit leads the others of trial k to
     d_k = -(sum_(j != k) J_j'J_j + P)^-1 (sum_(j != k) g_j + p), less the step that all together would still take; z_k becomes
@@ -61,12 +64,13 @@ def left_out(study: Study, fit: Fit) -> LeftOut:
     parts = list(pairwise(_ends(study)))
     H = np.stack([J[a:b].T @ J[a:b] for a, b in parts])
     g = np.stack([J[a:b].T @ z[a:b] for a, b in parts])
-    together = np.linalg.solve(H.sum(axis=0) + prior, g.sum(axis=0) + pull)
+    together = solve(H.sum(axis=0) + prior, g.sum(axis=0) + pull)
     out = z.copy()
-    for k, (a, b) in enumerate(parts):
-        others = np.delete(H, k, axis=0).sum(axis=0) + prior  # summed, not subtracted: a trial may alone show something
-        without = np.linalg.solve(others, np.delete(g, k, axis=0).sum(axis=0) + pull)
-        out[a:b] += J[a:b] @ (together - without)
+    for group in groups or [[k] for k in range(len(parts))]:
+        others = np.delete(H, group, axis=0).sum(axis=0) + prior  # summed, not subtracted: a trial may alone show something
+        without = solve(others, np.delete(g, group, axis=0).sum(axis=0) + pull)
+        for a, b in (parts[k] for k in group):
+            out[a:b] += J[a:b] @ (together - without)
     return LeftOut(study, out.reshape(study.evidence.present.shape))
 
 

@@ -20,6 +20,7 @@ from twin.diagnose.patterns import Dictionary
 from twin.diagnose.ranking import projected
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import ACCEPT, DRAWS, FAINT, GUMBEL_99, LEFT, LINE, MATERIAL
+from twin.information import solve
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ def draws(study: Study, base: Fit, known: Dictionary, seed: int) -> Draws:
     present = evidence.present.ravel()[:, None]
     e = np.random.default_rng(seed).normal(size=(n, DRAWS)) * present
     H = base.J.T @ base.J + np.diag(prior_weight(base.model) ** 2) + 1e-9 * np.eye(k)
-    z = (e - base.J @ np.linalg.solve(H, base.J.T @ e)) * present
+    z = (e - base.J @ solve(H, base.J.T @ e)) * present
     X = np.concatenate([base.J, known.columns], axis=1)
     A = projected(X, X, base)[k:, k:]
     u = known.columns.T @ z
@@ -70,7 +71,7 @@ def draws(study: Study, base: Fit, known: Dictionary, seed: int) -> Draws:
     for pattern in known.patterns:
         i = np.array(pattern.where)
         inner = A[np.ix_(i, i)]
-        falls = np.einsum("id,id->d", u[i], np.linalg.solve(inner + 1e-9 * max(np.trace(inner), 1e-12) * np.eye(len(i)), u[i]))
+        falls = np.einsum("id,id->d", u[i], solve(inner + 1e-9 * max(np.trace(inner), 1e-12) * np.eye(len(i)), u[i]))
         gain = np.maximum(gain, falls - len(i) * np.log(objective.n))
         fall = np.maximum(fall, falls)
     spectrum = Spectrum.of(objective.bench, objective.trials)

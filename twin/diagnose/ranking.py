@@ -11,6 +11,7 @@ from twin.diagnose.evidence import Discrepancy, Evidence
 from twin.diagnose.patterns import Dictionary
 from twin.diagnose.thresholds import STARTS, TOP
 from twin.effects import Start, catalogue
+from twin.information import solve
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
     S = X.T @ VX
     own = np.flatnonzero(~fit.at_bound())
     JJ = S[np.ix_(own, own)] + np.diag(prior_weight(fit.model)[own] ** 2) + 1e-9 * np.eye(len(own))
-    return S - S[:, own] @ np.linalg.solve(JJ, S[own, :])
+    return S - S[:, own] @ solve(JJ, S[own, :])
 
 
 def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective: Objective) -> list[float]:
@@ -79,7 +80,7 @@ def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective:
             continue
         A, u = A[np.ix_(keep, keep)], u[keep]
         # z falls by column * amplitude, columns being changes of the residual: amplitude = -A^-1 u
-        amplitude = -np.linalg.solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), u)
+        amplitude = -solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), u)
         table = {p.name: p for p in catalogue()[pattern.effect].declared(objective.bench.n_tendon)}
         used = [n for n, kept in zip(pattern.amplitudes, keep, strict=True) if kept]
         one_sided = [table[n].low >= table[n].value for n in used]

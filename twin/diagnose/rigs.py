@@ -15,6 +15,7 @@ import numpy as np
 from twin.bench import Bench
 from twin.calibrate import Fit, prior_weight
 from twin.diagnose.thresholds import GROUP, TURNS, WORTH
+from twin.information import solve
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ def rigs(bench: Bench, trials: Sequence[int], fitted: Fit) -> Rigs | None:
     P = np.diag(prior_weight(fitted.model)[own] ** 2) + 1e-9 * np.eye(len(own))
 
     def shift(side: np.ndarray) -> np.ndarray:
-        return np.linalg.solve(H[side].sum(axis=0) + P, g[side].sum(axis=0))
+        return solve(H[side].sum(axis=0) + P, g[side].sum(axis=0))
 
     def fall(side: np.ndarray) -> float:
         return float(g[side].sum(axis=0) @ shift(side))
@@ -48,7 +49,7 @@ def rigs(bench: Bench, trials: Sequence[int], fitted: Fit) -> Rigs | None:
     best, sides = 0.0, None
     for seed in range(len(trials)):
         # From each trial in turn: with the half of the others that its own robot suits best.
-        start = costs(np.linalg.solve(H[seed] + P, g[seed]))
+        start = costs(solve(H[seed] + P, g[seed]))
         side = start <= np.median(start)
         for _ in range(TURNS):
             if not GROUP <= side.sum() <= len(trials) - GROUP:

@@ -71,18 +71,16 @@ class Loads:
 
 @dataclass(frozen=True)
 class Route:
-    """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N) at rest, and its `stiffening` with tension (1/N)."""
+    """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N). Of antagonists also by how much they bed in (m) and
+    over which tension (N), and the torque (N m) by which the joint that they turn rubs, with its pre-sliding turn (rad)."""
 
     mu: float = 0.0
     presliding: float = 4e-4
     stretch: float = 0.0
-    stiffening: float = 0.0
-
-    def elongation(self, tension: np.ndarray) -> np.ndarray:
-        """What a tendon that is slack at rest is longer by under `tension` (N), m: stretch (1 - exp(-k T)) / k, k = stiffening."""
-        if self.stiffening == 0.0:
-            return self.stretch * tension
-        return self.stretch / self.stiffening * -np.expm1(-self.stiffening * tension)
+    bedding: float = 0.0
+    bedding_tension: float = 1.0
+    bearing: float = 0.0
+    bearing_presliding: float = 1e-2
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from twin.compiled import jit
-from twin.effects.effect import Effect, Route
+from twin.effects.effect import Effect, Route, Signals, Start
 from twin.quantities import Parameter
 
 ROUNDING = 1e-3  # rad: |turn angle| is rounded below this, so that a straight tendon has a derivative
@@ -47,8 +48,17 @@ class TendonFriction(Effect):
         Parameter("presliding", 4e-4, "m", 2e-5, 3e-3, "tendon travel from sticking to sliding; our choice", scale=1e-4),
     )
     shape = ("presliding",)
+    akin = ("joint_friction",)
     guesses = ({"mu": 0.1},)
     moves_with = "the direction of pull (hysteresis loop)"
+
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Of antagonists, which always pull and turn several times, a tenth of what shows on a backbone shows as much."""
+        if any(s.antagonists for s in predicted):
+            yield Start({"mu": 0.01}, ("mu", "presliding"))
+        else:
+            yield from super().starts(predicted, n_tendon)
 
     def route(self) -> Route:
         return Route(self["mu"], self["presliding"])

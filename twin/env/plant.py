@@ -90,4 +90,4 @@ class Plant:
         )  # fmt: skip
 
     def _travel(self, path: np.ndarray, tension: np.ndarray) -> np.ndarray:
-        return self._straight - path + self._laws.route.elongation(tension)
+        return self._straight - path + self._laws.route.stretch * tension

@@ -22,7 +22,6 @@ from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.lengths import STIFFEST
 from twin.equilibrium.trial import Driving, Found, How, Near, Slow, run
-from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs
 from twin.springs.spring import no_springs
 
@@ -110,13 +109,9 @@ class Equilibrium:
         return Statics(self.model._address, self.data._address, self.chain, self.spring, law, load)
 
     def driving(self, problem: Problem) -> Driving:
-        """What drives the trial. Raises SolveError for held lengths of tendons that stiffen."""
+        """What drives the trial."""
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
-        if problem.route.stiffening > 0.0 and by_length.any():
-            raise SolveError(
-                f"a length held by a tendon that stiffens ({problem.route.stiffening:.3g} 1/N) is solved for antagonists only"
-            )
         heating = problem.heating
         return Driving(
             time=np.array(problem.time, float),

@@ -3,11 +3,13 @@
 With y = pulley (a - rest) the tendon that the jaw's turn takes of tendon 1 (m), u_i what the drum pulls in, the tendons are longer
 than at rest by u_1 - y and u_2 + y, which gives their tensions T_i at the drum, T_i >= 0, through
 
-    e(T) = stretch (1 - exp(-k (T - T_0))) / k + least (T - T_0),    k = stiffening (k = 0: Hooke's law)
+    e(T) = stretch (T - T_0) + S (1 - exp(-(T - T_0) / T_b)),    S, T_b: by how much and over which tension they bed in
 
-and the jaw stands where its hinge is in balance under the outer torque tau, friction taking its share over the wrap angle w:
+and the jaw stands where its hinge is in balance under the outer torque tau, friction taking its share over the wrap angle w, and
+the bearing a force F_b = torque / |pulley| of its own:
 
-    G(y) = T_1(u_1 - y) exp(-mu w z) - T_2(u_2 + y) exp(mu w z) + tau / pulley = 0,    z = clip(z_0 + (y - y_0) / presliding, -1, 1)
+    G(y) = T_1(u_1 - y) exp(-mu w z) - T_2(u_2 + y) exp(mu w z) - F_b b + tau / pulley = 0
+    z = clip(z_0 + (y - y_0) / presliding, -1, 1),   b likewise, with its own pre-sliding
 
 G falls with y, so that there is one answer: Newton's method within a bracket that shrinks.
 """
@@ -34,19 +36,28 @@ class Pair(NamedTuple):
 
     rest: float  # N, the tension of both at rest
     stretch: float  # m/N
-    stiffening: float  # 1/N
+    bedding: float  # m, S
+    bedding_tension: float  # N, T_b
     loss: float  # mu w
     presliding: float  # m
+    bearing: float  # N, F_b
+    bearing_presliding: float  # m
 
 
 @jit
 def longer(T, pair):
     """What a tendon under T (N) is longer than at rest (m), and its derivative (m/N)."""
-    rest, stretch, stiffening = pair.rest, pair.stretch, pair.stiffening
-    if stiffening == 0.0:
-        return (stretch + STIFFEST) * (T - rest), stretch + STIFFEST
-    bent = math.exp(-stiffening * (T - rest))
-    return stretch / stiffening * (1.0 - bent) + STIFFEST * (T - rest), stretch * bent + STIFFEST
+    rest, stretch = pair.rest, pair.stretch + STIFFEST
+    if pair.bedding == 0.0:
+        return stretch * (T - rest), stretch
+    loose = math.exp(-(T - rest) / pair.bedding_tension)
+    return pair.bedding * (1.0 - loose) + stretch * (T - rest), pair.bedding / pair.bedding_tension * loose + stretch
+
+
+@jit
+def rest_of_bedding(e, pair):
+    """Tension (N) of a tendon that only beds in, e < 0 (m) shorter than at rest."""
+    return pair.rest - pair.bedding_tension * math.log(1.0 - e / pair.bedding)
 
 
 @jit
@@ -55,11 +66,13 @@ def pull(e, pair):
 
     `longer` is concave: from a tension below the answer Newton's steps rise to it and never pass it.
     """
-    rest, stretch, stiffening = pair.rest, pair.stretch, pair.stiffening
-    if e < 0.0 and stretch > 0.0 and stiffening > 0.0:
-        T = max(0.0, rest - math.log(1.0 - stiffening * e / stretch) / stiffening)
+    if e < 0.0 and pair.bedding > 0.0:
+        # Below the answer: what the tendon is shorter by is shared, so that either part alone is a bound from below.
+        T = max(0.0, rest_of_bedding(e, pair), pair.rest + e / (pair.stretch + STIFFEST))
+    elif pair.bedding > 0.0:
+        T = pair.rest
     else:
-        T = max(0.0, rest + e / (stretch + STIFFEST))
+        T = max(0.0, pair.rest + e / (pair.stretch + STIFFEST))
     for _ in range(ROUNDS):
         now, slope = longer(T, pair)
         step = (e - now) / slope
@@ -72,26 +85,30 @@ def pull(e, pair):
 
 
 class At(NamedTuple):
-    """A sample: what the drum pulls in (m), the load tau / pulley (N), and where the jaw last stood: y (m) and slip state z."""
+    """A sample: what the drum pulls in (m), the load tau / pulley (N), and where the jaw last stood: y (m) and slip states z, b."""
 
     u1: float
     u2: float
     load: float
     y0: float
     z0: float
+    b0: float
 
 
 @jit
 def unbalance(y, at, pair):
-    """G and dG/dy at y, with the tensions and the slip state there."""
+    """G and dG/dy at y, with the tensions and the slip states there."""
     T1, k1 = pull(at.u1 - y, pair)
     T2, k2 = pull(at.u2 + y, pair)
     z = slip_state(at.z0, y - at.y0, pair.presliding)
+    b = slip_state(at.b0, y - at.y0, pair.bearing_presliding)
     down, up = math.exp(-pair.loss * z), math.exp(pair.loss * z)
     slope = -k1 * down - k2 * up
     if abs(z) < 1.0:
         slope -= pair.loss / pair.presliding * (T1 * down + T2 * up)
-    return T1 * down - T2 * up + at.load, slope, T1, T2, z
+    if abs(b) < 1.0:
+        slope -= pair.bearing / pair.bearing_presliding
+    return T1 * down - T2 * up - pair.bearing * b + at.load, slope, T1, T2, z, b
 
 
 @jit
@@ -107,18 +124,18 @@ def bracket(at, pair):
 
 
 @jit
-def run(u, load, pair, y_out, T_out):
-    """Follow displacements u (n, 2) m and loads (n,) N: y (n,) m and base tensions (n, 2) N out; returns the last slip state.
+def run(u, load, pair, smooth, y_out, T_out):
+    """Follow displacements u (n, 2) m and loads (n,) N: y (n,) m and base tensions (n, 2) N out.
 
-    The start is without friction: where a trial comes from is not known.
+    The start is without friction, of the `smooth` pair: where a trial comes from is not known.
     """
-    y, z = 0.5 * (u[0, 0] - u[0, 1]), 0.0
+    y, z, b = 0.5 * (u[0, 0] - u[0, 1]), 0.0, 0.0
     for i in range(u.shape[0]):
-        at = At(u[i, 0], u[i, 1], load[i], y, z)
-        now = pair if i > 0 else Pair(pair.rest, pair.stretch, pair.stiffening, 0.0, pair.presliding)
+        at = At(u[i, 0], u[i, 1], load[i], y, z, b)
+        now = pair if i > 0 else smooth
         low, high = bracket(at, now)
         for _ in range(ROUNDS):
-            G, slope, T1, T2, z = unbalance(y, at, now)
+            G, slope, T1, T2, z, b = unbalance(y, at, now)
             if G > 0.0:
                 low = max(low, y)
             elif G < 0.0:
@@ -132,14 +149,14 @@ def run(u, load, pair, y_out, T_out):
                 break
             y = new
         if i == 0:
-            z = 0.0
+            z, b = 0.0, 0.0
         y_out[i], T_out[i, 0], T_out[i, 1] = y, T1, T2
-    return z
 
 
 def follow(u: np.ndarray, load: np.ndarray, pair: Pair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tendon y (n,) m that the jaw has taken of tendon 1, base tensions (n, 2) N and status (n,), under displacements u (n, 2) m
     and loads tau / pulley (n,) N."""
     y, tension = np.empty(len(u)), np.empty((len(u), 2))
-    run(np.ascontiguousarray(u, float), np.ascontiguousarray(load, float), Pair(*(float(x) for x in pair)), y, tension)
+    pair = Pair(*(float(x) for x in pair))
+    run(np.ascontiguousarray(u, float), np.ascontiguousarray(load, float), pair, pair._replace(loss=0.0, bearing=0.0), y, tension)
     return y, tension, np.where(np.isfinite(y), DIRECT, NOT_FOUND)

@@ -56,8 +56,11 @@ class Antagonists:
         torques (n, 2) N m that act on them from outside."""
         body, route, u = self.body, problem.route, problem.command
         torque = np.broadcast_to(np.asarray(problem.loads.torque, float), len(u))
-        stretch = body.stretch + route.stretch
-        pair = Pair(body.pretension, stretch, route.stiffening, route.mu * body.wrap, route.presliding)
+        arm = abs(body.pulley)
+        pair = Pair(
+            body.pretension, body.stretch + route.stretch, route.bedding, route.bedding_tension, route.mu * body.wrap,
+            route.presliding, route.bearing / arm, route.bearing_presliding * arm,
+        )  # fmt: skip
         y, tension, status = follow(u, torque / body.pulley, pair)
         q = body.rest + y / body.pulley
         drum = 0.5 * (u[:, 0] - u[:, 1]) / body.drum  # what both tendons have lost is slack

@@ -48,8 +48,8 @@ class Started:
         motion. Raises SolveError where there is no such equilibrium, and for what is not stepped here."""
         if problem.loads.wall[4] > 0.0:
             raise SolveError("a silicone body's motion against a soft wall is not stepped here; use static equilibria")
-        if problem.route.stiffening > 0.0 or problem.heating is not None:
-            raise SolveError("tendons that stiffen and SMA springs do not move a silicone body here; remove that effect or drive")
+        if problem.heating is not None:
+            raise SolveError("SMA springs do not move a silicone body here; remove that drive")
         scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
         body = replace(body, youngs_modulus=scale * body.youngs_modulus, poisson=min(body.poisson, POISSON))
         statics = SoftStatics(body)

@@ -56,11 +56,11 @@ class SoftStatics:
     def solve(self, problem: Problem) -> SoftPath:
         """Equilibria in order; tendons held at lengths are measured from the hanging rest, and so is `path`.
 
-        Where none was found the sample's status is NOT_FOUND and its shape is the one before. Raises SolveError for tendons that
-        stiffen or springs that pull, which nothing here solves.
+        Where none was found the sample's status is NOT_FOUND and its shape is the one before. Raises SolveError for springs
+        that pull, which nothing here solves.
         """
-        if problem.route.stiffening > 0.0 or problem.heating is not None:
-            raise SolveError("tendons that stiffen and SMA springs are not solved for a silicone body; remove that effect or drive")
+        if problem.heating is not None:
+            raise SolveError("SMA springs are not solved for a silicone body; remove that drive")
         with single_thread():
             trial, near = Trial(self, problem), problem.near
             asked = trial.asked()

@@ -1,0 +1,58 @@
+"""Levels of a condition, and an effect that helps inside what was fitted and harms beyond it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from twin.diagnose.beyond import beyond, levels
+
+TIME = np.arange(20.0)
+
+
+def trial(payload: float = 0.0, torque: float = 0.0, seconds: float = 1.0) -> Any:
+    loads = SimpleNamespace(payload=payload, torque=np.full(20, torque), gravity=np.array([0.0, 0.0, 9.81]))
+    return SimpleNamespace(loads=loads, time=seconds * TIME, command=np.sin(0.5 * TIME)[:, None])
+
+
+def bench(*trials: Any) -> Any:
+    return SimpleNamespace(inputs=trials, outputs=[SimpleNamespace(group="angle")])
+
+
+def test_trials_share_a_level_where_their_condition_is_alike() -> None:
+    loaded = bench(*(trial(torque=t) for t in (0.0101, 0.05, 0.0104, 0.09)))
+    assert levels(loaded, range(4)) == {"load torque": [[0, 2], [1], [3]]}
+    assert levels(loaded, range(3)) == {}, "two levels: one left out leaves no trend"
+    paced = bench(trial(), trial(seconds=0.1), trial(seconds=1.1), trial(seconds=20.0))
+    assert levels(paced, range(4)) == {"rate of pull": [[3], [0, 2], [1]]}
+    assert levels(bench(trial(), trial(), trial()), range(3)) == {}, "one condition only"
+    assert levels(bench(trial(), trial(0.01), trial(0.02)), range(3)) == {}, "a level of one trial is that trial left out"
+
+
+def weighed(J: np.ndarray, y: np.ndarray, effects: tuple[str, ...]) -> Any:
+    x = np.linalg.lstsq(J, y, rcond=None)[0]
+    free = [SimpleNamespace(parameter=SimpleNamespace(std=None, step=1.0, value=0.0)) for _ in x]
+    model = SimpleNamespace(free=free, vector=lambda: x)
+    fit = SimpleNamespace(J=-J, z=y - J @ x, model=model, at_bound=lambda: np.zeros(len(x), bool))
+    return SimpleNamespace(fit=fit, effects=effects)
+
+
+def test_an_effect_that_takes_what_grows_with_the_payload_for_a_square_is_told_to_harm_beyond() -> None:
+    """Measured: a load's bend that saturates. A parabola fits three payloads better than a line does, and misses one left out by
+    more; a law that is right helps on both."""
+    load = np.repeat([0.0, 1.0, 2.0, 3.0], 40)
+    rng = np.random.default_rng(0)
+    y = np.tanh(2.0 * load) + 0.05 * rng.normal(size=160)
+    day = bench(*(trial(payload) for payload in np.repeat([0.0, 0.01, 0.02, 0.03], 2)))
+    study: Any = SimpleNamespace(
+        bench=day, trials=range(8), objective=SimpleNamespace(n=160), evidence=SimpleNamespace(present=np.ones((160, 1), bool))
+    )
+    line = np.column_stack([np.ones(160), load])
+    for name, column, harms in (("cube", load**3 - 4 * load**2, True), ("right", np.tanh(2.0 * load), False)):
+        final, without = weighed(np.column_stack([line, column]), y, (name,)), weighed(line, y, ())
+        (found,) = beyond(study, final, SimpleNamespace(without={name: without}))
+        assert (found.condition, found.levels, found.harmful) == ("payload", 4, (name,) if harms else ())
+        assert found.beyond >= found.inside
+        assert ("harms beyond" in found.words()) is harms

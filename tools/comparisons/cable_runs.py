@@ -1,0 +1,127 @@
+"""Any folder of cable tool runs: each tool and pose fitted at two loads and judged at all its other ones.
+
+What is fitted is the law that the tools of development follow, capstan friction and elastic cables that bed in, from what those
+showed (`MAKE`); nothing is chosen on the runs judged. The bars are held against a = a_0 + ratio q + compliance tau by least
+squares on the same runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tools.comparisons.cable_tool import loops
+from tools.comparisons.row import Row
+from tools.importers import cable_tool
+from twin.bench import prepare
+from twin.calibrate import Free, Model, Objective, fit
+from twin.effects import named
+from twin.evaluate import evaluate
+from twin.measurements import Recording
+from twin.residual import Noise, Whitener
+from twin.robots import load
+from twin.twin import Twin
+
+LOADS = (20, 60)  # per cent, fitted
+ROUNDS = 4  # of a fit: derivatives of the robot's own numbers are taken once in each, and here they bend
+# Value and spread on the tools of development (R_5, L_Roll_3, L_Pitch_3): what another of the make is believed to have.
+MAKE = {
+    "tendon_friction": {"mu": (0.010, 0.005), "presliding": (3e-5, 3e-5)},
+    "constructional_stretch": {"elongation": (4e-4, 2e-4), "tension": (2.0, 1.0)},
+}
+
+
+def compare(folder: Path, asked: Sequence[int] = LOADS) -> list[Row]:
+    """The rows of every tool and pose below `folder` that has runs at both fitted loads (or the nearest to them) and at others."""
+    lines = []
+    for recording in cable_tool.read_all(folder):
+        loads = sorted({percent(t.name) for t in recording.trials})
+        if len(loads) < 2:
+            lines.append(Row(recording.title, "", "", f"{loads[0]} % load alone: two loads are needed to fit", None))
+            continue
+        first = min(loads, key=lambda x: abs(x - asked[0]))
+        second = min((x for x in loads if x != first), key=lambda x: abs(x - asked[1]))
+        lines += judged(recording, {first, second})
+    return lines
+
+
+def judged(recording: Recording, chosen: set[int]) -> list[Row]:
+    """The rows of one tool, fitted at the loads chosen."""
+    fitted, other = (
+        replace(recording, trials=tuple(t for t in recording.trials if (percent(t.name) in chosen) is inside))
+        for inside in (True, False)
+    )
+    twin = refitted(make(), fitted)
+    told = f"fitted at {' and '.join(str(c) for c in sorted(chosen))} %"
+    inside = f"{linear(fitted, fitted):.2f} -> {evaluate(twin, fitted)['rmse']:.2f} deg"
+    lines = [Row(f"{recording.title}, {told}: linear + load -> twin", "", "", inside, None)]
+    if other.trials:
+        before, after = linear(fitted, other), evaluate(twin, other)["rmse"]
+        share = after / before
+        judged = f"{before:.2f} -> {after:.2f} deg ({100 * share:.0f} %)"
+        lines.append(Row("  at the other loads", "<= 60 %", "<= 35 %", judged, share <= 0.6, share <= 0.35))
+        lines.append(Row("  by load", "", "", _by_load(twin, fitted, other), None))
+    widths = loops(recording, twin.predict(recording))
+    worst = max(abs(b / a - 1.0) for a, b in widths.values())
+    shown = ", ".join(f"{name[4:]} %: {a:.1f}/{b:.1f}" for name, (a, b) in widths.items())
+    lines.append(Row("  loop width by load, measured/twin, deg", "within 30 %", "within 12 %", shown, worst <= 0.3, worst <= 0.12))
+    return lines
+
+
+def _by_load(twin: Twin, fitted: Recording, other: Recording) -> str:
+    """Load by load: linear + load -> twin, and whether it lies inside what was fitted or beyond."""
+    ends = [percent(t.name) for t in fitted.trials]
+    told = []
+    for each in sorted({percent(t.name) for t in other.trials}):
+        runs = replace(other, trials=tuple(t for t in other.trials if percent(t.name) == each))
+        where = "inside" if min(ends) < each < max(ends) else "beyond"
+        told.append(f"{each} % ({where}): {linear(fitted, runs):.2f} -> {evaluate(twin, runs)['rmse']:.2f}")
+    return ", ".join(told)
+
+
+def percent(name: str) -> int:
+    """The load of a run, as its name has it."""
+    return int(name.removeprefix("load").partition("_")[0])
+
+
+def linear(fitted: Recording, judged: Recording) -> float:
+    """RMS error (deg) on the runs judged of a = a_0 + ratio q + compliance tau, least squares on those fitted."""
+
+    def rows(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+        q, tau, a = (
+            np.concatenate([t.values[name] for t in recording.trials])
+            for name in ("joint_1_angle", "joint_2_torque", "joint_2_angle")
+        )
+        return np.column_stack([np.ones_like(q), q, tau]), a
+
+    A, a = rows(fitted)
+    B, b = rows(judged)
+    return float(np.rad2deg(np.sqrt(np.mean((b - B @ np.linalg.lstsq(A, a, rcond=None)[0]) ** 2))))
+
+
+def make() -> Twin:
+    """The tool as described, with the law of its make."""
+    effects = tuple(named(effect)({name: value for name, (value, _) in law.items()}, 2) for effect, law in MAKE.items())
+    return Twin(load("cable_tool"), {}, effects)
+
+
+def refitted(twin: Twin, recording: Recording) -> Twin:
+    """The twin with its robot's own numbers and those of its law fitted to a recording, each held by what is believed of it."""
+    bench = prepare(recording, twin.robot)
+    nothing = [np.zeros((*y.shape, bench.n_tendon)) for y in bench.measured]
+    noise = Noise(np.full(1, cable_tool.REPEATS), np.zeros(bench.n_tendon), np.zeros(1), "repeats")
+    whitener = Whitener(noise, bench.measured, nothing, [i.command for i in bench.inputs])
+    objective = Objective(bench, range(len(bench.inputs)), whitener, 1)
+    tables = {effect: {p.name: p for p in named(effect).declared(2)} for effect in MAKE}
+    law = tuple(
+        Free(effect, replace(tables[effect][name], value=value, std=spread))
+        for effect, numbers in MAKE.items()
+        for name, (value, spread) in numbers.items()
+    )
+    model = Model(twin, (*Model.base(twin.robot).free, *law))
+    for _ in range(ROUNDS):
+        model = fit(objective, model).model
+    return model.twin

@@ -1,0 +1,86 @@
+"""Inside and beyond what was fitted: what the model in force predicts of a trial, and of a whole level of a condition, left out.
+
+A law that holds at every payload that was fitted need not hold at the next one. Where trials span a condition, each of its levels
+is left out at once, to first order as single trials are; an effect that helps on trials left out and harms on levels is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.bench import Bench
+from twin.diagnose.gate import Gated
+from twin.diagnose.left_out import left_out
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import EDGE, PACE, WORSE
+from twin.diagnose.weigh import Weighed
+
+SHOWN = {"payload": "payload", "torque": "load torque", "rate": "rate of pull", "mount": "mount"}
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """Of one condition: what it is, how many levels there are, the error (sigmas) on trials (`inside`) and on levels (`beyond`)
+    left out in turn, and which claimed effects lessen the one and enlarge the other."""
+
+    condition: str
+    levels: int
+    inside: float
+    beyond: float
+    harmful: tuple[str, ...]
+
+    def words(self) -> str:
+        told = (
+            f"left out by {self.condition} ({self.levels} levels): {self.beyond:.2f} sigma are left beyond what was fitted, "
+            f"{self.inside:.2f} inside"
+        )
+        if not self.harmful:
+            return told
+        named = " and ".join(e.replace("_", " ") for e in self.harmful)
+        return f"{told}; {named} helps inside and harms beyond: do not trust it at another {self.condition}"
+
+
+def beyond(study: Study, final: Weighed, gated: Gated) -> tuple[Beyond, ...]:
+    """One for each condition that the fitted trials span; `final` is the model in force."""
+    added = [e for e in gated.without if e in final.effects]
+    inside = {e: left_out(study, w.fit).square for e, w in _each(final, gated, added).items()}
+    out = []
+    for condition, groups in levels(study.bench, study.trials).items():
+        far = {e: left_out(study, w.fit, groups).square for e, w in _each(final, gated, added).items()}
+        harmful = tuple(e for e in added if inside[e] > inside[""] and far[""] > WORSE**2 * far[e])
+        out.append(Beyond(condition, len(groups), float(np.sqrt(inside[""])), float(np.sqrt(far[""])), harmful))
+    return tuple(out)
+
+
+def _each(final: Weighed, gated: Gated, added: Sequence[str]) -> dict[str, Weighed]:
+    """The model in force, and by effect what it is without that effect."""
+    return {"": final, **{e: gated.without[e] for e in added}}
+
+
+def levels(bench: Bench, trials: Sequence[int]) -> dict[str, list[list[int]]]:
+    """By condition the positions in `trials` that share a level, where there are three levels or more, not all of one trial.
+
+    Loads within a tenth of their range are one level, rates within half a decade. Two levels would leave one, which shows no trend
+    to go on; and a level of one trial is that trial left out.
+    """
+    inputs = [bench.inputs[k] for k in trials]
+    speed = [np.median(np.abs(np.diff(i.command, axis=0)).max(axis=1) / np.diff(i.time)) for i in inputs]
+    values = {
+        "payload": np.array([i.loads.payload for i in inputs]),
+        "torque": np.array([np.mean(i.loads.torque) for i in inputs]),
+        "rate": np.log(np.maximum(speed, 1e-12)) / np.log(PACE),
+    }
+    found = {name: _apart(v, 1.0 if name == "rate" else EDGE * np.ptp(v)) for name, v in values.items()}
+    mounts = [tuple(np.round(i.loads.gravity, 3)) for i in inputs]
+    found["mount"] = [[k for k, m in enumerate(mounts) if m == each] for each in dict.fromkeys(mounts)]
+    return {SHOWN[name]: groups for name, groups in found.items() if len(groups) > 2 and max(map(len, groups)) > 1}
+
+
+def _apart(values: np.ndarray, gap: float) -> list[list[int]]:
+    """Positions of values that follow one another closer than `gap`, together."""
+    order = np.argsort(values, kind="stable")
+    cuts = np.flatnonzero(np.diff(values[order]) > max(gap, 1e-12)) + 1
+    return [sorted(part.tolist()) for part in np.split(order, cuts)]
