@@ -48,7 +48,7 @@ def residual(recording: Recording) -> tuple[Bench, list[int], np.ndarray]:
 
 def told_where(recording: Recording) -> str:
     bench, fitted, found, discrepancy = calibrated(recording)
-    at = [readings(bench, report((), t.true)) for t in found.evaluation.traces]
+    at = [readings(bench, report((), t.true)) for t in found.evaluation.traces.values()]
     return where(bench, fitted, discrepancy.mean, at)
 
 

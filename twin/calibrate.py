@@ -23,7 +23,7 @@ from twin.information import solve, untold
 from twin.quantities import Fitted, Parameter
 from twin.residual import Whitener
 from twin.robots import Robot
-from twin.twin import Trace, Twin, Way, readings, report, simulate
+from twin.twin import Trace, Twin, Way, readings, report, simulated
 
 ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
@@ -89,10 +89,10 @@ class Model:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A model's prediction of the fitted trials: traces, raw residuals (n_k, n_output) SI, whitened residual flat (n,)."""
+    """A model's prediction of the fitted trials: traces by trial, raw residuals (n_k, n_output) SI, whitened residual flat (n,)."""
 
     model: Model
-    traces: list[Trace]
+    traces: Mapping[int, Trace]
     raw: list[np.ndarray]
     z: np.ndarray
 
@@ -105,14 +105,13 @@ class Objective:
         self.n = int(sum(np.isfinite(bench.measured[k]).sum() for k in trials))
 
     def predict(
-        self, twin: Twin, near: list[Trace] | None = None, keep: bool = False, once: bool = False
-    ) -> tuple[list[Trace], list[np.ndarray]]:
-        way = Way(near, keep, once, TOLERANCE if keep else ROUGH)
-        traces = simulate(twin, self.bench, trials=self.trials, way=way)
-        own = traces[-len(self.trials) :] if len(traces) == len(self.trials) else [traces[k] for k in self.trials]
-        return traces, [readings(self.bench, report(twin.effects, t.true)) for t in own]
+        self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
+    ) -> tuple[dict[int, Trace], list[np.ndarray]]:
+        way = Way(near or {}, keep, once, TOLERANCE if keep else ROUGH)
+        traces = simulated(twin, self.bench, self.trials, way)
+        return traces, [readings(self.bench, report(twin.effects, traces[k].true)) for k in self.trials]
 
-    def evaluate(self, model: Model, near: list[Trace] | None = None) -> Evaluation:
+    def evaluate(self, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation:
         traces, predicted = self.predict(model.twin, near, keep=True)
         raw = [self.bench.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]
         return Evaluation(model, traces, raw, self.white(raw))
@@ -126,8 +125,7 @@ class Objective:
 
         def column(model: Model, size: float) -> np.ndarray:
             if _same_simulation(at.model.twin, model.twin):
-                own = at.traces if len(at.traces) == len(self.trials) else [at.traces[k] for k in self.trials]
-                predicted = [readings(self.bench, report(model.twin.effects, t.true)) for t in own]
+                predicted = [readings(self.bench, report(model.twin.effects, at.traces[k].true)) for k in self.trials]
             else:
                 predicted = self.predict(model.twin, at.traces, once=once)[1]
             raw = [self.bench.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -109,10 +109,10 @@ def can_step(bench: Bench) -> bool:
 
 @dataclass(frozen=True)
 class Way:
-    """How trials are solved: traces (with kept tangents, of a neighbouring twin, same trials) speed the solves up, with `once` to
-    first order in the difference; `keep` keeps tangents for that."""
+    """How trials are solved: traces by trial (with kept tangents, of a neighbouring twin) speed the solves of these up, with `once`
+    to first order in the difference; `keep` keeps tangents for that."""
 
-    near: Sequence[Trace] | None = None
+    near: Mapping[int, Trace] = field(default_factory=dict)
     keep: bool = False
     once: bool = False
     tolerance: float = TOLERANCE
@@ -123,23 +123,28 @@ def simulate(
 ) -> list[Trace]:
     """The true signals of the bench's trials (all, or those listed) in order of their clock.
 
-    With creep every trial before is simulated too, since the body remembers; with `way.keep` all of them are returned. Raises
-    SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
+    Raises SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
     """
+    wanted = range(len(bench.inputs)) if trials is None else trials
+    found = simulated(twin, bench, wanted, way, dynamic)
+    return [found[k] for k in wanted]
+
+
+def simulated(twin: Twin, bench: Bench, wanted: Sequence[int], way: Way | None = None, dynamic: bool = False) -> dict[int, Trace]:
+    """As `simulate`, by trial; with creep all before the last wanted one, since the body remembers."""
     way, laws, body = way or Way(), twin.laws, twin.body()
     solver, creep = twin.robot.solver(body, dynamic=dynamic and set(bench.drives) <= body.stepped), laws.creep
-    wanted = range(len(bench.inputs)) if trials is None else trials
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.n_slow))
     traces, rested = {}, 0.0
-    for position, k in enumerate(run):
+    for k in run:
         inputs = bench.inputs[k]
         pause = max(0.0, float(inputs.clock[0]) - rested)
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
-        close = way.near[position].path if way.near is not None and len(way.near) == len(run) else None
+        close = way.near[k].path if k in way.near else None
         traces[k] = _trial(twin, body, solver, inputs, delayed, close, way)
-    return [traces[k] for k in (run if way.keep else wanted)]
+    return traces
 
 
 def _trial(

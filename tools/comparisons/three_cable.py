@@ -74,7 +74,7 @@ def with_all(bench: Bench, rows: Sequence[int]) -> tuple[Twin, Twin, str]:
     model, objective, _ = objective_of(bench, Twin.of(bench.robot), list(rows), SETTINGS)
     base = found = fit(objective, model, refresh=True)
     for name in BY_HAND:
-        predicted = [t.true for t in found.evaluation.traces]
+        predicted = [t.true for t in found.evaluation.traces.values()]
         begun = list(named(name).starts(predicted, bench.n_tendon))
         found = min(
             (fit(objective, found.model.with_effect(name, s.values, s.free, bench.n_tendon)) for s in begun), key=lambda f: f.cost

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +33,7 @@ def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings
 
 
 def sensitivity(
-    bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: list[Trace] | None = None
+    bench: Bench, trials: Sequence[int], twin: Twin, predicted: Sequence[np.ndarray], near: Mapping[int, Trace] | None = None
 ) -> list[np.ndarray]:
     """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading.
 
@@ -50,7 +50,7 @@ def sensitivity(
         step = 2.0 * bench.reading[t]
         push = step * np.eye(bench.n_tendon)[t]
         moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
-        traces = simulate(twin, moved, trials=trials, way=Way(near))
+        traces = simulate(twin, moved, trials=trials, way=Way(near or {}))
         for G, y, trace, share in zip(out, predicted, traces, felt[:, t], strict=True):
             G[:, :, t] = share * (readings(bench, report(twin.effects, trace.true)) - y) / step
     return out

@@ -41,7 +41,7 @@ def dictionary(objective: Objective, fit: Fit) -> Dictionary:
     """Patterns of every effect of the catalogue that the model lacks, that finds what it needs and is not akin to one it has."""
     bench = objective.bench
     present = {e.id for e in fit.model.twin.effects}
-    predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces]
+    predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces.values()]
     patterns: list[Pattern] = []
     neighbours: dict[Twin, tuple[Model, float]] = {}
     index: dict[Twin, int] = {}  # several starts may share a pattern

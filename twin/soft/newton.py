@@ -21,9 +21,13 @@ from twin.soft.wall import Skin, press
 
 STEPS = 60
 LONGEST = 6e-3  # m, of a step at any node
-SHRINKS = 0.6  # a tangent is kept while a step leaves less than this of the one before
+SHRINKS = 0.6  # a step that leaves more than this of the one before is a poor one
+PATIENCE = 3  # poor steps, after which a tangent is made anew; a step costs a fiftieth of that
+GROWS = 5.0  # a step longer than the one before by this is lost
+LEARNT = 16  # steps that a tangent learns from
+BENT = 0.1  # a step along which the tangent is further off than by this factor teaches nothing
 SLACK = 1e-9  # m: a gap below this is none
-STALE = 5  # steps after which a tangent that is to be kept is made anew
+STALE = 5  # steps after which a tangent that is wanted is made anew
 NONE, OWN, NEAR = 0, 1, 2  # whose inverse tangent serves: none yet, the state's, or that of the neighbour's sample, used in place
 
 
@@ -39,7 +43,7 @@ class Parts(NamedTuple):
 class Way(NamedTuple):
     """What is asked at each sample: tensions and free lengths (n, t) and which tendons are `held`; stretch (n, t) m/N; forces
     (n_free, 3) N, wall (5,) and the stiffness (n,) they count over; friction and pre-sliding; times (n,) s, amplitude and time
-    (k,) of creep; the step (m) that counts as none, and whether one step is all that is taken."""
+    (k,) of creep; the step (m) that counts as none, whether one step is all that is taken, and whether its tangent is wanted."""
 
     tension: np.ndarray
     free: np.ndarray
@@ -55,6 +59,7 @@ class Way(NamedTuple):
     lag: np.ndarray
     close: float
     once: bool
+    sharp: bool
 
 
 class Kept(NamedTuple):
@@ -91,8 +96,8 @@ class State(NamedTuple):
 
 class Room(NamedTuple):
     """Arrays to work in: forces (nq,), pressures (c, 4), all nodes (n_node, 3), the tangent, what the tendons do, how far each
-    tendon's unit pull moves the nodes (t, nq), relaxed stress (c, q, 6) or (0, 0, 6), and whether the tangent's pressures are
-    foreseen (1,)."""
+    tendon's unit pull moves the nodes (t, nq), relaxed stress (c, q, 6) or (0, 0, 6), whether the tangent's pressures are
+    foreseen (1,), and what the inverse tangent has learnt from steps: B <- (1 + better along') B (LEARNT, nq) each."""
 
     f: np.ndarray
     p: np.ndarray
@@ -102,6 +107,8 @@ class Room(NamedTuple):
     reach: np.ndarray
     relaxed: np.ndarray
     foresees: np.ndarray
+    along: np.ndarray
+    better: np.ndarray
 
 
 @jit
@@ -118,8 +125,6 @@ def along(parts, way, kept, i, state, found, room):
         if steps == 0:
             return i
         if found.inverse.shape[0] > 0:
-            if steps > STALE:
-                renew(parts, way, i, state, room)
             found.borrowed[i] = state.has[0] == NEAR
             if not found.borrowed[i]:
                 found.inverse[i] = state.inverse
@@ -142,18 +147,20 @@ def settle(parts, way, i, state, room, near):
     for t in range(T.size):
         if not way.held[t]:
             state.tension[t] = way.tension[i, t] / way.scale[i]
-    du, dT = np.empty(u.size), np.empty(T.size)
+    du, dT = np.zeros(u.size), np.empty(T.size)
+    learnt, poor = 0, 0
     for step in range(STEPS):
         if not (residual(parts, way, i, state, room) and (state.has[0] != NONE or renew(parts, way, i, state, room))):
             break
-        linear(way, i, state, room, near if state.has[0] == NEAR else state.inverse, du, dT)
+        learnt = linear(way, i, state, room, near if state.has[0] == NEAR else state.inverse, learnt, last < 1e9, du, dT)
         length = np.abs(du).max()
-        if not (length < SHRINKS * last or fresh or way.once):
+        poor += not (length < SHRINKS * last or fresh)
+        if not ((poor <= PATIENCE and length < GROWS * last) or fresh or way.once):
             state.has[0] = NONE
             fails += 1
             if fails > STEPS // 4 or not np.isfinite(length):
                 break
-            last, fresh = 1e9, True  # the next turn makes a new tangent here
+            last, fresh, learnt, poor = 1e9, True, 0, 0  # the next turn makes a new tangent here
             continue
         share = min(1.0, LONGEST / max(length, 1e-12))
         foresee(parts, share * du, room)
@@ -163,10 +170,14 @@ def settle(parts, way, i, state, room, near):
                 state.tension[t] = max(0.0, state.tension[t] + share * dT[t])
         if way.once or length < way.close:
             commit(parts, way, state, room)
+            if way.sharp and step >= STALE:
+                renew(parts, way, i, state, room)
+            elif state.has[0] == OWN and not way.sharp:
+                remember(state.inverse, room, learnt)
             return step + 1
         if share < 1.0:
-            state.has[0] = NONE
-        last, fresh = length, False
+            state.has[0], learnt = NONE, 0
+        last, fresh = length if share == 1.0 else 1e9, False
     state.u[:] = u
     state.tension[:] = T
     state.has[0] = NONE
@@ -210,8 +221,11 @@ def renew(parts, way, i, state, room):
 
 
 @inner
-def linear(way, i, state, room, inverse, du, dT):
-    """Changes of nodes du (nq,) and tensions dT (t,) that solve the linear problem; tendons fall slack or taut on the way."""
+def linear(way, i, state, room, inverse, learnt, learns, du, dT):
+    """Changes of nodes du (nq,) and tensions dT (t,) that solve the linear problem; tendons fall slack or taut on the way.
+
+    The tangent is better by `learnt` steps, and, if it `learns`, by the last, which du held. Returns how many it has learnt from.
+    """
     p, T, reach, nt = room.pulled, state.tension, room.reach, state.tension.size
     push = np.zeros((du.size, 1 + nt), np.float32)
     push[:, 0] = -room.f
@@ -219,6 +233,7 @@ def linear(way, i, state, room, inverse, du, dT):
         if way.held[t]:
             push[:, 1 + t] = p.pull[t]
     moved = np.dot(inverse, push)
+    learnt = corrected(moved, room, learnt, learns, du)
     du[:] = moved[:, 0]
     gap, taut, had = np.empty(nt), np.zeros(nt, np.bool_), np.zeros(nt, np.bool_)
     for t in range(nt):
@@ -246,6 +261,45 @@ def linear(way, i, state, room, inverse, du, dT):
     for t in range(nt):
         if had[t]:
             du -= dT[t] * reach[t]
+    return learnt
+
+
+@inner
+def corrected(moved, room, learnt, learns, step):
+    """Columns `moved` (nq, m) by the inverse tangent as better by steps taken (Broyden's good update); how many of them now."""
+    for k in range(learnt):
+        better(moved, room.along[k], room.better[k])
+    if not learns or learnt == LEARNT:
+        return learnt
+    s, g = room.along[learnt], room.better[learnt]
+    s[:], g[:] = step, moved[:, 0]  # what the step left, by the tangent that led to it
+    size, bent = np.dot(s, s), np.dot(s, s) - np.dot(s, g)
+    if not BENT * size < bent < size / BENT:
+        return learnt
+    g /= bent
+    better(moved, s, g)
+    return learnt + 1
+
+
+@inner
+def better(moved, s, g):
+    """moved += g (s' moved), in place."""
+    nq, m = moved.shape
+    for c in range(m):
+        share = 0.0
+        for a in range(nq):
+            share += s[a] * moved[a, c]
+        for a in range(nq):
+            moved[a, c] += g[a] * share
+
+
+@inner
+def remember(inverse, room, learnt):
+    """The inverse tangent with what it has learnt."""
+    for k in range(learnt):
+        row = np.dot(room.along[k].astype(np.float32), inverse)
+        for a in range(row.size):
+            inverse[a] += np.float32(room.better[k, a]) * row
 
 
 @inner

@@ -7,7 +7,7 @@ import numpy as np
 from twin.soft.body import AROUND, SoftBody, skin_points
 from twin.soft.cables import Cables, unpulled
 from twin.soft.lattice import ACROSS
-from twin.soft.newton import NONE, Parts, Room, State
+from twin.soft.newton import LEARNT, NONE, Parts, Room, State
 from twin.soft.silicone import Cells, Tangent
 from twin.soft.wall import Skin
 
@@ -41,7 +41,7 @@ def room_for(parts: Parts, creeps: bool) -> Room:
     relaxed = np.zeros((*parts.cells.weight.shape, 6)) if creeps else np.empty((0, 0, 6))
     return Room(
         np.empty(nq), np.zeros((cells, 4)), np.zeros((parts.clamped + nq // 3, 3)), tangent, unpulled(parts.cables),
-        np.zeros((len(parts.cables.rest), nq)), relaxed, np.zeros(1, bool),
+        np.zeros((len(parts.cables.rest), nq)), relaxed, np.zeros(1, bool), np.zeros((LEARNT, nq)), np.zeros((LEARNT, nq)),
     )  # fmt: skip
 
 

@@ -78,7 +78,7 @@ class Solid:
         )  # fmt: skip
         way = Way(
             pull.tension[None].copy(), pull.free[None].copy(), _plain(pull.held), pull.stretch[None].copy(), _plain(burden.force),
-            _plain(burden.wall), one, float(pull.mu), float(pull.presliding), np.zeros(1), nothing, nothing, close, False,
+            _plain(burden.wall), one, float(pull.mu), float(pull.presliding), np.zeros(1), nothing, nothing, close, False, True,
         )  # fmt: skip
         problem = self.parts, way, 0, state, self._room, inverse
         if not self._compiled:  # else numba takes what it compiled before for other arrays, and the last bits depend on that

@@ -228,5 +228,5 @@ class Trial:
             tension, free, held, np.outer(scale, np.full(len(held), problem.route.stretch)), self.force, self.wall, scale,
             float(problem.route.mu), float(problem.route.presliding),
             np.array(problem.time[rows], float), np.array(problem.creep.amplitude, float), np.array(problem.creep.time, float),
-            CLOSE * problem.tolerance / TOLERANCE, once,
+            CLOSE * problem.tolerance / TOLERANCE, once, problem.keep,
         )  # fmt: skip
