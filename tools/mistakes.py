@@ -115,11 +115,25 @@ def _text(pattern: str, into: str, count: int = 0) -> Callable[[Path], None]:
     return plant
 
 
-def _constant(pattern: str) -> Callable[[Path], None]:
+def _constant(pattern: str, value: float = 0.0) -> Callable[[Path], None]:
     """A channel that died before the first trial and logs one value."""
 
     def plant(folder: Path) -> None:
-        _edited(folder, lambda c: {n: np.full_like(v, 0.0) if re.fullmatch(pattern, n) else v for n, v in c.items()})
+        _edited(folder, lambda c: {n: np.full_like(v, value) if re.fullmatch(pattern, n) else v for n, v in c.items()})
+
+    return plant
+
+
+def _clouds(turn: np.ndarray, shift: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Callable[[Path], None]:
+    """Point clouds in another unit or frame, or of another robot."""
+
+    def plant(folder: Path) -> None:
+        files = sorted(folder.glob("*.clouds.npz"))
+        if not files:
+            raise ValueError(f"{folder} has no clouds")
+        for file in files:
+            arrays = dict(np.load(file))
+            np.savez_compressed(file, **(arrays | {"points": arrays["points"] @ turn.T + shift}))
 
     return plant
 
@@ -160,7 +174,7 @@ def _rescaled_robot(pattern: str, factor: float) -> Callable[[Path], None]:
 
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-POSITION, DISPLACEMENT, TENSION = r"disk_\d+_[xyz]", r"tendon_\d+_displacement", r"tendon_\d+_tension"
+POSITION, DISPLACEMENT, TENSION = r"(disk|marker)_\d+_[xyz]", r"tendon_\d+_displacement", r"tendon_\d+_tension"
 
 MISTAKES: dict[str, Callable[[Path], None]] = {
     "positions in m under mm": _scaled(POSITION, 1e-3),
@@ -193,6 +207,18 @@ MISTAKES: dict[str, Callable[[Path], None]] = {
     "a trial twice": _twice("slow_1"),
     "a trial of another robot": _framed(100.0 / 120.0 * np.eye(3), only="slow_2"),
     "a marker that is not tracked": _constant(r"disk_6_[xyz]"),
+    "resistances in kohm under ohm": _scaled(r"sensor_\d+_resistance", 1e-3),
+    "a strain sensor that is shorted": _constant("sensor_2_resistance", 0.2),
+    "a strain sensor that is open": _constant("sensor_2_resistance", 9.9e6),
+    "a strain sensor that stands still": _constant("sensor_2_resistance", 1000.0),
+    "strain sensors 1 and 3 exchanged": _exchanged(("sensor_1_resistance", "sensor_3_resistance")),
+    "strain sensors 1 and 2 exchanged": _exchanged(("sensor_1_resistance", "sensor_2_resistance")),
+    "clouds in mm": _clouds(1e3 * np.eye(3)),
+    "clouds in another frame": _clouds(QUARTER, (0.02, 0.0, 0.03)),
+    "clouds of a finger half as large again": _clouds(1.5 * np.eye(3)),
+    "markers turned by 16 degrees about the axis": _framed(
+        np.array([[np.cos(0.28), -np.sin(0.28), 0.0], [np.sin(0.28), np.cos(0.28), 0.0], [0.0, 0.0, 1.0]])
+    ),
     "a load cell that is not plugged in": _constant("tendon_2_tension"),
     "origin of the markers shifted": _framed(np.eye(3), (0.0, 15.0, 20.0)),
     "start in minutes": _text(r"^start = ([\d.]+)", lambda m: f"start = {float(m[1]) / 60:.3f}"),  # type: ignore[arg-type]

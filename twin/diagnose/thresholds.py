@@ -89,6 +89,13 @@ ROUNDING = _row("ROUNDING", 1.0, "s", "a start written in whole seconds is no ov
 COARSE = _row("COARSE", 100.0, "s", "between readings: a tenth of a second in ms", "derivation: 1000 x 0.1 s")
 DAY_LONG = _row("DAY_LONG", 7200.0, "s", "a trial of more than two hours is rare, of seven seconds in ms usual", "judgement")
 HASTY = _row("HASTY", 0.2, "s", "no tendon-driven robot is moved and read in less", "derivation: a mode of 5 Hz")
+HUNDREDS = _row(
+    "HUNDREDS", 30.0, "ratio", "between this and its inverse no unit is off by a thousand", "derivation: the root of 1000"
+)  # fmt: skip
+ASTRAY = _row(
+    "ASTRAY", 2.0, "ratio", "of markers' distance from their cloud to that of its points from each other: 0.9 on good days",
+    "python -m tools.mistakes SET (a finger's)",
+)  # fmt: skip
 STUCK = _row("STUCK", 0.1, "of the noise", "a channel that scatters by less is not read", "judgement")
 ALIVE = _row("ALIVE", 10.0, "standard deviations of noise", "a motion so large cannot be missed", "derivation: 10 sigma")
 EXPLAINED = _row("EXPLAINED", 0.5, "of an error", "as FITS: what one pattern must take", "judgement: as FITS")

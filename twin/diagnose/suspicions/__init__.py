@@ -8,6 +8,7 @@ frames.py     markers mirrored, turned, shifted
 order.py      tendons and markers exchanged
 trials.py     duplicates, another robot, clocks, milliseconds
 channels.py   dead channels, declared noise, room temperature
+clouds.py     point clouds in another unit, or away from their markers
 described.py  robot.toml off by a thousand
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from twin.bench import Bench
 from twin.diagnose.split import blind
-from twin.diagnose.suspicions import channels, described, frames, order, signs, trials, units
+from twin.diagnose.suspicions import channels, clouds, described, frames, order, signs, trials, units
 from twin.diagnose.suspicions.case import Case, Suspicion
 from twin.diagnose.thresholds import AS_GOOD
 from twin.twin import Twin
@@ -27,7 +28,7 @@ from twin.twin import Twin
 Kind = Callable[[Case], Iterable[Suspicion]]
 SEEN: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs, channels.noise,
-    signs.outputs, signs.size, frames.frame, order.markers,
+    signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, order.tendons, channels.inputs,

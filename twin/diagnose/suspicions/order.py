@@ -13,6 +13,8 @@ from twin.diagnose.suspicions.case import Case, Suspicion, rms
 from twin.diagnose.suspicions.units import best
 from twin.diagnose.thresholds import FITS
 
+BUILT = ("sensor",)  # readings whose level and gain every built robot has its own of
+
 
 def tendons(case: Case) -> Iterator[Suspicion]:
     """Two driving channels exchanged, or all of them counted from another one."""
@@ -51,7 +53,8 @@ def markers(case: Case) -> Iterator[Suspicion]:
     for group, (names, columns) in groups.items():
         alive = np.flatnonzero(~np.isin(columns, dead).any(axis=1))
         names, columns = [names[a] for a in alive], columns[alive]
-        cost = np.array([[rms(y[:, a] - p[:, b]) for b in columns] for a in columns])
+        left = _followed if group in BUILT else rms_of
+        cost = np.array([[left(y[:, a], p[:, b]) for b in columns] for a in columns])
         if len(columns) < 2 or not np.isfinite(cost).all():
             continue
         _, of = linear_sum_assignment(cost**2)
@@ -65,3 +68,17 @@ def markers(case: Case) -> Iterator[Suspicion]:
             yield Suspicion(
                 "marker order" if group == "marker" else "channel order", words, change, after / before, f"{group} order"
             )
+
+
+def rms_of(y: np.ndarray, p: np.ndarray) -> float:
+    """RMS of what a prediction leaves of readings."""
+    return rms(y - p)
+
+
+def _followed(y: np.ndarray, p: np.ndarray) -> float:
+    """RMS of what the best rising straight line in a prediction leaves of readings, over their level."""
+    y, p = y[:, 0], p[:, 0]
+    known = np.isfinite(y)
+    y, p = y[known] - y[known].mean(), p[known] - p[known].mean()
+    slope = max(0.0, float(p @ y) / max(float(p @ p), 1e-300))
+    return rms(y - slope * p)

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.bench import Inputs
 from twin.diagnose.suspicions.case import Case, Suspicion, called, rms
-from twin.diagnose.thresholds import FITS
+from twin.diagnose.thresholds import FITS, HUNDREDS
 from twin.measurements import Channel
 from twin.units import unit_scale
 
@@ -17,6 +17,7 @@ OTHERS = {  # SI unit -> units that are mistaken for each other
     "m": ("m", "cm", "mm", "um"), "N": ("N", "mN", "kN"), "rad": ("rad", "deg"), "K": ("K", "degC", "degF"), "A": ("A", "mA"),
     "V": ("V", "mV"), "ohm": ("ohm", "mohm", "kohm"), "N*m": ("N*m", "N*mm"),
 }  # fmt: skip
+LEVELS = ("ohm",)  # quantities that are never near zero, and of which a built robot has its own: their level tells a unit
 KINDS = {
     "m": "length unit", "N": "force unit", "rad": "angle unit", "K": "temperature unit", "A": "current unit", "V": "voltage unit",
     "ohm": "resistance unit", "N*m": "torque unit",
@@ -35,7 +36,10 @@ def outputs(case: Case) -> Iterator[Suspicion]:
         si, before, found = channels[0].si_unit, case.error(columns, nominal), []
         for other in others(channels[0]):
             reread = _reread(case, columns, unit, other, si)
-            left = reread.better(before, reread.error(columns, nominal), columns)
+            after = reread.error(columns, nominal)
+            left = reread.better(before, after, columns)
+            if left is None and si in LEVELS and after < FITS * before:
+                left = after / before if not 1.0 / HUNDREDS < _level(case, columns) < HUNDREDS else None
             if left is not None:
                 found.append((left, other))
         if found:
@@ -139,3 +143,9 @@ def _typical(case: Case, columns: list[int], values: object, unit: str) -> float
     scale = case.bench.outputs[columns[0]].channel.scale
     y = np.concatenate([values[k][:, columns] for k in case.trials])  # type: ignore[index]
     return rms((y - scale.offset) * scale.denominator / scale.numerator)
+
+
+def _level(case: Case, columns: list[int]) -> float:
+    """Measured over predicted, the median of both over the columns of the fitted trials."""
+    read, shown = (np.concatenate([v[k][:, columns] for k in case.trials]) for v in (case.bench.measured, case.predicted or ()))
+    return float(np.nanmedian(np.abs(read)) / np.nanmedian(np.abs(shown)))

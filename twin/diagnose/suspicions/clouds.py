@@ -1,0 +1,55 @@
+"""Point clouds: in another unit than metres, and away from the markers of the same instant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from twin.diagnose.suspicions.case import Case, Suspicion
+from twin.diagnose.thresholds import ASTRAY, HUNDREDS
+from twin.measurements import Clouds
+
+KIND = "point clouds"
+
+
+def clouds(case: Case) -> Iterator[Suspicion]:
+    """Clouds as large as no robot of this kind, or that stand off the markers: of another frame or another robot.
+
+    A marker on the skin that the camera sees is as near to a point of the cloud as these are to each other.
+    """
+    of = {t.name: t.clouds for t in case.bench.recording.trials}
+    seen = {k: c for k in case.trials if (c := of[case.bench.inputs[k].name]) is not None and len(c.points)}
+    if not seen:
+        return
+    size = float(np.median([np.linalg.norm(np.ptp(c.points, axis=0)) for c in seen.values()]))
+    robot = float(case.twin.body().spec.compile().stat.extent)
+    if not 1.0 / HUNDREDS < size / robot < HUNDREDS:
+        unit, factor = ("mm", 1e-3) if size > robot else ("km", 1e3)
+        words = f"the clouds are {size:.3g} m across and the robot {robot:.2g} m"
+        yield Suspicion(KIND, words, f"write `points` in metres: as they stand they would be {unit} (times {factor:g})")
+        return
+    names, columns = case.points()
+    near = [_nearest(case.bench.measured[k][:, columns], case.bench.inputs[k].time, c) for k, c in seen.items()]
+    off, spacing = (np.concatenate([n[part] for n in near]) for part in (0, 1))
+    if off.size and np.median(off) > ASTRAY * np.median(spacing):
+        words = (
+            f"markers {names[0]} to {names[-1]} stand {1e3 * np.median(off):.1f} mm off the nearest of their clouds, whose points "
+            f"are {1e3 * np.median(spacing):.1f} mm apart (medians)"
+        )
+        change = "give clouds and markers in the base frame, both of this robot and by the trial's own clock, or leave out `cloud`"
+        yield Suspicion(KIND, words, change)
+
+
+def _nearest(markers: np.ndarray, time: np.ndarray, clouds: Clouds) -> tuple[np.ndarray, np.ndarray]:
+    """Distances (m) of markers (n, m, 3), at the row next to each frame, from its nearest point; and of its points from theirs."""
+    off, spacing = [np.empty(0)], [np.empty(0)]
+    for t, a, b in zip(clouds.time, clouds.offsets[:-1], clouds.offsets[1:], strict=True):
+        points, there = clouds.points[a:b], markers[np.argmin(np.abs(time - t))]
+        there = there[np.isfinite(there).all(axis=1)]
+        if len(points) > 1 and len(there):
+            tree = KDTree(points)
+            off.append(tree.query(there)[0])
+            spacing.append(tree.query(points, k=2)[0][:, 1])
+    return np.concatenate(off), np.concatenate(spacing)
