@@ -20,15 +20,15 @@ import viser
 from PIL import Image
 
 from twin.body import Problem
-from twin.effects import Loads, named
+from twin.effects import Loads, Route, named
 from twin.errors import DataError
 from twin.evaluate import evaluate
+from twin.figure import Range
 from twin.measurements import Recording, read
 from twin.twin import Twin
 from twin.viewer import App
-from twin.viewer.colours import Range, bar, colours
-from twin.viewer.figures import figure
-from twin.viewer.live import live
+from twin.viewer.colours import bar, colours
+from twin.viewer.live import Live
 from twin.viewer.replay import Replay
 
 SAMPLE = Path(__file__).parents[1] / "models/continuum/samples/friday"
@@ -51,8 +51,8 @@ def sample() -> Recording:
 
 def test_the_finger_skin_moves_with_the_silicone() -> None:
     twin = Twin.of("finger")
-    drawn = figure(twin)
-    shown = live(twin, drawn).shape(np.array([1.5, 0.0, 0.0, 0.0]), Loads(G))
+    drawn = twin.figure()
+    shown = Live(twin).shape(np.array([1.5, 0.0, 0.0, 0.0]), Loads(G))
     tip = shown.markers[0, -1]
     assert np.allclose(shown.skin[0, -1], tip, atol=1e-9)  # the last point of the skin is the tip
     assert tip[0] > 0.01  # m, towards tendon 1
@@ -64,7 +64,7 @@ def test_the_finger_skin_moves_with_the_silicone() -> None:
 def test_tension_along_the_tendons_falls_by_friction_and_not_without() -> None:
     tension = np.array([1.5, 0.0, 0.0])
     for twin, falls in ((rubbing(), True), (Twin.of("continuum"), False)):
-        along = live(twin, figure(twin)).shape(tension, Loads(G)).tension[0].reshape(3, -1)[0]
+        along = Live(twin).shape(tension, Loads(G)).tension[0].reshape(3, -1)[0]
         assert along[0] == pytest.approx(1.5)
         if falls:  # Euler: 1.5 exp(-mu theta) at most; the turn at the holes adds up to less than the bend of a radian
             assert np.all(np.diff(along) < 0.0)
@@ -87,9 +87,9 @@ def test_a_replay_is_what_evaluate_measures() -> None:
 def test_the_standing_robot_and_the_replayed_one_are_one_figure() -> None:
     twin = Twin.of("continuum")
     tension = np.array([1.0, 0.4, 0.0])
-    drawn = figure(twin)
+    drawn = twin.figure()
     path = twin.robot.solver(twin.body()).solve(Problem(np.zeros(1), tension[None], Loads(G)))
-    replayed, standing = drawn.frames(path, Loads(G)), live(twin, drawn).shape(tension, Loads(G))
+    replayed, standing = drawn.frames(path, Loads(G), Route()), Live(twin).shape(tension, Loads(G))
     for name in ("place", "piece", "markers"):
         assert np.allclose(getattr(replayed, name), getattr(standing, name), atol=1e-6)  # m: two solves' tolerance
 
@@ -103,7 +103,7 @@ def test_the_bar_says_what_the_colours_are() -> None:
 
 def test_what_is_not_drawn_is_said() -> None:
     with pytest.raises(DataError, match="not drawn here yet"):
-        figure(Twin.of("two_link"))
+        Twin.of("two_link").figure()
 
 
 # ---- in a browser -----------------------------------------------------------------------------------------------------------

@@ -5,9 +5,9 @@ incompressible neo-Hookean bar under engineering strain e, stretch a = 1 + e, ca
 
     s = E / 3 (a - 1 / a^2).
 
-E is fitted (least squares) up to a strain, together with the strain at which the grips had taken up the slack, which the cross-head's
-readings hold; the law holds up to the largest strain to which no stress is off by more than `HOLDS` of the largest. A test
-is one specimen at one rate: unloading, rate and batch are not in it.
+E is fitted (least squares) up to a strain, with the strain at which the grips had taken up the slack (cross-heads read it); the
+law holds up to the largest strain to which no stress is off by more than `HOLDS` of the largest. A test is one specimen at one rate:
+unloading, rate and batch are not in it.
 """
 
 from __future__ import annotations

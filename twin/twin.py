@@ -10,7 +10,8 @@ import numpy as np
 from twin.bench import Bench, Inputs, prepare
 from twin.body import TOLERANCE, Body, Heating, Path, Problem, Solver
 from twin.effects import Drive, Effect, Signals, named
-from twin.errors import SolveError
+from twin.errors import DataError, SolveError
+from twin.figure import Figure
 from twin.laws import Laws
 from twin.measurements import Recording
 from twin.quantities import Values
@@ -65,6 +66,13 @@ class Twin:
         }
         seen = bench.recording
         return seen.with_values([values[t.name] for t in seen.trials], f"simulation: twin of {self.robot.name}")
+
+    def figure(self) -> Figure:
+        """What is drawn of its robot. Raises DataError for a family that is not drawn."""
+        draw = family(self.robot.family).figure
+        if draw is None:
+            raise DataError(f"robot {self.robot.name!r} is a {self.robot.family}, which is not drawn here yet; see `twin robots`")
+        return draw(self.body())
 
 
 def _by_channel(bench: Bench, y: np.ndarray) -> dict[str, np.ndarray]:
@@ -145,6 +153,13 @@ def simulated(twin: Twin, bench: Bench, wanted: Sequence[int], way: Way | None =
         close = way.near[k].path if k in way.near else None
         traces[k] = _trial(twin, body, solver, inputs, delayed, close, way)
     return traces
+
+
+def alone(twin: Twin, inputs: Inputs) -> Trace:
+    """One trial by statics, by itself: nothing came before it. Raises as `simulate`."""
+    body, creep = twin.body(), twin.laws.creep
+    solver = twin.robot.solver(body)
+    return _trial(twin, body, solver, inputs, np.zeros((len(creep.amplitude), solver.n_slow)), None, Way())
 
 
 def _trial(

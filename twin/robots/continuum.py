@@ -20,12 +20,13 @@ import numpy as np
 from twin.body import Frame, marker_senses, tendon_ports, tendon_senses
 from twin.dynamics import Dynamics
 from twin.equilibrium import Equilibrium
+from twin.equilibrium.figure import ChainFigure
 from twin.hinges import HingeChain, JointSet
 from twin.quantities import each
 from twin.robots.backbone import BODIES, Backbone, Piece
 from twin.robots.continuum_schema import SCHEMA, Continuum, disk_masses, hole_places
 
-__all__ = ["SCHEMA", "build", "dynamics", "statics"]
+__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
 
 ALUMINIUM = [0.72, 0.74, 0.78, 1.0]
 NITI = [0.35, 0.38, 0.44, 1.0]
@@ -222,3 +223,7 @@ def statics(body: HingeChain) -> Equilibrium:
 
 def dynamics(body: HingeChain) -> Dynamics:
     return Dynamics(body)
+
+
+def figure(body: HingeChain) -> ChainFigure:
+    return ChainFigure(body, statics(body))

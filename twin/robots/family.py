@@ -10,17 +10,20 @@ from typing import Any, Protocol, cast
 
 from twin.body import Body, Solver
 from twin.errors import UnknownNameError
+from twin.figure import Figure
 from twin.robots.schema import Schema
 
 
 class Family(Protocol):
     """A module of `twin.robots` with these names is a family, found by the name that `robot.toml` gives.
 
-    SCHEMA: all it reads of a file. `dynamics` is None where bodies are solved by statics only.
+    SCHEMA: all it reads of a file. `dynamics` is None where bodies are solved by statics only. `figure`, that of a
+    body, is None where bodies are not drawn.
     """
 
     SCHEMA: Schema
     dynamics: Callable[[Any], Solver] | None
+    figure: Callable[[Any], Figure] | None
 
     def build(self, structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
         """The robot of these counts and values (SI, by parameter name). Raises DataError for what cannot be built."""

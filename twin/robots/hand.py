@@ -15,9 +15,10 @@ from twin.body import Port, Sense
 from twin.robots import soft
 from twin.robots.hand_schema import SCHEMA, Hand, of_finger
 from twin.soft import HandBody, HandDynamics, HandStatics
+from twin.soft.figure import HandFigure
 from twin.soft.statics import turned
 
-__all__ = ["SCHEMA", "build", "dynamics", "statics"]
+__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
 
 PALM = [0.35, 0.37, 0.4, 1.0]
 THICK = 5e-3  # m, of the drawn palm
@@ -79,3 +80,7 @@ def statics(body: HandBody) -> HandStatics:
 
 def dynamics(body: HandBody) -> HandDynamics:
     return HandDynamics(body)
+
+
+def figure(body: HandBody) -> HandFigure:
+    return HandFigure(body)

@@ -13,8 +13,9 @@ from twin.quantities import each
 from twin.robots.soft_schema import SCHEMA, Soft
 from twin.sensors import Cords
 from twin.soft import Cone, SoftBody, SoftDynamics, SoftStatics, lattice, straight
+from twin.soft.figure import SoftFigure
 
-__all__ = ["SCHEMA", "build", "dynamics", "statics"]
+__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
 
 SILICONE, CORD, SENSOR, SPOT = [0.93, 0.9, 0.82, 0.45], [0.85, 0.6, 0.15, 1.0], [0.15, 0.15, 0.18, 1.0], [0.9, 0.2, 0.2, 1.0]
 DISCS = 24  # of the picture
@@ -101,3 +102,7 @@ def statics(body: SoftBody) -> SoftStatics:
 
 def dynamics(body: SoftBody) -> SoftDynamics:
     return SoftDynamics(body)
+
+
+def figure(body: SoftBody) -> SoftFigure:
+    return SoftFigure(body)

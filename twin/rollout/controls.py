@@ -42,11 +42,13 @@ def full_pull(twin: Twin) -> Pull:
     solver, n = twin.robot.solver(body), body.n_tendon
     if body.markers:
         path = solver.solve(Problem(np.arange(n + 1.0), PROBE * np.eye(n + 1, n, -1), Loads(np.zeros(3))))
-        tip, travel = path.markers[:, -1], path.path[0] - np.diagonal(path.path[1:])
-        moved = np.linalg.norm(tip[1:, :2] - tip[0, :2], axis=1)
+        away, travel = path.markers[1:, :, :2] - path.markers[0, :, :2], path.path[0] - np.diagonal(path.path[1:])
+        tip = np.linalg.norm(away, axis=2).argmax(axis=1)  # of the finger that a tendon bends
+        away = away[np.arange(n), tip]
+        moved = np.linalg.norm(away, axis=1)
         if moved.min() > 0.0:
-            share = float(moved.mean() / (0.5 * np.linalg.norm(tip[0])))
-            return Pull(PROBE / share, float(travel.mean()) / share, (tip[1:, :2] - tip[0, :2]) / moved[:, None])
+            share = float(moved.mean() / (0.5 * np.abs(path.markers[0, tip, 2]).mean()))
+            return Pull(PROBE / share, float(travel.mean()) / share, away / moved[:, None])
     raise DataError(f"not every tendon of robot {twin.robot.name!r} moves a tip sideways: no controls are drawn for it; give them")
 
 

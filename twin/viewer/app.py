@@ -14,14 +14,14 @@ import numpy as np
 import viser
 import viser.uplot
 
-from twin.effects import Loads
+from twin.effects import Drive, Loads
 from twin.errors import TwinError
+from twin.figure import Frames, Range
 from twin.measurements import Recording
 from twin.rollout import full_pull
 from twin.twin import Twin
-from twin.viewer.colours import Range, bar
-from twin.viewer.figures import Figure, Frames, figure
-from twin.viewer.live import Live, live
+from twin.viewer.colours import bar
+from twin.viewer.live import Live
 from twin.viewer.replay import Replay, Track
 from twin.viewer.scene import Scene
 
@@ -30,6 +30,10 @@ MOST = 1.5  # full pulls at a slider's end
 TELLING, PLOTTING = 0.1, 1.0  # s between words and between plots of a running replay: a reader needs no more
 DESCRIBED, BETTER = "as described", "with effects"
 REPLAY, BY_HAND = "replay", "by hand"
+BY = {  # what is pulled by: name, unit, meaning, SI of one
+    Drive.TENSION: ("tension", "N", "tension as its load cell reads it", 1.0),
+    Drive.DISPLACEMENT: ("displacement", "mm", "taken up by its motor from the hanging rest; all others are held too", 1e-3),
+}
 NOW = {"label": "now", "stroke": "#d62728"}
 
 
@@ -41,12 +45,12 @@ class App:
         drive it."""
         self.server, self.twin = server, twin
         self._described = Twin.of(twin.robot)
-        self._figure = figure(twin)
+        self._figure = twin.figure()
         self._replay = Replay(recording, twin) if recording is not None else None
         self._scene = Scene(server, self._figure, twin.robot.gravity)
         self._wanted, self._clock, self._told, self._plotted = True, time.monotonic(), 0.0, 0.0
         self._track: Track | None = None
-        self._live: tuple[Twin, Figure, Live] | None = None
+        self._live: tuple[Twin, Live] | None = None
         self._range = self._figure.coloured(MOST)
         self._panel(recording)
         self.drawn = 0  # pictures sent
@@ -98,20 +102,25 @@ class App:
     def _drive_panel(self) -> None:
         gui, robot = self.server.gui, self.twin.robot
         self._driving = gui.add_folder("by hand", visible=self._replay is None)
-        most = round(MOST * full_pull(self.twin).tension, 1)
+        full, ports = full_pull(self.twin), self.twin.robot.build().drives
+        ways = [d for d in (Drive.TENSION, Drive.DISPLACEMENT) if all(any(p.drive is d for p in port) for port in ports)]
+        most = {Drive.TENSION: round(MOST * full.tension, 1), Drive.DISPLACEMENT: round(MOST * 1e3 * full.displacement, 1)}
         with self._driving:
-            self.pulls = [
-                gui.add_slider(f"tendon {i}, N", 0.0, most, 0.01, 0.0, hint="tension as its load cell reads it")
-                for i in range(1, robot.n_tendon + 1)
-            ]
-            self.payload = gui.add_slider(
-                "payload, g", 0.0, 30.0, 1.0, 0.0, hint="at the tip", visible=len(self._figure.cylinders) > 0
-            )
+            self.by = gui.add_dropdown("pull by", tuple(BY[d][0] for d in ways), visible=len(ways) > 1, hint="what motors hold")
+            self.sliders = {
+                d: [
+                    gui.add_slider(f"tendon {i}, {BY[d][1]}", 0.0, most[d], 0.01, 0.0, hint=BY[d][2], visible=d is ways[0])
+                    for i in range(1, robot.n_tendon + 1)
+                ]
+                for d in ways
+            }
+            self.payload = gui.add_slider("payload, g", 0.0, 30.0, 1.0, 0.0, hint="at the tip", visible=not len(self._figure.faces))
             self.tilt = gui.add_slider("gravity tilt, deg", 0, 180, 5, 0, hint="of its direction from that described")
             self.azimuth = gui.add_slider("gravity azimuth, deg", 0, 355, 5, 0, hint="about the robot's axis")
             self.slack = gui.add_button("let go", hint="all tendons slack, friction's history forgotten")
-        for handle in (*self.pulls, self.payload, self.tilt, self.azimuth):
+        for handle in (*(s for of in self.sliders.values() for s in of), self.payload, self.tilt, self.azimuth):
             self._noted(handle)
+        self.by.on_update(lambda _: self._let_go())
         self.slack.on_click(lambda _: self._let_go())
 
     def _noted(self, handle: Any) -> None:
@@ -122,9 +131,20 @@ class App:
 
         (handle.on_click if isinstance(handle, viser.GuiButtonGroupHandle) else handle.on_update)(note)
 
+    @property
+    def drive(self) -> Drive:
+        """What the sliders are."""
+        return next(d for d, (name, *_) in BY.items() if name == self.by.value)
+
+    @property
+    def pulls(self) -> list[viser.GuiSliderHandle]:
+        """The sliders in use."""
+        return self.sliders[self.drive]
+
     def _let_go(self) -> None:
-        for pull in self.pulls:
-            pull.value = 0.0
+        for drive, sliders in self.sliders.items():
+            for slider in sliders:
+                slider.value, slider.visible = 0.0, drive is self.drive
         self._live, self._wanted = None, True
 
     # ---- the loop -------------------------------------------------------------------------------------------------------
@@ -208,11 +228,10 @@ class App:
         self._replaying.visible, self._driving.visible = False, True
         twin = self._chosen()
         if self._live is None or self._live[0] != twin:
-            drawn = figure(twin)
-            self._live = twin, drawn, live(twin, drawn)
-        self._coloured(self._figure.coloured(float(self.pulls[0].max)))
-        tension = np.array([p.value for p in self.pulls])
-        shown = self._live[2].shape(tension, self._loads())
+            self._live = twin, Live(twin, self.drive)
+        self._coloured(self._figure.coloured(float(self.sliders[Drive.TENSION][0].max)))
+        pull = np.array([p.value for p in self.pulls]) * BY[self.drive][3]
+        shown = self._live[1].shape(pull, self._loads())
         self._scene.draw(shown, self._range)
         self._scene.mark(shown.markers[0], np.full_like(shown.markers[0], np.nan), 0.0)
         self.words.content = _standing(shown)

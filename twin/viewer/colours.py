@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
+
+from twin.figure import Range
 
 # Five points of viridis (S. van der Walt and N. Smith, CC0), which reads in grey and to colour-blind eyes.
 STOPS = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], float)
-
-
-class Range(NamedTuple):
-    """What the ends of the bar are, in the unit that is shown, and one SI unit in it."""
-
-    name: str
-    unit: str
-    factor: float
-    low: float
-    high: float
 
 
 def colours(values: np.ndarray, over: Range) -> np.ndarray:

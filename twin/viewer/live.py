@@ -1,58 +1,48 @@
-"""A robot under sliders: its shape under tensions and loads, from where it stood."""
+"""A robot under sliders: its shape under what pulls it and its loads, from where it stood."""
 
 from __future__ import annotations
 
-from typing import Protocol, cast
-
 import numpy as np
 
-from twin.body import Problem
-from twin.effects import Loads
-from twin.equilibrium.along import tension_along
+from twin.bench import ROOM, Inputs
+from twin.effects import Drive, Loads
 from twin.errors import SolveError
-from twin.kinematics import LoadedRobot
-from twin.twin import Twin
-from twin.viewer.figures import ChainFigure, Figure, Frames, SoftFigure
+from twin.figure import Frames
+from twin.twin import Twin, alone
+
+TURNS = 24  # back to which friction is followed
 
 
-class Live(Protocol):
-    def shape(self, tension: np.ndarray, loads: Loads) -> Frames:
-        """One instant under base tensions (n_tendon,) N, as load cells read them. Raises SolveError where there is none."""
-        ...
+class Live:
+    """A robot whose friction remembers where its tendons turned, as long as its loads stay as they are.
+
+    Pulls on in one direction wipe out those between, so that the turns are all that friction knows of its history; creep is as of a
+    second a turn.
+    """
+
+    def __init__(self, twin: Twin, drive: Drive = Drive.TENSION) -> None:
+        self._twin, self._drive, self._figure = twin, drive, twin.figure()
+        self._loads: Loads | None = None
+        self._turns: list[np.ndarray] = []
+
+    def shape(self, pull: np.ndarray, loads: Loads) -> Frames:
+        """One instant under pulls (n_tendon,), N as load cells read them or m as drives report. Raises SolveError where there is
+        none."""
+        if self._loads is None or loads.payload != self._loads.payload or not np.array_equal(loads.gravity, self._loads.gravity):
+            self._turns, self._loads = [np.zeros_like(pull)], loads
+        turns = [*(self._turns if _turned(self._turns, pull) else self._turns[:-1]), pull][-TURNS:]
+        command, time = np.stack(turns), np.arange(float(len(turns)))
+        inputs = Inputs("here", time, time, command, (self._drive,) * len(pull), np.full(len(turns), ROOM), loads)
+        trace = alone(self._twin, inputs)
+        if trace.path is None:
+            raise SolveError("no shape was found")
+        self._turns = turns
+        return self._figure.frames(trace.path, self._twin.laws.surround(loads), self._twin.laws.route).at(-1)
 
 
-def live(twin: Twin, figure: Figure) -> Live:
-    return SoftLive(twin, figure) if isinstance(figure, SoftFigure) else ChainLive(twin, cast(ChainFigure, figure))
-
-
-class ChainLive:
-    """A backbone, its friction's history kept while its loads stay as they are."""
-
-    def __init__(self, twin: Twin, figure: ChainFigure) -> None:
-        self._twin, self._figure, self._loads = twin, figure, Loads(twin.robot.gravity)
-        self._robot = LoadedRobot(twin, self._loads)
-
-    def shape(self, tension: np.ndarray, loads: Loads) -> Frames:
-        if loads.payload != self._loads.payload or not np.array_equal(loads.gravity, self._loads.gravity):
-            self._robot, self._loads = LoadedRobot(self._twin, loads), loads
-        robot = self._robot
-        seen = robot.pull(tension)
-        along = np.zeros((robot.n_tendon, robot.now.z.shape[1]))
-        tension_along(robot.solver.chain, robot.law, robot.tension, robot.now.z.copy(), robot.now.s.copy(), along)
-        return self._figure.standing(robot.now.q, along, seen.markers)
-
-
-class SoftLive:
-    """A silicone finger, pulled anew from slack every time."""
-
-    def __init__(self, twin: Twin, figure: SoftFigure) -> None:
-        self._twin, self._figure = twin, figure
-        self._solver = twin.robot.solver(figure.body)
-
-    def shape(self, tension: np.ndarray, loads: Loads) -> Frames:
-        laws = self._twin.laws
-        command = np.vstack([np.zeros_like(tension), tension])
-        path = self._solver.solve(Problem(np.arange(2.0), command, laws.surround(loads), laws.route))
-        if not path.status.all():
-            raise SolveError(f"no equilibrium under tensions {np.round(tension, 2).tolist()} N")
-        return self._figure.frames(path, loads).at(1)
+def _turned(turns: list[np.ndarray], pull: np.ndarray) -> bool:
+    """Whether some tendon goes another way than on its last; the first pull always counts as a turn."""
+    if len(turns) < 2:
+        return True
+    last, now = turns[-1] - turns[-2], pull - turns[-1]
+    return bool(np.any(last * now < 0.0) or np.any((last == 0.0) & (now != 0.0)))

@@ -8,9 +8,9 @@ import numpy as np
 
 from twin.bench import prepare
 from twin.errors import DataError
+from twin.figure import Frames
 from twin.measurements import Recording
 from twin.twin import Twin, is_dynamic, report, simulate
-from twin.viewer.figures import Frames, figure
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Replay:
             inputs = self._bench.inputs[trial]
             trace = simulate(twin, self._bench, trials=[trial], dynamic=self._dynamic)[0]
             assert trace.path is not None
-            frames = figure(twin).frames(trace.path, twin.laws.surround(inputs.loads))
+            frames = twin.figure().frames(trace.path, twin.laws.surround(inputs.loads), twin.laws.route)
             markers = report(twin.effects, trace.true).markers[:, list(self._columns)]
             away = np.linalg.norm(self.measured(trial) - markers, axis=2)
             with np.errstate(invalid="ignore"):

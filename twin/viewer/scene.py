@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 import viser
 
-from twin.viewer.colours import Range, colours
-from twin.viewer.figures import Figure, Frames
+from twin.figure import Figure, Frames, Range
+from twin.viewer.colours import colours
 
 MEASURED, PREDICTED, ARROW, CORD = (214, 39, 40), (31, 119, 180), (20, 20, 20), 0.014
 NOTHING = np.zeros((0, 3), np.float32)
@@ -55,7 +55,7 @@ class Scene:
                 self._links.batched_positions = (s * shown.place[0]).astype(np.float32)
                 self._links.batched_wxyzs = shown.turn[0].astype(np.float32)
             pieces = (s * shown.piece[0]).astype(np.float32)
-            along = colours(shown.tension[0], over) if self._links is not None else np.full((len(pieces), 3), 60, np.uint8)
+            along = colours(shown.tension[0], over) if not len(self._figure.faces) else np.full((len(pieces), 3), 60, np.uint8)
             shades = np.repeat(_linear(along)[:, None], 2, axis=1)
             if self._cords is None:
                 self._cords = self._server.scene.add_line_segments("/tendons", pieces, shades, thickness=CORD)
