@@ -14,9 +14,10 @@ from tools.bench.finger.cables import interpolation
 from tools.bench.finger.camera import Points, cloud, scatter
 from tools.bench.finger.effects import Effect, all_effects
 from tools.bench.finger.hand import Hand
-from tools.bench.finger.motions import bench_day, shape_day
+from tools.bench.finger.motions import Trial, bench_day, shape_day
 from tools.bench.finger.sensors import Built
 from tools.bench.finger.shape import write_shape_truth
+from tools.bench.finger.skin import Skin
 from tools.bench.finger.statics import Finger
 from tools.bench.finger.write import CLOUD, MARKER, SENSOR, Sheet, drive_reading, peaks, write_set
 
@@ -24,16 +25,22 @@ TABLES = Path(__file__).parent
 
 
 def make_set(
-    folder: Path, names: Sequence[str], seed: int, shape: bool = False, progress: Callable[[str], None] = lambda what: None
+    folder: Path,
+    names: Sequence[str],
+    seed: int,
+    shape: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+    edges: bool = False,
 ) -> list[Effect]:
-    """Write one day: folder/measured, folder/holdout, folder/truth.json; a shape day has folder/shape_truth.npz for its holdout."""
+    """Write one day: folder/measured, folder/holdout, folder/truth.json; a shape day has folder/shape_truth.npz for its holdout.
+    `edges`: in its tests two edges hold the finger, in place of a hand that pushes."""
     # Streams of their own, so that adding an effect changes neither finger nor day.
     making, motions, hands, instruments, laws = (np.random.default_rng([seed, n]) for n in range(5))
     built = Built.draw(making)
     effects = [all_effects()[name].draw(laws, built) for name in names]
     finger = make_finger(built, effects)
     trials = shape_day(motions) if shape else bench_day(motions)
-    pushes = {t.name: Hand.draw(hands, finger.skin, float(t.time[-1])) for t in trials if t.hand}
+    pushes = {t.name: _hand(t, edges)(hands, finger.skin, float(t.time[-1])) for t in trials if t.hand}
     logs = run(finger, effects, trials, pushes, progress)
     sheets = _sheets(instruments, finger, built, effects, logs, markers=not shape)
     folder.mkdir(parents=True)
@@ -46,6 +53,10 @@ def make_set(
         write_shape_truth(folder / "shape_truth.npz", TABLES / "points.csv", finger, built, logs)
     _write_truth(folder / "truth.json", seed, finger, built, effects, logs)
     return effects
+
+
+def _hand(trial: Trial, edges: bool) -> Callable[[np.random.Generator, Skin, float], Hand]:
+    return Hand.hold if edges and trial.name.startswith("test") else Hand.draw
 
 
 def _sheets(
