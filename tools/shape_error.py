@@ -23,6 +23,7 @@ import numpy as np
 from twin.measurements import Recording, read
 from twin.robots import load
 from twin.shape.align import Aligned, align
+from twin.shape.band import Bands
 from twin.shape.estimator import Z90, estimator, estimators
 from twin.shape.predict import predict
 from twin.twin import Twin
@@ -93,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         recording, twin = read(day / "measured"), Twin.of(load("finger"))
         found = align(recording, twin)
         print(f"{day.name}: aligned in {found.seconds:.1f} s; off by {aligned_error(found, day / 'shape_truth.npz')}")
-        print(f"  bands widened by {', '.join(f'{n} {by:.2f}' for n, by in found.bands.items())}")
+        print(f"  bands widened by {', '.join(f'{n} {by:.2f}' for n, by in found.bands.by.items())}")
         twins = {"aligned": found.twin} if args.aligned else {"described": twin, "aligned": found.twin}
         if args.search:
             from tools.align_search import search
@@ -105,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for name in args.estimators.split(","):
             for label, each in twins.items():
                 law, began = estimator(name)(each), time.perf_counter()
-                arrays, _ = predict(cut(recording, args.dead), law, found.bands.get(name, 1.0) if label == "aligned" else 1.0)
+                arrays, _ = predict(cut(recording, args.dead), law, found.bands if label == "aligned" else Bands())
                 s = score(day / "shape_truth.npz", arrays, time.perf_counter() - began)
                 errors = "  ".join(f"{k} {v:.2f} {100 * s.inside[k]:.0f} %" for k, v in s.error.items())
                 mean = float(np.mean(list(s.error.values())))

@@ -112,7 +112,7 @@ class Shape:
         law = estimator(self.estimator)
         recording, twin = _fingers(self.set, self.twin)
         with working(f"shapes of {recording.title}"):
-            arrays, notices = predict(recording, law(twin), bands_of(self.twin).get(self.estimator, 1.0))
+            arrays, notices = predict(recording, law(twin), bands_of(self.twin))
             write(self.out, arrays)
         for notice in notices:
             out.print(f"note: {plain(notice)}", highlight=False, markup=False)

@@ -25,7 +25,7 @@ from twin.factory import named_points
 from twin.measurements import Clouds, Recording
 from twin.quantities import Fitted
 from twin.sensors import strain
-from twin.shape.band import Behind, widened_by
+from twin.shape.band import Bands, Behind, widened_by
 from twin.shape.cloud_fit import BEYOND, CLOUD, CloudFit
 from twin.shape.estimator import Felt, estimators
 from twin.shape.modal import Network
@@ -42,12 +42,11 @@ STEP = 1e-4  # m in z, of differences
 @dataclass(frozen=True)
 class Aligned:
     """The aligned twin, its fitted numbers with standard errors, and what they rest on: distances (m, root mean square) of the
-    clouds from the visible skin before and after, samples by kind, and what the clouds could not fix. `bands`: by how much each
-    estimator's band is widened where something may press."""
+    clouds from the visible skin before and after, samples by kind, and what the clouds could not fix; how wide bands are to be."""
 
     twin: Twin
     fitted: Mapping[str, Fitted]
-    bands: Mapping[str, float]
+    bands: Bands
     before: float
     after: float
     frames: int
@@ -94,8 +93,7 @@ def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) ->
         fitted |= fit_sensors(_known(shown, CloudFit(skin, net, turned(angle)), statics, net, twin), twin)
         twin = replace(twin, values={**twin.values, **{name: f.value for name, f in fitted.items()}})
     progress("bands under the hand")
-    behind = [b for s in shown if s.nodes is None and (b := _behind(s, CloudFit(skin, net, turned(angle)), net, twin)) is not None]
-    bands = _bands(twin, behind) if behind else {}
+    bands = _bands([s for s in shown if s.nodes is None and s.frames()], CloudFit(skin, net, turned(angle)), net, twin)
     stds = {p.name: p.std for p in twin.robot.nuisance}
     unfixed = tuple(n for n in stds if n not in fitted or (fitted[n].std or 0.0) > 0.5 * (stds[n] or np.inf))
     frames = sum(len(s.frames()) for s in shown)
@@ -165,12 +163,14 @@ def _known(shown: Sequence[Shown], fit: CloudFit, statics: SoftStatics, net: Net
     return Known(*(np.concatenate(p) for p in zip(*parts, strict=True)))
 
 
-def _bands(twin: Twin, behind: Sequence[Behind]) -> dict[str, float]:
-    bands = {}
+def _bands(pushed: Sequence[Shown], fit: CloudFit, net: Network, twin: Twin) -> Bands:
+    if not pushed:
+        return Bands()
+    behind, by = [_behind(trial, fit, net, twin) for trial in pushed], {}
     for name, law in estimators().items():
         with suppress(DataError):  # no weights of it for this robot: nobody will estimate with it either
-            bands[name] = widened_by(law(twin), behind)
-    return bands
+            by[name] = widened_by(law(twin), behind)
+    return Bands(by, tuple(sorted({trial.sensed.contact or "" for trial in pushed})))
 
 
 def _fitted(
@@ -191,13 +191,11 @@ def _strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.
     return eps[0], slope @ covariance @ slope.T + PUSHED**2 * np.eye(len(slope))
 
 
-def _behind(trial: Shown, fit: CloudFit, net: Network, twin: Twin) -> Behind | None:
-    """The named points behind a pushed trial's clouds; None where it has none."""
+def _behind(trial: Shown, fit: CloudFit, net: Network, twin: Twin) -> Behind:
+    """The named points behind a pushed trial's clouds."""
     body = twin.body()
     assert isinstance(body, SoftBody)
     felt, found, at = _fitted(trial, fit, net, body)
-    if not at:
-        return None
     weights = body.lattice.weights(named_points(twin.robot).rest)
     moved = np.einsum("pn,fnc->fpc", weights, net.modes.nodes(np.stack([z for z, _ in found])))
     basis = np.einsum("pn,knc->kpc", weights, net.modes.basis.reshape(len(net.modes.basis), -1, 3))

@@ -7,13 +7,14 @@ twin's own error o, c the cloud's own uncertainty, the band holds a point if it 
     k = sqrt(max((D / 1.645)^2 - c^2 - o^2, 0)) / s,        widen = (90 % quantile of k)^w,    w = HANDS^2 / (HANDS^2 + ONE^2 / n)
 
 w is the weight of what n pushes say against what is known without them: log k scatters by ONE from push to push, and hands differ
-by HANDS from the factory's.
+by HANDS from the factory's. That holds for what pushed then. What else may push, by the words of its trial's `external_contact`, is
+a stranger, which may hold the finger as no hand of the factory's does; its band is widened by STRANGER.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,6 +23,20 @@ from twin.shape.estimator import Z90, Estimator, Felt, Shapes, own_error
 ONE = 0.75  # of log k of a single push: 0.37 of four pushes, measured on 70 chains of the factory with `physics`
 HANDS = 0.4  # of log k: hands for which the band of the factory's is half as wide again as it should be are nothing strange; ours
 PUSH = 3.0  # s that a push takes
+STRANGER = 1.8  # 1.7 (`physics`, `modal` 1.8) hold 90 % where two edges up to 25 mm apart hold a slack finger, by the twin itself
+
+
+@dataclass(frozen=True)
+class Bands:
+    """By how much the band of each estimator is widened under the hands that pushed in alignment, in the words of their trials."""
+
+    by: Mapping[str, float] = field(default_factory=dict)
+    hands: tuple[str, ...] = ()
+
+    def of(self, law: Estimator, contact: str) -> float:
+        if not self.hands:
+            return 1.0
+        return self.by.get(law.name(), 1.0) if contact in self.hands else STRANGER
 
 
 @dataclass(frozen=True)

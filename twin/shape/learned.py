@@ -48,11 +48,11 @@ class Learned(Estimator):
     @classmethod
     def file(cls) -> str:
         """Name of the weights' file beside robot.toml."""
-        return f"{cls.__module__.rpartition('.')[2]}.npz"
+        return f"{cls.name()}.npz"
 
     @classmethod
     def form(cls) -> str:
-        return f"twin-{cls.__module__.rpartition('.')[2]}/3"
+        return f"twin-{cls.name()}/3"
 
     @classmethod
     @abstractmethod

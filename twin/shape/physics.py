@@ -60,7 +60,7 @@ class Physics(Estimator):
         with single_thread():
             walk = _Walk(self)
             for i in range(n):
-                moved[i], std[i], outside[i] = walk.to(felt.displacement[i], felt.strain[i] if felt.pushed else None)
+                moved[i], std[i], outside[i] = (walk.pushed if felt.pushed else walk.free)(felt.displacement[i], felt.strain[i])
         return Shapes(moved, std, outside)
 
 
@@ -72,6 +72,10 @@ def _prior(cone: Cone, cells: int) -> np.ndarray:
     forces = np.stack([skin.force(draw_pushes(rng, cone, PUSHES)).ravel() for _ in range(HANDS)])
     values, vectors = np.linalg.eigh(forces.T @ forces / HANDS)
     return vectors[:, -RANK:] * np.sqrt(np.maximum(values[-RANK:], 0.0))
+
+
+def _noise(strain: np.ndarray) -> np.ndarray:
+    return np.hypot(STRAIN, GAIN * strain)
 
 
 def _left_open(G: np.ndarray, J: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -95,15 +99,21 @@ class _Walk:
         self.hanging = hang(self.solid, self.shape, owner.weight)
         self.at, self.burden, self.a = np.zeros(len(self.hanging)), owner.weight, np.zeros(RANK)
 
-    def to(self, displacement: np.ndarray, strain: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Displacements (P, 3), std (P,) and whether this is outside, of the next sample; strain None where nothing pushes."""
-        there = np.isfinite(strain) if strain is not None else np.zeros(0, bool)
-        if strain is None or not there.any():
-            found = self._march(displacement, np.zeros(RANK))
-            moved = self.owner.weights @ self.shape.u
-            return moved, own_error(moved), not found
+    def free(self, displacement: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Displacements (P, 3), std (P,) and whether this is outside, of the next sample, if nothing pushes; strains that tendons
+        alone do not make say that something does."""
+        found = self._march(displacement, np.zeros(RANK))
+        moved, there = self.owner.weights @ self.shape.u, np.isfinite(strain)
+        away = np.abs(self._strain()[0] - strain)[there] / _noise(strain[there])
+        return moved, own_error(moved), not found or bool((away > OUTSIDE).any())
+
+    def pushed(self, displacement: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The same, if something may push."""
+        there = np.isfinite(strain)
+        if not there.any():
+            return self.free(displacement, strain)
         felt, wrong, step = strain[there], np.zeros(there.sum()), np.zeros(RANK)
-        noise, response, found = np.hypot(STRAIN, GAIN * felt), np.zeros((self.shape.u.size, RANK)), True
+        noise, response, found = _noise(felt), np.zeros((self.shape.u.size, RANK)), True
         J = np.zeros((len(felt), RANK))
         for _ in range(ROUNDS):
             if not self._march(displacement, self.a):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +14,9 @@ from tools.bench.finger.cables import interpolation
 from tools.bench.finger.camera import Points, cloud, scatter
 from tools.bench.finger.effects import Effect, all_effects
 from tools.bench.finger.hand import Hand
-from tools.bench.finger.motions import Trial, bench_day, shape_day
+from tools.bench.finger.motions import bench_day, shape_day
 from tools.bench.finger.sensors import Built
 from tools.bench.finger.shape import write_shape_truth
-from tools.bench.finger.skin import Skin
 from tools.bench.finger.statics import Finger
 from tools.bench.finger.write import CLOUD, MARKER, SENSOR, Sheet, drive_reading, peaks, write_set
 
@@ -40,7 +39,9 @@ def make_set(
     effects = [all_effects()[name].draw(laws, built) for name in names]
     finger = make_finger(built, effects)
     trials = shape_day(motions) if shape else bench_day(motions)
-    pushes = {t.name: _hand(t, edges)(hands, finger.skin, float(t.time[-1])) for t in trials if t.hand}
+    trials = [replace(t, edges=edges and t.hand and t.name.startswith("test")) for t in trials]
+    pushing = {t.name: Hand.hold if t.edges else Hand.draw for t in trials if t.hand}
+    pushes = {t.name: pushing[t.name](hands, finger.skin, float(t.time[-1])) for t in trials if t.hand}
     logs = run(finger, effects, trials, pushes, progress)
     sheets = _sheets(instruments, finger, built, effects, logs, markers=not shape)
     folder.mkdir(parents=True)
@@ -53,10 +54,6 @@ def make_set(
         write_shape_truth(folder / "shape_truth.npz", TABLES / "points.csv", finger, built, logs)
     _write_truth(folder / "truth.json", seed, finger, built, effects, logs)
     return effects
-
-
-def _hand(trial: Trial, edges: bool) -> Callable[[np.random.Generator, Skin, float], Hand]:
-    return Hand.hold if edges and trial.name.startswith("test") else Hand.draw
 
 
 def _sheets(
