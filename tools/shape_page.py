@@ -80,7 +80,7 @@ class Frames:
             std.append(1e3 * arrays[f"{trial.label}_std"][at])
             places.append(true[f"{trial.label}_vertices"] * float(true["unit_mm"]))
         rows = sum(len(t.time) for t in recording.trials)
-        return Frames(*(np.concatenate(parts) for parts in (places, found, std)), 1e3 * (spent - began) / rows)
+        return Frames(np.concatenate(places), np.concatenate(found), np.concatenate(std), 1e3 * (spent - began) / rows)
 
     @property
     def error(self) -> np.ndarray:

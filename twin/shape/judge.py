@@ -23,7 +23,7 @@ from twin.shape.lesson import Data, disturbed
 from twin.twin import Twin
 
 SIZES = (0.0, 2.0, 5.0, 10.0, 30.0)  # mm, of the mean displacement
-LEVELS = 6  # of deformation, equally many samples at each
+LEVELS, ENOUGH = 6, 50  # of deformation, equally many samples at each; with fewer than that all levels are taken for one
 LEAST = 1e-4  # m, of a pointwise error bar
 NARROWEST = 0.05  # a band is narrowed to: of clamped points, whose error is none
 AT_ONCE = 256  # samples
@@ -96,7 +96,8 @@ def _tried(law: type[Learned], arrays: dict[str, Any], data: Data, robot: Robot,
 def _widened(ratio: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Levels (k,) and by how much (k, P) spreads are widened there, of (n, P) and (n,)."""
     parts = np.array_split(np.argsort(levels), LEVELS)
-    widen = np.stack([np.quantile(ratio[rows], 0.9, axis=0) for rows in parts]) / Z90
+    alike = parts if len(levels) >= LEVELS * ENOUGH else [np.arange(len(levels))] * LEVELS
+    widen = np.stack([np.quantile(ratio[rows], 0.9, axis=0) for rows in alike]) / Z90
     return np.array([np.median(levels[rows]) for rows in parts]), np.maximum(widen, NARROWEST)
 
 

@@ -133,7 +133,7 @@ class _Walk:
         G = np.einsum("pn,nck->pck", self.owner.weights, response.reshape(-1, 3, RANK))
         by_push = wrong + J @ (self.a - step)  # J and what is wrong are those before the step
         variance = BAND**2 * _left_open(G, J / noise[:, None], by_push / noise) + own_error(moved) ** 2
-        far = not found or np.abs(self.a).max() > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
+        far = not found or np.linalg.norm(self.a) > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
         return moved, np.sqrt(variance), bool(far)
 
     def _again(self, displacement: np.ndarray) -> np.ndarray:

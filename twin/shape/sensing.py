@@ -69,7 +69,8 @@ def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[s
         notices += said
     if not any(np.isfinite(v).any() for v in readings.values()):
         raise DataError(f"{recording.title}: no resistance is near {body.cords.rest.round(1).tolist()} ohm; check unit and robot")
-    sensed = {i.name: _trial(twin, body, i, readings[i.name], by_name[i.name].other.get(CONTACT)) for i in bench.inputs}
+    contact = {name: str(t.other[CONTACT]) for name, t in by_name.items() if CONTACT in t.other}
+    sensed = {i.name: _trial(twin, body, i, readings[i.name], contact.get(i.name)) for i in bench.inputs}
     return tuple(sensed[t.name] for t in recording.trials), tuple(notices)
 
 
