@@ -71,10 +71,14 @@ class Learned(Estimator):
         return Shapes(moved, std, self._outside(felt))
 
     def _outside(self, felt: Felt) -> np.ndarray:
-        """(n,) over the strains that are there."""
-        centre = self.arrays["known_mean"]
-        x = np.where(np.isfinite(felt.strain), felt.strain, centre) - centre
-        return np.einsum("ni,ij,nj->n", x, self.arrays["known_inverse"], x) > float(self.arrays["known_far"])
+        """(n,) over the strains that are there, as these are spread whatever the others are."""
+        x, covariance = felt.strain - self.arrays["known_mean"], np.linalg.inv(self.arrays["known_inverse"])
+        there, far = np.isfinite(x), np.zeros(len(x))
+        for some in np.unique(there, axis=0):
+            rows = (there == some).all(axis=1)
+            inverse, known = np.linalg.inv(covariance[np.ix_(some, some)]), x[rows][:, some]
+            far[rows] = np.einsum("ni,ij,nj->n", known, inverse, known)
+        return far > float(self.arrays["known_far"])
 
 
 class Pointwise(Learned):
