@@ -240,7 +240,7 @@ def test_hysteresis_that_the_twin_knows_is_undone_in_each_trial_alone(day: Recor
     plain, values = sense(day, aligned.twin)[0], []
     for trial in day.trials:
         R, t, none = np.stack([trial.values[n] for n in names], axis=1), trial.time, np.zeros((len(trial.time), 0))
-        rest = np.broadcast_to(aligned.twin.body().cords.rest, R.shape)
+        rest = np.broadcast_to(Modal(aligned.twin).body.cords.rest, R.shape)
         true = Signals(t, t, none, none, none[:, :, None], t, others={"sensor": R, "sensor_rest": rest})
         values.append(dict(zip(names, law.sense(true).others["sensor"].T, strict=True)))
     lagging = day.with_values(values, day.source)
