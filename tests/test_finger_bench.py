@@ -201,6 +201,18 @@ def test_a_hand_pushes_with_what_it_says_and_lets_go(finger):
     np.testing.assert_allclose(alone.at(middle, finger.skin, count).sum(axis=0), hand.peak[0], rtol=1e-9)
 
 
+def test_two_edges_hold_the_finger_from_opposite_sides(finger):
+    """Three times two forces that all but cancel, each on a strip of the skin; its points lie 4 mm apart along the finger."""
+    hand = Hand.hold(np.random.default_rng(3), finger.skin, 16.0)
+    first, second = hand.peak[0::2], hand.peak[1::2]
+    assert (np.linalg.norm(first + second, axis=1) < 0.16 * np.linalg.norm(first, axis=1)).all()
+    for traction, force in zip(hand.traction, hand.peak, strict=True):
+        weight = traction * finger.skin.area
+        centre = weight @ finger.skin.points
+        assert np.sqrt(weight @ (finger.skin.points[:, 2] - centre[2]) ** 2) < 4.0
+        assert centre[:2] @ force[:2] < -0.98 * np.linalg.norm(centre[:2]) * np.linalg.norm(force)
+
+
 def test_pad_presses_back(finger):
     soft = Finger.of()
     soft.pads = (Pad((1.0, 0.0, 0.0), 18.0, 3e-3),)

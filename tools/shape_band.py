@@ -3,7 +3,7 @@
     twin generate finger --samples 60000 --seed 1 --out shapes/
     python -m tools.shape_band shapes/ [--fingers 30]
 
-Prints the value for BAND in twin/shape/physics.py, and coverage by how hard the strains say the hand presses. The trained
+Prints the value for BAND in twin/shape/physics.py, and coverage by how wide the band is and how far the points moved. The trained
 estimators find theirs when they are trained, on the same fingers. No bench day plays a part.
 """
 
@@ -30,7 +30,7 @@ def main() -> None:
     args = parser.parse_args()
     robot = load("finger")
     data, law, rng = samples(args.shapes, robot), Physics(Twin.of(robot)), np.random.default_rng(5)
-    ratio, push = [], []
+    ratio, push, way = [], [], []
     for kind in ("pushed", "both"):
         rows = np.flatnonzero(data.held & (data.kind == kind))
         for chain in np.array_split(rows, len(rows) // LENGTH)[: args.fingers]:
@@ -40,13 +40,14 @@ def main() -> None:
             away = np.linalg.norm(shapes.moved - true, axis=2)
             spread = np.sqrt(np.maximum(shapes.std**2 - own_error(shapes.moved) ** 2, 1e-14))
             ratio.append(away / spread)
-            push.append(spread.max(axis=1))
-    ratios, pushes = np.concatenate(ratio), np.concatenate(push)
+            push.append(spread.mean(axis=1))
+            way.append(np.linalg.norm(shapes.moved, axis=2).mean(axis=1))
+    ratios = np.concatenate(ratio)
     print(f"BAND = {BAND * np.quantile(ratios, 0.9) / Z90:.2f} (now {BAND}); now it holds {100 * (ratios < Z90).mean():.1f} %")
-    quarter = np.digitize(pushes, np.quantile(pushes, [0.25, 0.5, 0.75]))
-    for q in range(4):
-        held, wide = (ratios[quarter == q] < Z90).mean(), 1e3 * pushes[quarter == q].mean()
-        print(f"  the frames whose widest std is {wide:.2f} mm: {100 * held:.1f} %")
+    for words, sizes in (("std", np.concatenate(push)), ("displacement", np.concatenate(way))):
+        part = np.digitize(sizes, np.quantile(sizes, [0.2, 0.4, 0.6, 0.8]))
+        held = [f"{100 * (ratios[part == k] < Z90).mean():.0f} % at {1e3 * np.median(sizes[part == k]):.2g} mm" for k in range(5)]
+        print(f"  by mean {words}: {', '.join(held)}")
 
 
 if __name__ == "__main__":

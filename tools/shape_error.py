@@ -4,7 +4,8 @@
     python -m tools.shape_error DIR [DIR ...] [--estimators physics,modal]
 
 For each estimator, with the twin as described and with the twin aligned to the day's clouds: mean distance of the named points (mm)
-by trial, the share of points within the 90 % band (1.645 std), and the time a frame takes. --dead 2 cuts sensor 2 off; --aligned
+by trial, the share of points within the 90 % band (1.645 std), the share of frames flagged as unlike all that the estimator knows,
+and the time a frame takes. --dead 2 cuts sensor 2 off; --aligned
 leaves the twin as described out; --search adds one aligned by a black-box search (CMA-ES, `pip install cma`) over 13 numbers.
 """
 
@@ -22,6 +23,7 @@ import numpy as np
 from twin.measurements import Recording, read
 from twin.robots import load
 from twin.shape.align import Aligned, align
+from twin.shape.band import Bands
 from twin.shape.estimator import Z90, estimator, estimators
 from twin.shape.predict import predict
 from twin.twin import Twin
@@ -31,26 +33,32 @@ NEAR = 0.06  # s, within which a frame is the truth's
 
 @dataclass(frozen=True)
 class Score:
-    """Mean vertex error (mm) by trial, the share of points within the band, and ms a frame."""
+    """Mean vertex error (mm) and the share of points within the band by trial, that share of all frames, the share of frames that
+    are flagged as outside, and ms a frame."""
 
     error: dict[str, float]
+    inside: dict[str, float]
     covered: float
+    flagged: float
     frame: float
 
 
 def score(truth: Path, arrays: dict[str, np.ndarray], seconds: float) -> Score:
     true = np.load(truth)
-    error, inside, frames = {}, [], 0
+    error, inside, flagged = {}, {}, []
     for name in sorted(k[:-5] for k in true.files if k.startswith("test") and k.endswith("_time")):
         time_of, t = true[f"{name}_time"], arrays[f"{name}_time"]
         at = np.abs(t[None] - time_of[:, None]).argmin(axis=1)
         near = np.abs(t[at] - time_of) < NEAR
         places = true[f"{name}_vertices"] * float(true["unit_mm"]) * 1e-3
         away = np.linalg.norm(arrays[f"{name}_vertices"][at] - places, axis=2)[near]
-        inside.append((away <= Z90 * arrays[f"{name}_std"][at][near]).ravel())
+        inside[name] = away <= Z90 * arrays[f"{name}_std"][at][near]
+        flagged.append(arrays[f"{name}_outside"][at][near])
         error[name] = 1e3 * float(away.mean())
     frames = sum(len(v) for k, v in arrays.items() if k.endswith("_time"))
-    return Score(error, float(np.concatenate(inside).mean()), 1e3 * seconds / frames)
+    shares = {name: float(each.mean()) for name, each in inside.items()}
+    covered, apart = (float(np.concatenate(parts).mean()) for parts in (list(inside.values()), flagged))
+    return Score(error, shares, covered, apart, 1e3 * seconds / frames)
 
 
 def cut(recording: Recording, sensor: int | None) -> Recording:
@@ -86,6 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         recording, twin = read(day / "measured"), Twin.of(load("finger"))
         found = align(recording, twin)
         print(f"{day.name}: aligned in {found.seconds:.1f} s; off by {aligned_error(found, day / 'shape_truth.npz')}")
+        print(f"  bands widened by {', '.join(f'{n} {by:.2f}' for n, by in found.bands.by.items())}")
         twins = {"aligned": found.twin} if args.aligned else {"described": twin, "aligned": found.twin}
         if args.search:
             from tools.align_search import search
@@ -97,12 +106,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for name in args.estimators.split(","):
             for label, each in twins.items():
                 law, began = estimator(name)(each), time.perf_counter()
-                arrays, _ = predict(cut(recording, args.dead), law)
+                arrays, _ = predict(cut(recording, args.dead), law, found.bands if label == "aligned" else Bands())
                 s = score(day / "shape_truth.npz", arrays, time.perf_counter() - began)
-                errors = "  ".join(f"{k} {v:.2f}" for k, v in s.error.items())
+                errors = "  ".join(f"{k} {v:.2f} {100 * s.inside[k]:.0f} %" for k, v in s.error.items())
                 mean = float(np.mean(list(s.error.values())))
                 print(
-                    f"  {name:20s} {label:10s} {mean:6.2f} mm  ({errors})  in band {100 * s.covered:.0f} %  {s.frame:.1f} ms",
+                    f"  {name:20s} {label:10s} {mean:6.2f} mm  ({errors})  in band {100 * s.covered:.1f} %  "
+                    f"flagged {100 * s.flagged:.1f} %  {s.frame:.1f} ms",
                     flush=True,
                 )
 

@@ -1,5 +1,5 @@
-"""One page of figures on shape from strain: error by estimator, deformation, noise and number of clouds; estimated surfaces
-coloured by error against true ones; cost of each estimator.
+"""One page of figures on shape from strain: error by estimator, deformation, noise and number of clouds; what the 90 % band holds
+by deformation; estimated surfaces coloured by error against true ones; cost of each estimator.
 
     python -m tools.bench.finger --shape --seed 22 --out DAY
     python -m tools.shape_page DAY [DAY ...] --out shape.html
@@ -23,8 +23,8 @@ from plotly.subplots import make_subplots
 from tools.shape_error import score
 from twin.measurements import Clouds, Recording, read
 from twin.robots import load
-from twin.shape.align import align
-from twin.shape.estimator import Estimator, estimator, estimators
+from twin.shape.align import Aligned, align
+from twin.shape.estimator import Z90, Estimator, estimator, estimators
 from twin.shape.predict import predict
 from twin.twin import Twin
 
@@ -39,12 +39,16 @@ COLOURS = ("#1f6f8b", "#b0413e", "#d9a441", "#5b8e5a", "#7b5ea7", "#777777")
 class Day:
     folder: Path
     recording: Recording
-    twin: Twin
+    aligned: Aligned
 
     @staticmethod
     def of(folder: Path) -> Day:
         recording = read(folder / "measured")
-        return Day(folder, recording, align(recording, Twin.of(load("finger"))).twin)
+        return Day(folder, recording, align(recording, Twin.of(load("finger"))))
+
+    @property
+    def twin(self) -> Twin:
+        return self.aligned.twin
 
     @property
     def judged(self) -> Recording:
@@ -57,28 +61,36 @@ class Day:
 
 @dataclass(frozen=True)
 class Frames:
-    """True and estimated places (n, P, 3) mm of a day's judged frames, and ms a frame."""
+    """True and estimated places (n, P, 3) mm of a day's judged frames, their standard deviations (n, P) mm, and ms a frame."""
 
     true: np.ndarray
     found: np.ndarray
+    std: np.ndarray
     cost: float
 
     @staticmethod
-    def of(day: Day, law: Estimator) -> Frames:
+    def of(day: Day, name: str) -> Frames:
+        law = estimator(name)(day.twin)
         began, recording = time.perf_counter(), day.judged
-        arrays, spent = predict(recording, law)[0], time.perf_counter()
-        true, places, found = np.load(day.folder / "shape_truth.npz"), [], []
+        arrays, spent = predict(recording, law, day.aligned.bands)[0], time.perf_counter()
+        true, places, found, std = np.load(day.folder / "shape_truth.npz"), [], [], []
         for trial in recording.trials:
             at = np.abs(arrays[f"{trial.label}_time"][None] - true[f"{trial.label}_time"][:, None]).argmin(axis=1)
             found.append(1e3 * arrays[f"{trial.label}_vertices"][at])
+            std.append(1e3 * arrays[f"{trial.label}_std"][at])
             places.append(true[f"{trial.label}_vertices"] * float(true["unit_mm"]))
         rows = sum(len(t.time) for t in recording.trials)
-        return Frames(np.concatenate(places), np.concatenate(found), 1e3 * (spent - began) / rows)
+        return Frames(np.concatenate(places), np.concatenate(found), np.concatenate(std), 1e3 * (spent - began) / rows)
 
     @property
     def error(self) -> np.ndarray:
         """(n, P) mm."""
         return np.linalg.norm(self.found - self.true, axis=2)
+
+    @property
+    def inside(self) -> np.ndarray:
+        """(n,) per cent of the points in the band."""
+        return 100.0 * (self.error <= Z90 * self.std).mean(axis=1)
 
 
 def noisy(recording: Recording, ohm: float) -> Recording:
@@ -106,7 +118,7 @@ def curves(days: Sequence[Day], names: Sequence[str], frames: dict[str, list[Fra
     """Error by estimator, by deformation, by noise and by number of clouds; cost."""
     titles = (
         "by estimator and day", "by mean displacement, mm", "by noise added to resistances, ohm", "by number of clouds aligned to",
-        "cost of a frame on one busy core, ms (with the skin)",
+        "cost of a frame on one busy core, ms (with the skin)", "points in the 90 % band by mean displacement, mm",
     )  # fmt: skip
     page, first = make_subplots(rows=3, cols=2, subplot_titles=titles, vertical_spacing=0.1), days[0]
     rest = load("finger")
@@ -126,9 +138,13 @@ def curves(days: Sequence[Day], names: Sequence[str], frames: dict[str, list[Fra
         page.add_scatter(x=NOISE, y=noise, **line, row=2, col=1)
         clouds = [first.error(law(twin), first.judged) for _, twin in twins]
         page.add_scatter(x=[count for count, _ in twins], y=clouds, **line, row=2, col=2)
+        held = np.concatenate([f.inside for f in frames[name]])
+        page.add_scatter(x=[size[at == k].mean() for k in bins], y=[held[at == k].mean() for k in bins], **line, row=3, col=2)
         page.add_bar(x=[name], y=[frames[name][0].cost], **{**style, "showlegend": False}, row=3, col=1)
     page.update_yaxes(title_text="mean vertex error, mm", rangemode="tozero")
     page.update_yaxes(title_text="ms", type="log", rangemode="normal", row=3, col=1)
+    page.update_yaxes(title_text="%", rangemode="normal", row=3, col=2)
+    page.add_hline(y=90.0, line_dash="dot", row=3, col=2)  # type: ignore[arg-type]  # plotly's annotation lacks int
     return page.update_layout(height=1200, template="plotly_white", barmode="group", title="Shape from four strain sensors: error")
 
 
@@ -178,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--estimators", default=",".join(sorted(estimators(), key=lambda n: n != "physics")))
     args = parser.parse_args(arguments)
     names, days = args.estimators.split(","), [Day.of(folder) for folder in args.days]
-    frames = {name: [Frames.of(day, estimator(name)(day.twin)) for day in days] for name in names}
+    frames = {name: [Frames.of(day, name) for day in days] for name in names}
     figures = curves(days, names, frames), surfaces(names, frames)
     head = '<!doctype html><meta charset="utf-8"><title>Shape from strain</title>'
     bodies = [to_html(figure, full_html=False, include_plotlyjs=k == 0) for k, figure in enumerate(figures)]

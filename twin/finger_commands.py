@@ -105,13 +105,14 @@ class Shape:
     estimator: Annotated[str, arg(help="which estimator; a wrong name lists those there are")] = "physics"
 
     def run(self) -> None:
+        from twin.shape.align_report import bands_of
         from twin.shape.estimator import estimator
         from twin.shape.predict import predict, write
 
         law = estimator(self.estimator)
         recording, twin = _fingers(self.set, self.twin)
         with working(f"shapes of {recording.title}"):
-            arrays, notices = predict(recording, law(twin))
+            arrays, notices = predict(recording, law(twin), bands_of(self.twin))
             write(self.out, arrays)
         for notice in notices:
             out.print(f"note: {plain(notice)}", highlight=False, markup=False)

@@ -11,6 +11,7 @@ deepsoro.py    a decoder trained by chamfer distance, a baseline                
 constant_curvature.py  an arc, a baseline
 
 sensing.py     a trial to strains and displacements                    align.py      R0, kappa and mounting angle from clouds
+band.py        how wide a band is to be, from clouds
 predict.py     a recording's shapes as a file                          cloud_fit.py, sensor_fit.py, skin.py  what it is made of
 """
 

@@ -4,6 +4,7 @@
 2. Shape under a hand: coordinates of the twin's deformation modes, frame by frame (`cloud_fit.py`).
 3. Sensors: with both kinds of shapes the strains are known, and sqrt(R) = a + a kappa+ max(eps, 0) + a kappa- min(eps, 0), a =
    sqrt(R0), is linear in (a, a kappa+, a kappa-): least squares, robust, with the robot's priors.
+4. Bands: how far each estimator is off behind those clouds tells how wide its band is to be under this hand (`band.py`).
 
 Every step is smooth and small; `tools/shape_error.py` holds it against a black-box search over all numbers at once.
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,11 +21,13 @@ from scipy.optimize import least_squares
 
 from twin.bench import prepare
 from twin.errors import DataError
+from twin.factory import named_points
 from twin.measurements import Clouds, Recording
 from twin.quantities import Fitted
 from twin.sensors import strain
+from twin.shape.band import Bands, Behind, widened_by
 from twin.shape.cloud_fit import BEYOND, CLOUD, CloudFit
-from twin.shape.estimator import Felt
+from twin.shape.estimator import Felt, estimators
 from twin.shape.modal import Network
 from twin.shape.sensing import Sensed, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
@@ -38,10 +42,11 @@ STEP = 1e-4  # m in z, of differences
 @dataclass(frozen=True)
 class Aligned:
     """The aligned twin, its fitted numbers with standard errors, and what they rest on: distances (m, root mean square) of the
-    clouds from the visible skin before and after, samples by kind, and what the clouds could not fix."""
+    clouds from the visible skin before and after, samples by kind, and what the clouds could not fix; how wide bands are to be."""
 
     twin: Twin
     fitted: Mapping[str, Fitted]
+    bands: Bands
     before: float
     after: float
     frames: int
@@ -87,11 +92,13 @@ def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) ->
         progress(f"shapes under the hand, sweep {sweep + 1}")
         fitted |= fit_sensors(_known(shown, CloudFit(skin, net, turned(angle)), statics, net, twin), twin)
         twin = replace(twin, values={**twin.values, **{name: f.value for name, f in fitted.items()}})
+    progress("bands under the hand")
+    bands = _bands([s for s in shown if s.nodes is None and s.frames()], CloudFit(skin, net, turned(angle)), net, twin)
     stds = {p.name: p.std for p in twin.robot.nuisance}
     unfixed = tuple(n for n in stds if n not in fitted or (fitted[n].std or 0.0) > 0.5 * (stds[n] or np.inf))
     frames = sum(len(s.frames()) for s in shown)
     after = _misfit(skin, shown, angle)
-    return Aligned(twin, fitted, before, after, frames, unfixed, notices, time.perf_counter() - begun)
+    return Aligned(twin, fitted, bands, before, after, frames, unfixed, notices, time.perf_counter() - begun)
 
 
 def _shown(recording: Recording, twin: Twin) -> tuple[list[Shown], tuple[str, ...]]:
@@ -150,20 +157,48 @@ def _known(shown: Sequence[Shown], fit: CloudFit, statics: SoftStatics, net: Net
             covariance = np.broadcast_to(FREE**2 * np.eye(eps.shape[1]), (len(eps), eps.shape[1], eps.shape[1]))
             parts.append((eps, trial.sensed.resistance, covariance))
             continue
-        frames = trial.frames()
-        at = [i for i, _ in frames]
-        R = trial.sensed.resistance[at]
-        start = net(Felt(strain(R, body.cords), trial.sensed.displacement[at]))[0]
-        found = [_by_cloud(fit, statics, net, cloud, z) for (_, cloud), z in zip(frames, start, strict=True)]
-        parts.append((np.stack([e for e, _ in found]), R, np.stack([c for _, c in found])))
+        _, found, at = _fitted(trial, fit, net, body)
+        strains = [_strained(statics, net, z, covariance) for z, covariance in found]
+        parts.append((np.stack([e for e, _ in strains]), trial.sensed.resistance[at], np.stack([c for _, c in strains])))
     return Known(*(np.concatenate(p) for p in zip(*parts, strict=True)))
 
 
-def _by_cloud(
-    fit: CloudFit, statics: SoftStatics, net: Network, cloud: np.ndarray, start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Strains (s,) of the shape behind a cloud and their covariance (s, s)."""
-    z, covariance = fit(cloud, start)
+def _bands(pushed: Sequence[Shown], fit: CloudFit, net: Network, twin: Twin) -> Bands:
+    if not pushed:
+        return Bands()
+    behind, by = [_behind(trial, fit, net, twin) for trial in pushed], {}
+    for name, law in estimators().items():
+        with suppress(DataError):  # no weights of it for this robot: nobody will estimate with it either
+            by[name] = widened_by(law(twin), behind)
+    return Bands(by, tuple(sorted({trial.sensed.contact or "" for trial in pushed})))
+
+
+def _fitted(
+    trial: Shown, fit: CloudFit, net: Network, body: SoftBody
+) -> tuple[Felt, list[tuple[np.ndarray, np.ndarray]], list[int]]:
+    """What was felt at a trial's clouds, coordinates of the shapes behind these with their covariance, and the samples."""
+    frames = trial.frames()
+    at = [i for i, _ in frames]
+    felt = Felt(strain(trial.sensed.resistance[at], body.cords), trial.sensed.displacement[at])
+    start = net(felt)[0]
+    return felt, [fit(cloud, z) for (_, cloud), z in zip(frames, start, strict=True)], at
+
+
+def _strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Strains (s,) of a shape and their covariance (s, s)."""
     eps = statics.sensed(net.modes.nodes(np.concatenate([z[None], z + STEP * np.eye(len(z))])))["strain"]
     slope = (eps[1:] - eps[0]).T / STEP
     return eps[0], slope @ covariance @ slope.T + PUSHED**2 * np.eye(len(slope))
+
+
+def _behind(trial: Shown, fit: CloudFit, net: Network, twin: Twin) -> Behind:
+    """The named points behind a pushed trial's clouds."""
+    body = twin.body()
+    assert isinstance(body, SoftBody)
+    felt, found, at = _fitted(trial, fit, net, body)
+    weights = body.lattice.weights(named_points(twin.robot).rest)
+    moved = np.einsum("pn,fnc->fpc", weights, net.modes.nodes(np.stack([z for z, _ in found])))
+    basis = np.einsum("pn,knc->kpc", weights, net.modes.basis.reshape(len(net.modes.basis), -1, 3))
+    variance = [np.einsum("kpc,kl,lpc->p", basis, c, basis, optimize=True) for _, c in found]
+    time_of = trial.sensed.time[at]
+    return Behind(felt, float(time_of[-1] - time_of[0]), moved, np.sqrt(np.stack(variance)))

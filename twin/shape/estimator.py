@@ -65,6 +65,11 @@ class Estimator(ABC):
         self.twin, self.body = twin, body
         self.points: Points = named_points(twin.robot)
 
+    @classmethod
+    def name(cls) -> str:
+        """Its file's."""
+        return cls.__module__.rpartition(".")[2]
+
     @abstractmethod
     def estimate(self, felt: Felt) -> Shapes:
         """The shapes behind what is felt."""

@@ -1,10 +1,11 @@
 """Estimators that are trained on the factory's shapes: their weights, how wide their band is, and what they know.
 
-    std^2 = (widen spread)^2 + own^2,      `widen` (2, P): of each point, where something may press and where nothing does
+    std^2 = (widen spread)^2 + own^2,      `widen` (2, k, P): of each point, where something may press and where nothing does,
+                                            at k mean displacements `levels` (2, k) m of the points, between these by straight lines
 
-so that 1.645 widen spread holds 90 % of its places on held-out factory fingers; own is the error of the twin that made these. A
-strain pattern is outside what they know where its distance from the factory's patterns, a Mahalanobis distance, is beyond all but
-one in a thousand of those.
+so that 1.645 widen spread holds 90 % of its places on held-out factory fingers, little and far deformed ones alike; own is the
+error of the twin that made these. A strain pattern is outside what they know where its distance from the factory's patterns, a
+Mahalanobis distance, is beyond all but one in a thousand of those.
 """
 
 from __future__ import annotations
@@ -22,6 +23,18 @@ if TYPE_CHECKING:
     from twin.shape.lesson import Data, Lesson
 
 
+def level(moved: np.ndarray) -> np.ndarray:
+    """Mean displacement (n,) m of points moved by (n, P, 3) m."""
+    return np.linalg.norm(moved, axis=2).mean(axis=1)
+
+
+def at_level(level: np.ndarray, levels: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(n, P) at levels (n,) of `values` (k, P) at rising `levels` (k,); beyond the last as at the last."""
+    i = np.clip(np.searchsorted(levels, level) - 1, 0, len(levels) - 2)
+    t = np.clip((level - levels[i]) / (levels[i + 1] - levels[i]), 0.0, 1.0)[:, None]
+    return (1.0 - t) * values[i] + t * values[i + 1]
+
+
 class Learned(Estimator):
     """Base of all estimators with weights. Remembers nothing."""
 
@@ -35,11 +48,11 @@ class Learned(Estimator):
     @classmethod
     def file(cls) -> str:
         """Name of the weights' file beside robot.toml."""
-        return f"{cls.__module__.rpartition('.')[2]}.npz"
+        return f"{cls.name()}.npz"
 
     @classmethod
     def form(cls) -> str:
-        return f"twin-{cls.__module__.rpartition('.')[2]}/2"
+        return f"twin-{cls.name()}/3"
 
     @classmethod
     @abstractmethod
@@ -52,14 +65,20 @@ class Learned(Estimator):
 
     def estimate(self, felt: Felt) -> Shapes:
         moved, spread = self.decode(felt)
-        std = np.hypot(spread * self.arrays["widen"][0 if felt.pushed else 1], own_error(moved))
+        row = 0 if felt.pushed else 1
+        widen = at_level(level(moved), self.arrays["levels"][row], self.arrays["widen"][row])
+        std = np.hypot(spread * widen, own_error(moved))
         return Shapes(moved, std, self._outside(felt))
 
     def _outside(self, felt: Felt) -> np.ndarray:
-        """(n,) over the strains that are there."""
-        centre = self.arrays["known_mean"]
-        x = np.where(np.isfinite(felt.strain), felt.strain, centre) - centre
-        return np.einsum("ni,ij,nj->n", x, self.arrays["known_inverse"], x) > float(self.arrays["known_far"])
+        """(n,) over the strains that are there, as these are spread whatever the others are."""
+        x, covariance = felt.strain - self.arrays["known_mean"], np.linalg.inv(self.arrays["known_inverse"])
+        there, far = np.isfinite(x), np.zeros(len(x))
+        for some in np.unique(there, axis=0):
+            rows = (there == some).all(axis=1)
+            inverse, known = np.linalg.inv(covariance[np.ix_(some, some)]), x[rows][:, some]
+            far[rows] = np.einsum("ni,ij,nj->n", known, inverse, known)
+        return far > float(self.arrays["known_far"])
 
 
 class Pointwise(Learned):

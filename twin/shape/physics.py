@@ -6,13 +6,13 @@ B is the root of the covariance of the factory's hands, so that a is a Gaussian 
 equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before. Without a push u is what the
 tendons make of it.
 
-Hands press gently or hard, so that (a, strain error) are normal given a strength of which little is known: together a t
-distribution of FREEDOM degrees. What m strains leave open is then wider the harder the likeliest push,
+How wide the error bar is: hands press gently or hard, so that for it a ~ N(0, s^2), and which strength s the strains speak for that
+tendons alone leave, delta = eps_felt - eps + J a, is weighed by Bayes. With J / sigma = U diag(d) V' and y = U' delta / sigma,
 
-    C = (FREEDOM + q) / (FREEDOM + m)  G (1 - J' (J J' + sigma^2)^-1 J) G',      G = dx/da,  J = deps/da,
+    p(s | y) ~ p(s) prod_k N(y_k; 0, 1 + s^2 d_k^2),      C = sum_s p(s | y) s^2 G (1 - V' diag(s^2 d^2 / (1 + s^2 d^2)) V) G'
 
-q = |a|^2 + |(eps - eps_felt) / sigma|^2 (Kotz and Nadarajah 2004, sec. 1.11), and the error bar is BAND of its root and the twin's
-own error.
+G = dx/da, J = deps/da; the error bar is BAND of the root of C, and the twin's own error. Where the strains show nobody pressing it
+is narrow, the harder they show a push the wider. p(s) is the factory's: even up to STRENGTH, falling as s^-FALL beyond.
 """
 
 from __future__ import annotations
@@ -35,8 +35,10 @@ ROUNDS = 4
 SETTLED = 0.02  # of a step in a
 LONGEST = 4.0  # of a step in a
 OUTSIDE = 4.0  # standard deviations of the residual strain, or of a push, that the twin does not explain
-FREEDOM = 1.0  # as widely as the factory's hands differ in strength: with it gentle and hard pushes are covered alike
-BAND = 0.96  # so that 1.645 std holds 90 % of the points of held-out factory fingers: python -m tools.shape_band
+STRENGTH, FALL = 1.3, 10.0  # of the factory's hands: the likeliest for 140 of its training fingers
+S = np.geomspace(0.02, 8.0, 40)
+PRIOR = np.where(S < STRENGTH, S, S * (STRENGTH / S) ** FALL)  # on this grid, whose cells are as wide as s
+BAND = 0.92  # so that 1.645 std holds 90 % of the points of held-out factory fingers: python -m tools.shape_band
 
 
 class Physics(Estimator):
@@ -58,7 +60,7 @@ class Physics(Estimator):
         with single_thread():
             walk = _Walk(self)
             for i in range(n):
-                moved[i], std[i], outside[i] = walk.to(felt.displacement[i], felt.strain[i] if felt.pushed else None)
+                moved[i], std[i], outside[i] = (walk.pushed if felt.pushed else walk.free)(felt.displacement[i], felt.strain[i])
         return Shapes(moved, std, outside)
 
 
@@ -72,6 +74,22 @@ def _prior(cone: Cone, cells: int) -> np.ndarray:
     return vectors[:, -RANK:] * np.sqrt(np.maximum(values[-RANK:], 0.0))
 
 
+def _noise(strain: np.ndarray) -> np.ndarray:
+    return np.hypot(STRAIN, GAIN * strain)
+
+
+def _left_open(G: np.ndarray, J: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Variance (P,) m^2 of the points: G (P, 3, RANK) are their slopes by a, J (m, RANK) those of the strains and y (m,) the
+    strains that tendons alone leave, these in standard deviations."""
+    U, d, V = np.linalg.svd(J, full_matrices=False)
+    told = (S[:, None] * d) ** 2
+    fits = -0.5 * (np.log1p(told) + (U.T @ y) ** 2 / (1.0 + told)).sum(axis=1)
+    p = PRIOR * np.exp(fits - fits.max())
+    p /= p.sum()
+    known = (p * S**2) @ (told / (1.0 + told))
+    return (p @ S**2) * (G**2).sum(axis=(1, 2)) - ((G @ V.T) ** 2).sum(axis=1) @ known
+
+
 class _Walk:
     """One way through a trial's samples."""
 
@@ -81,18 +99,26 @@ class _Walk:
         self.hanging = hang(self.solid, self.shape, owner.weight)
         self.at, self.burden, self.a = np.zeros(len(self.hanging)), owner.weight, np.zeros(RANK)
 
-    def to(self, displacement: np.ndarray, strain: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Displacements (P, 3), std (P,) and whether this is outside, of the next sample; strain None where nothing pushes."""
-        there = np.isfinite(strain) if strain is not None else np.zeros(0, bool)
-        if strain is None or not there.any():
-            found = self._march(displacement, np.zeros(RANK))
-            moved = self.owner.weights @ self.shape.u
-            return moved, own_error(moved), not found
-        felt, covariance, wrong, step = strain[there], np.eye(RANK), np.zeros(1), np.zeros(RANK)
-        noise, response, found = np.hypot(STRAIN, GAIN * felt), np.zeros((self.shape.u.size, RANK)), True
+    def free(self, displacement: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Displacements (P, 3), std (P,) and whether this is outside, of the next sample, if nothing pushes; strains that tendons
+        alone do not make say that something does."""
+        found = self._march(displacement, np.zeros(RANK))
+        moved, there = self.owner.weights @ self.shape.u, np.isfinite(strain)
+        away = np.abs(self._strain()[0] - strain)[there] / _noise(strain[there])
+        return moved, own_error(moved), not found or bool((away > OUTSIDE).any())
+
+    def pushed(self, displacement: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The same, if something may push."""
+        there = np.isfinite(strain)
+        if not there.any():
+            return self.free(displacement, strain)
+        felt, wrong, step = strain[there], np.zeros(there.sum()), np.zeros(RANK)
+        noise, response, found = _noise(felt), np.zeros((self.shape.u.size, RANK)), True
+        J = np.zeros((len(felt), RANK))
         for _ in range(ROUNDS):
             if not self._march(displacement, self.a):
-                found, step, covariance, response = False, np.zeros(RANK), np.eye(RANK), self._again(displacement)
+                found, step, response = False, np.zeros(RANK), self._again(displacement)
+                J, wrong = np.zeros_like(J), np.zeros_like(wrong)
                 break
             response = self._response()
             eps, slope = self._strain()
@@ -100,15 +126,14 @@ class _Walk:
             gain = np.linalg.solve(J @ J.T + np.diag(noise**2), J).T
             step = gain @ (wrong + J @ self.a) - self.a
             step *= min(1.0, LONGEST / np.linalg.norm(step))
-            covariance = np.eye(RANK) - gain @ J
             self.a = self.a + step
             if np.abs(step).max() < SETTLED:
                 break
         moved = self.owner.weights @ (self.shape.u + (response @ step).reshape(-1, 3))
         G = np.einsum("pn,nck->pck", self.owner.weights, response.reshape(-1, 3, RANK))
-        strength = (FREEDOM + self.a @ self.a + ((wrong / noise) ** 2).sum()) / (FREEDOM + len(felt)) if found else 1.0
-        variance = np.einsum("pck,kl,pcl->p", G, covariance, G, optimize=True) * strength * BAND**2 + own_error(moved) ** 2
-        far = not found or np.abs(self.a).max() > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
+        by_push = wrong + J @ (self.a - step)  # J and what is wrong are those before the step
+        variance = BAND**2 * _left_open(G, J / noise[:, None], by_push / noise) + own_error(moved) ** 2
+        far = not found or np.linalg.norm(self.a) > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
         return moved, np.sqrt(variance), bool(far)
 
     def _again(self, displacement: np.ndarray) -> np.ndarray:

@@ -8,21 +8,26 @@ import numpy as np
 
 from twin.errors import DataError
 from twin.measurements import Recording
+from twin.shape.band import Bands, widened
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.shape.sensing import Sensed, sense
 from twin.shape.skin import Skin
 from twin.soft.statics import single_thread, turned
 
+PLAIN = Bands()
 
-def predict(recording: Recording, estimator: Estimator) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+
+def predict(recording: Recording, estimator: Estimator, bands: Bands = PLAIN) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3) m of each trial,
-    and what a reader should know."""
+    and what a reader should know. `bands`: how wide they are to be where something may press."""
     sensed, notices = sense(recording, estimator.twin)
     arrays, skin = {}, SkinOf(estimator)
     for trial in sensed:
         label = next(t.label for t in recording.trials if t.name == trial.name)
         with single_thread():
             shapes = estimator.estimate(felt(trial, estimator))
+        if trial.contact is not None:
+            shapes = widened(shapes, bands.of(estimator, trial.contact))
         turn = turned(estimator.body.turn).T
         arrays |= {
             f"{label}_time": trial.time,

@@ -27,13 +27,17 @@ FLAT, MOVING = 0.005, 0.03  # of the resistance at rest: noise is below the one,
 @dataclass(frozen=True)
 class Sensed:
     """One trial: time (n,) s, resistance (n, s) ohm with the sensors' effects undone, NaN where a sensor is dead; displacement
-    (n, t) m as the motors pull; whether something may push."""
+    (n, t) m as the motors pull; what may push, in the words of the set, None where nothing does."""
 
     name: str
     time: np.ndarray
     resistance: np.ndarray
     displacement: np.ndarray
-    pushed: bool
+    contact: str | None
+
+    @property
+    def pushed(self) -> bool:
+        return self.contact is not None
 
     def strain(self, cords: Cords) -> np.ndarray:
         return strain(self.resistance, cords)
@@ -65,7 +69,8 @@ def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[s
         notices += said
     if not any(np.isfinite(v).any() for v in readings.values()):
         raise DataError(f"{recording.title}: no resistance is near {body.cords.rest.round(1).tolist()} ohm; check unit and robot")
-    sensed = {i.name: _trial(twin, body, i, readings[i.name], CONTACT in by_name[i.name].other) for i in bench.inputs}
+    contact = {name: str(t.other[CONTACT]) for name, t in by_name.items() if CONTACT in t.other}
+    sensed = {i.name: _trial(twin, body, i, readings[i.name], contact.get(i.name)) for i in bench.inputs}
     return tuple(sensed[t.name] for t in recording.trials), tuple(notices)
 
 
@@ -98,7 +103,7 @@ def _alive(name: str, channels: list[str], values: np.ndarray, rest: np.ndarray)
     return out, said
 
 
-def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, pushed: bool) -> Sensed:
+def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, contact: str | None) -> Sensed:
     laws = twin.laws
     driven = laws.drive(laws.command(inputs.signals.with_(antagonists=body.antagonists)))
     assert isinstance(body, SoftBody)
@@ -109,4 +114,4 @@ def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, pushed:
             seen = laws.sense(driven.with_(others={"sensor": R, "sensor_rest": rest})).group("sensor")[..., 0]
             R = np.maximum(R + known - seen, 1e-3 * rest)
     R = np.where(np.isfinite(reported), R, np.nan)
-    return Sensed(inputs.name, inputs.time, R, driven.command, pushed)
+    return Sensed(inputs.name, inputs.time, R, driven.command, contact)

@@ -1,6 +1,7 @@
 """Write one virtual day of the soft finger:  python -m tools.bench.finger --out DIR --effect tendon_friction --seed 7
 
---effect may be given several times, or --effects a,b; without any the set has no effect. --shape writes a day for shape sensing.
+--effect may be given several times, or --effects a,b; without any the set has no effect. --shape writes a day for shape sensing;
+with --edges, two sharp edges hold the finger in its tests where else a hand pushes.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ def main() -> None:
     parser.add_argument("--effects", default="", help="the same, with commas: " + ", ".join(known))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--shape", action="store_true", help="trials to align a shape estimator by and to test it on")
+    parser.add_argument("--edges", action="store_true", help="of a shape day: two sharp edges hold the finger in its tests")
     args = parser.parse_args()
     names = args.effect + [name for name in args.effects.split(",") if name]
     if strange := sorted(set(names) - set(known)):
@@ -33,7 +35,7 @@ def main() -> None:
     def progress(what: str) -> None:
         print(f"{time.perf_counter() - began:6.1f} s  {what}", file=sys.stderr, flush=True)
 
-    for effect in make_set(args.out, names, args.seed, args.shape, progress):
+    for effect in make_set(args.out, names, args.seed, args.shape, progress, args.edges):
         print(effect)
     print(args.out)
 

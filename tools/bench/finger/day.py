@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,16 +24,24 @@ TABLES = Path(__file__).parent
 
 
 def make_set(
-    folder: Path, names: Sequence[str], seed: int, shape: bool = False, progress: Callable[[str], None] = lambda what: None
+    folder: Path,
+    names: Sequence[str],
+    seed: int,
+    shape: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+    edges: bool = False,
 ) -> list[Effect]:
-    """Write one day: folder/measured, folder/holdout, folder/truth.json; a shape day has folder/shape_truth.npz for its holdout."""
+    """Write one day: folder/measured, folder/holdout, folder/truth.json; a shape day has folder/shape_truth.npz for its holdout.
+    `edges`: in its tests two edges hold the finger, in place of a hand that pushes."""
     # Streams of their own, so that adding an effect changes neither finger nor day.
     making, motions, hands, instruments, laws = (np.random.default_rng([seed, n]) for n in range(5))
     built = Built.draw(making)
     effects = [all_effects()[name].draw(laws, built) for name in names]
     finger = make_finger(built, effects)
     trials = shape_day(motions) if shape else bench_day(motions)
-    pushes = {t.name: Hand.draw(hands, finger.skin, float(t.time[-1])) for t in trials if t.hand}
+    trials = [replace(t, edges=edges and t.hand and t.name.startswith("test")) for t in trials]
+    pushing = {t.name: Hand.hold if t.edges else Hand.draw for t in trials if t.hand}
+    pushes = {t.name: pushing[t.name](hands, finger.skin, float(t.time[-1])) for t in trials if t.hand}
     logs = run(finger, effects, trials, pushes, progress)
     sheets = _sheets(instruments, finger, built, effects, logs, markers=not shape)
     folder.mkdir(parents=True)

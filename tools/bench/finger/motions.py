@@ -25,6 +25,7 @@ class Trial:
     frames: float = 2.0  # s between two clouds
     cloud: bool = True
     hand: bool = False
+    edges: bool = False  # in place of a hand
     heldout: bool = False
 
 

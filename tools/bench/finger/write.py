@@ -60,7 +60,7 @@ def write_set(folder: Path, title: str, sheets: Sequence[Sheet]) -> None:
             points = (1e-3 * np.concatenate(sheet.clouds)).astype(np.float32)
             np.savez_compressed(whole / f"{name}.clouds.npz", points=points, offsets=offsets, time=sheet.frames)
         if sheet.trial.hand:
-            lines.append('external_contact = "hand, force unknown"')
+            lines.append(f'external_contact = "{"two edges" if sheet.trial.edges else "hand"}, force unknown"')
         _write_csv(whole / f"{name}.csv", ["time", *(c[0] for c in channels)], sheet)
     (whole / "measurements.toml").write_text("\n".join(lines) + "\n")
     whole.rename(folder)

@@ -1,0 +1,86 @@
+"""Bands of shape estimators: the closed forms behind them, and the widths that clouds ask for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from twin.errors import DataError
+from twin.robots import load
+from twin.shape.align_report import BANDS, HANDS, TABLE, bands_of
+from twin.shape.band import HANDS as DIFFER
+from twin.shape.band import ONE, PUSH, STRANGER, Bands, Behind, widened, widened_by
+from twin.shape.estimator import Estimator, Felt, Shapes, own_error
+from twin.shape.learned import at_level
+from twin.shape.physics import PRIOR, S, _left_open
+from twin.twin import Twin
+
+FRAMES = 60
+
+
+def test_what_strains_leave_open_is_the_variance_given_them() -> None:
+    """One strain y = 3 a_1 + noise, one point moved by a_2: given y its variance is the mean of s^2, here of draws near that y. 3 %
+    is three times the scatter of some 20,000 draws' variance, which has heavy tails."""
+    rng, G = np.random.default_rng(0), np.array([[[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]]])
+    s = rng.choice(S, size=2_000_000, p=PRIOR / PRIOR.sum())
+    y = 3.0 * s * rng.normal(size=len(s)) + rng.normal(size=len(s))
+    for at in (0.0, 4.0):
+        drawn = s[np.abs(y - at) < 0.1]
+        assert _left_open(G, np.array([[3.0, 0.0]]), np.array([at])) == pytest.approx((drawn**2).mean(), rel=0.03)
+
+
+def test_what_a_sharp_strain_tells_is_not_left_open() -> None:
+    """Of a point that moves with a_1 alone only the strain's own noise is left, 1 / 50^2."""
+    G = np.array([[[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]])
+    assert _left_open(G, np.array([[50.0, 0.0]]), np.array([40.0])) == pytest.approx(1.0 / 50.0**2, rel=0.01)
+
+
+def test_widths_between_and_beyond_levels() -> None:
+    levels, values = np.array([1.0, 3.0]), np.array([[2.0, 10.0], [4.0, 30.0]])
+    got = at_level(np.array([0.0, 1.0, 2.0, 3.0, 9.0]), levels, values)
+    assert got.tolist() == [[2.0, 10.0], [2.0, 10.0], [3.0, 20.0], [4.0, 30.0], [4.0, 30.0]]
+
+
+class Sure(Estimator):
+    """Always the same shape and the same spread."""
+
+    about = "for a test"
+
+    def estimate(self, felt: Felt) -> Shapes:
+        moved = np.full((len(felt), len(self.points.rest), 3), 1e-3)
+        return Shapes(moved, np.hypot(5e-4, own_error(moved)), np.zeros(len(felt), bool))
+
+
+@pytest.mark.parametrize("off", [0.5, 2.0])
+def test_clouds_tell_how_wide_a_band_is_to_be(off: float) -> None:
+    """Points behind the clouds lie apart by `off` times what the band says, along one axis, the cloud's own scatter beside it: the
+    band is moved towards that, by the weight that some five pushes have."""
+    law, rng, cloud = Sure(Twin.of(load("finger"))), np.random.default_rng(1), 1e-4
+    felt = Felt(np.zeros((FRAMES, 4)), np.zeros((FRAMES, 4)))
+    moved = law.estimate(felt).moved
+    each = np.hypot(off * 5e-4, np.hypot(cloud, own_error(moved)))
+    moved[..., 0] += each * rng.normal(size=each.shape)  # of one axis 1.645 std hold 90 %
+    pushes = 16.0 / PUSH
+    weight = DIFFER**2 / (DIFFER**2 + ONE**2 / pushes)
+    by = widened_by(law, [Behind(felt, 16.0, moved, np.full(each.shape, cloud))])
+    assert by == pytest.approx(off**weight, rel=0.02)  # 36,000 points: their 90 % quantile is good to 1 %
+    wide = widened(law.estimate(felt), by)
+    assert np.allclose(wide.std**2 - own_error(wide.moved) ** 2, (by * 5e-4) ** 2)
+
+
+def test_what_pushed_in_no_alignment_is_a_stranger() -> None:
+    law = Sure(Twin.of(load("finger")))
+    bands = Bands({law.name(): 0.7}, ("hand",))
+    assert (bands.of(law, "hand"), bands.of(law, "two edges"), Bands().of(law, "hand")) == (0.7, STRANGER, 1.0)
+
+
+def test_bands_are_read_beside_the_aligned_twin(tmp_path: Path) -> None:
+    (tmp_path / TABLE).write_text(json.dumps({BANDS: {"sure": 0.8}, HANDS: ["hand"]}))
+    assert bands_of(str(tmp_path)) == bands_of(str(tmp_path / "twin.toml")) == Bands({"sure": 0.8}, ("hand",))
+    assert bands_of("finger") == Bands()
+    (tmp_path / TABLE).write_text("half a")
+    with pytest.raises(DataError, match="twin align"):
+        bands_of(str(tmp_path))
