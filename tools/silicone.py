@@ -6,7 +6,7 @@ incompressible neo-Hookean bar under engineering strain e, stretch a = 1 + e, ca
     s = E / 3 (a - 1 / a^2).
 
 E is fitted (least squares) up to a strain, with the strain at which the grips had taken up the slack (cross-heads read it); the
-law holds up to the largest strain to which no stress is off by more than `HOLDS` of the largest. A test is one specimen at one rate:
+law holds up to the largest strain to which no stress is off by more than `HOLDS` of the largest. A test is one specimen at a rate:
 unloading, rate and batch are not in it.
 """
 
