@@ -17,7 +17,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from twin.effects import named
-from twin.env import LENGTHS
+from twin.env import KINDS
 from twin.env.continuum import ContinuumReach, ContinuumTrack, Options
 from twin.env.domain import Spread, draw, read_spread
 from twin.env.plant import Plant
@@ -44,7 +44,7 @@ def diagnosed(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", sorted(LENGTHS))
+@pytest.mark.parametrize("name", sorted(KINDS))
 def test_gymnasiums_checker_finds_nothing(name: str) -> None:
     env = gymnasium.make(f"twin/{name}").unwrapped
     with warnings.catch_warnings():
