@@ -72,7 +72,7 @@ def main() -> None:
     print(f"MuJoCo's own steps    {100 * own * one:8.1f} % of that ({1e3 * own:.2f} ms of {1e3 / one:.2f})")
     print(f"{said.envs:3d} in one batch      {many:8.1f} steps/s, {many / one:.2f} times as many")
     cores = cpu_count()
-    print(f"bare MuJoCo, {cores} cores {cores / own:8.1f} steps/s, {cores / own / one:.2f} times as many: no batch of this physics does more")
+    print(print(f"bare MuJoCo, {cores} cores {cores / own:8.1f} steps/s, {cores / own / one:.2f} times as many"))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Many environments stepped side by side in one process: threads, which MuJoCo's steps and all laws between them leave to each other.
+"""Many environments stepped side by side in one process, by threads: MuJoCo's steps and the laws between them run without the GIL.
 
 Each environment has its own twin, its own random numbers and its own motion, so that what it does depends on its seed alone, not on
 the number of threads.
@@ -49,7 +49,9 @@ class Batch(VectorEnv):
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """All of them. Raises DataError for seeds that are not one each."""
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if seed is None or isinstance(seed, int) else seed
+        seeds = (
+            [None if seed is None else seed + i for i in range(self.num_envs)] if seed is None or isinstance(seed, int) else seed
+        )
         if len(seeds) != self.num_envs:
             raise DataError(f"{len(seeds)} seeds came for {self.num_envs} environments; give one each, or one number")
         made = list(self._threads.map(lambda one: one[0].reset(seed=one[1], options=options), zip(self.envs, seeds, strict=True)))

@@ -30,8 +30,10 @@ TASKS = {"ContinuumReach": ContinuumReach, "ContinuumTrack": ContinuumTrack}
 def load(
     task: str = "ContinuumReach", twin: str | Path | Twin = "continuum", seed: int | None = None, **options: Any
 ) -> control.Environment:  # fmt: skip
-    """A task on a twin, with the options of the gymnasium environment. Raises UnknownNameError for a task or an option that there is
-    not."""
+    """A task on a twin, with the options of the gymnasium environment.
+
+    Raises UnknownNameError for a task or an option that there is not.
+    """
     if task not in TASKS:
         raise UnknownNameError("task", task, list(TASKS))
     physics = Physics(TASKS[task](twin, **options), seed)
@@ -44,8 +46,8 @@ class Physics(control.Physics):
 
     def __init__(self, env: ContinuumReach, seed: int | None) -> None:
         self.env, self._seed = env, seed
-        self._control, self._taken = np.zeros(env.n), 0
-        self.reset()
+        self._control, self._taken, self.seen = np.zeros(env.n), 0, np.zeros(0, np.float32)
+        self.reward, self.lost = 0.0, False
 
     def reset(self) -> None:
         """A new episode; the seed counts for the first."""
@@ -86,6 +88,9 @@ class Task(control.Task):
         sizes = physics.env.parts
         cuts = np.split(physics.seen, np.cumsum(list(sizes.values()))[:-1])
         return OrderedDict(zip(sizes, cuts, strict=True))
+
+    def observation_spec(self, physics: Physics) -> OrderedDict[str, specs.Array]:
+        return OrderedDict((name, specs.Array((size,), np.float32, name)) for name, size in physics.env.parts.items())
 
     def get_reward(self, physics: Physics) -> float:
         return physics.reward

@@ -47,8 +47,8 @@ class Options:
 class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
     """Turn a block about the vertical to a wanted angle, with three silicone fingers that hang over it.
 
-    `twin`: a twin.toml, a report's folder or a robot's name, of the family `hand`. The block, 2 `size` wide and 50 mm high, lies on a
-    table between the fingertips; each of the f fingers has p servos, each of which pulls a tendon in by as much as it pays its
+    `twin`: a twin.toml, a report's folder or a robot's name, of the family `hand`. The block, 2 `size` wide and 50 mm high, lies
+    on a table between the fingertips; each of the f fingers has p servos, each of which pulls a tendon in by as much as it pays its
     antagonist out. Effects on the body and along the tendons act; effects on sensors, drives and creep are refused here.
 
     Action, Box(-1, 1, (f p,)):
@@ -66,13 +66,13 @@ class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
     | fs+fp, +1 | sine and cosine of the block's angle about the vertical, by camera | 1 |
     | fs+fp+2, +3 | sine and cosine of the wanted angle | 1 |
 
-    With `observe="full"` there follow the block's place from the palm's axis (3, 0.05 m), its turn (4, quaternion), its velocity and
-    angular velocity (6, m/s and rad/s), and the tendons' tensions (N).
+    With `observe="full"` there follow the block's place from where it began (3, 0.05 m), its turn (4, quaternion), its
+    velocity and angular velocity (6, m/s and rad/s), and the tendons' tensions (N).
 
-    Reward: -|angle - wanted| (rad, the short way round), less the block's way from the palm's axis (0.05 m). `info`: angle, wanted,
+    Reward: -|angle - wanted| (rad, the short way round), less the block's way from where it began (0.05 m). `info`: angle, wanted,
     error (rad), success (within `success`), touching (points of the hand in contact). An episode is truncated after 60 steps, three
-    seconds of about 0.6 times real time; and, with a reward of -10 and the cause in `info["lost"]`, where a state is not finite, or
-    the block has left the fingers' reach.
+    seconds at some 0.6 times real time; and, with a reward of -10 and the cause in `info["lost"]`, where a state is not finite or
+    the block out of the fingers' reach.
     """
 
     metadata = {"render_modes": [], "render_fps": 20}  # noqa: RUF012
@@ -92,7 +92,8 @@ class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
-        """At rest, servos at zero; a twin, a block and a wanted angle drawn. Raises SolveError where draw after draw stands nowhere."""
+        """At rest, servos at zero; a twin, a block and a wanted angle drawn. Raises SolveError where draw after draw has no
+        equilibrium."""
         super().reset(seed=seed)
         o, rng = self.options, self.np_random
         for attempt in range(REDRAWS):

@@ -25,8 +25,8 @@ from twin.twin import Twin
 
 
 class Felt(NamedTuple):
-    """What sensors report at one instant: tension (t,) N, displacement (t,) m, resistance (s,) over that at no strain; and where the
-    markers truly are, (m, 3) m of the base frame, the tip last."""
+    """What sensors report at one instant: tension (t,) N, displacement (t,) m, resistance (s,) over that at no strain; and where
+    the markers truly are, (m, 3) m of the base frame, the tip last."""
 
     tension: np.ndarray
     displacement: np.ndarray
@@ -84,8 +84,8 @@ class HandPlant:
     """A hand and things, its pairs of antagonist tendons driven by servos. One instance serves one thread."""
 
     def __init__(self, twin: Twin, things: list[Thing], interval: float) -> None:
-        """At rest, the servos at zero. Raises DataError for a robot that is no hand and for effects that do not act here, SolveError
-        where it has no equilibrium."""
+        """At rest, the servos at zero. Raises DataError for a robot that is no hand and for effects that do not act here,
+        SolveError where it has no equilibrium."""
         body = twin.body()
         if not isinstance(body, HandBody):
             raise DataError(f"robot {twin.robot.name!r} is no hand: give a twin of the family 'hand'")
@@ -100,5 +100,6 @@ class HandPlant:
         self.rest = np.stack([finger.cords.rest for finger in body.fingers])
 
     def step(self, servos: np.ndarray) -> Sight:
-        """One interval on, the servos (finger, pair) m going straight to where they are told. Raises SolveError where it is lost."""
+        """One interval on, the servos (finger, pair) m going straight to where they are told. Raises SolveError where the motion is
+        lost."""
         return self.scene.step(servos, self.interval)

@@ -40,8 +40,8 @@ class Wires:
     def note(
         self, tension: np.ndarray, displacement: np.ndarray, markers: np.ndarray, others: Mapping[str, np.ndarray] | None = None
     ) -> None:
-        """What is true at the time last commanded: (n_tendon,) N, (n_tendon,) m, (n_marker, 3) m as their frame has them, and further
-        signals (n_port,) by group."""
+        """What is true at the time last commanded: (n_tendon,) N, (n_tendon,) m, (n_marker, 3) m as their frame has them, and
+        further signals (n_port,) by group."""
         self._seen.append((tension, displacement, markers, others or {}))
 
     def sensed(self) -> Signals:
