@@ -89,7 +89,7 @@ def test_nothing_is_returned_where_no_rollout_got_anywhere() -> None:
     ("robot", "drive", "steps"),
     [
         ("continuum", Drive.TENSION, True),
-        ("continuum", Drive.DISPLACEMENT, False),
+        ("continuum", Drive.DISPLACEMENT, True),
         ("finger", Drive.DISPLACEMENT, True),
         ("two_link", Drive.TENSION, False),
     ],
@@ -125,6 +125,16 @@ def test_a_table_drives_a_rollout_and_is_refused_with_a_gap(tmp_path: Path) -> N
     table.write_text(table.read_text().replace("0.5,1", "0.5,"))
     with pytest.raises(DataError, match="row 3, column tendon_1_tension"):
         from_table(Twin.of("continuum"), table)
+
+
+def test_currents_drive_a_rollout(tmp_path: Path) -> None:
+    table = tmp_path / "heat.csv"
+    rows = [f"{t},{2.0 if t < 8 else 0.0},0,0" for t in range(11)]
+    table.write_text("\n".join(["time,sma_1_current,sma_2_current,sma_3_current", *rows, ""]))
+    made = rollout(Twin.of("continuum"), from_table(Twin.of("continuum"), table)).recording
+    assert "MuJoCo steps" in made.source
+    assert made.trials[0].values["sma_1_temperature"].max() > 340.0  # K, from 296
+    assert made.trials[0].values["disk_8_x"].max() > 5e-3  # m: towards the spring that pulls
 
 
 def test_the_command_writes_a_set_that_reads_again(tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
 """Dynamic prediction: MuJoCo steps with the tension laws computed between them, in one compiled loop.
 
 Per step: slip states from the tendons' travel, segment tensions to `ctrl`; tip force and what the hinges' springs lack of the true
-elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. The slip state is explicit here: it is stable while the pre-sliding length
-in mm is at least half the step in ms, so the step shrinks with a short pre-sliding length. `discrete` integrates springs, those of
-hinges and wall, implicitly, so that none of them bounds the step; it damps: 2 % of critical at 1 ms on the first mode.
+elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. Tendons that motors or SMA springs hold at lengths are in winding.py. The
+slip state is explicit here: it is stable while the pre-sliding length in mm is at least half the step in ms, so the step shrinks
+with a short pre-sliding length. `discrete` integrates springs, those of hinges and wall, implicitly, so that none of them bounds
+the step; it damps: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations
@@ -15,17 +16,19 @@ import mujoco
 import numpy as np
 
 from twin.body import DIRECT, NOT_FOUND, Problem
-from twin.compiled import assign, dot, jit
-from twin.effects import Loads
+from twin.compiled import assign, dot, inner, jit
+from twin.effects import Drive, Loads
 from twin.engine import mj_step
 from twin.equilibrium import ChainPath, Equilibrium
 from twin.equilibrium.chain import State, laid, lay, lever, pass_on, shorter
 from twin.equilibrium.elastic import COUPLING, bendings, springs
+from twin.equilibrium.lengths import linearise
 from twin.equilibrium.newton import place
-from twin.equilibrium.trial import Slow, rested
+from twin.equilibrium.trial import Slow, rested, some
 from twin.equilibrium.trial import creep as advance_creep
 from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs
+from twin.winding import hang, heat, let_go, press, pulled, winding
 
 STEP_PER_PRESLIDING = 2.0  # s/m
 # m, from a wall to a post before it, to which slack springs of that length tie the disks: the sphere they cannot leave is flat to
@@ -46,7 +49,8 @@ class Motion(NamedTuple):
     motor: np.ndarray  # (n_tendon, n_piece) actuators
     fixed: np.ndarray  # (nv,) rest shape without creep
     time: np.ndarray  # (n,) s
-    tension: np.ndarray  # (n, n_tendon) N
+    command: np.ndarray  # (n, n_tendon) N, m or A
+    ambient: np.ndarray  # (n,) K, around SMA springs
 
 
 class Seen(NamedTuple):
@@ -54,28 +58,60 @@ class Seen(NamedTuple):
 
     markers: np.ndarray  # (n, n_marker, 3) m
     path: np.ndarray  # (n, n_tendon) m
+    tension: np.ndarray  # (n, n_tendon) N
+    temperature: np.ndarray  # (n, n_tendon) K
     q: np.ndarray  # (n, nv)
 
 
 @jit
-def route_tension(at, state, motion):
-    """Segment tensions to ctrl for the state's base tensions at the present geometry; its slip advances."""
+def route_tension(at, state, motion, winding):
+    """Segment tensions to ctrl for the state's base tensions, those of held tendons found, at the present geometry; its slip
+    advances. What a held tendon's own spring pulls is not the motors'."""
     nt, most = motion.motor.shape
     room, now = laid(most), np.zeros(most)
     for t in range(nt):
-        tendon = shorter(room, at.chain.pieces[t])
+        tendon, by_spring = shorter(room, at.chain.pieces[t]), 0.0
         lay(at.chain, t, tendon, now)
+        if winding.held.which[t]:
+            state.T[t] = by_spring = pulled(winding, t, now[0])
+            now[0] += winding.bowing[t]
         pass_on(state.T[t], at.law, tendon, state.z[t], state.s[t], now, state.z[t])
         for d in range(tendon.T.size):
             state.s[t, d] = now[d]
-            motion.ctrl[motion.motor[t, d]] = tendon.T[d]
+            motion.ctrl[motion.motor[t, d]] = tendon.T[d] - by_spring
+
+
+@inner
+def take(at, state, winding):
+    """The held tendons' tensions at the present geometry."""
+    room, distal = laid(state.s.shape[1]), np.empty(state.s.shape[1])
+    for t in range(state.T.size):
+        if winding.held.which[t]:
+            lay(at.chain, t, shorter(room, at.chain.pieces[t]), distal)
+            state.T[t] = pulled(winding, t, distal[0])
+
+
+@inner
+def hold(state, motion, winding, i, w):
+    """The held tendons' springs for a step that ends the share w of the way from sample i - 1 to i."""
+    command, held = motion.command, winding.held
+    press(winding, state.T)
+    for t in range(state.T.size):
+        if held.by_spring[t]:
+            heat(winding, state, t, command[i - 1, t], motion.ambient[i - 1], motion.step)
+        elif held.which[t]:
+            held.free[t] = held.straight[t] - (1.0 - w) * command[i - 1, t] - w * command[i, t]
+    linearise(held, state.s, state.T)
+    for t in range(state.T.size):
+        if held.which[t]:
+            let_go(winding, state, t)
 
 
 @jit
-def apply(at, state, motion, r):
+def apply(at, state, motion, bowing, r):
     """To qfrc_applied: the tip's force, and what the hinges' springs lack of the true elastic moment."""
     chain, fixed, tip = at.chain, motion.fixed, at.chain.disk[-1]
-    springs(chain.qpos, at.rest, chain, state.T, np.empty(state.T.size), r, np.empty((0, 0)))
+    springs(chain.qpos, at.rest, chain, state.T, bowing, r, np.empty((0, 0)))
     for k in range(r.size):
         p = chain.partner[k]
         native = chain.stiffness[k] * (chain.qpos[k] - at.rest[k]) + chain.coupling[k] * (
@@ -85,14 +121,18 @@ def apply(at, state, motion, r):
 
 
 @jit
-def look(at, state, motion, i, seen):
+def look(at, state, motion, winding, i, seen):
     """What is seen at sample i, the motion carried on straight for the rest of a step."""
-    chain, most = at.chain, motion.motor.shape[1]
+    chain, most, held = at.chain, motion.motor.shape[1], winding.held
     room, distal, bowing, r = laid(most), np.empty(most), np.empty(state.T.size), np.empty(state.q.size)
+    T = seen.tension[i]
     for k in range(chain.marker.size):
         for a in range(3):
             seen.markers[i, k, a] = chain.site[chain.marker[k], a]
-    springs(chain.qpos, at.rest, chain, motion.tension[i], bowing, r, np.empty((0, 0)))
+    for t in range(state.T.size):
+        T[t] = state.T[t] if held.which[t] else motion.command[i, t]
+        seen.temperature[i, t] = held.temperature[t]
+    springs(chain.qpos, at.rest, chain, T, bowing, r, np.empty((0, 0)))
     for t in range(state.T.size):
         lay(chain, t, shorter(room, chain.pieces[t]), distal)
         seen.path[i, t] = distal[0] + bowing[t]
@@ -100,22 +140,28 @@ def look(at, state, motion, i, seen):
 
 
 @jit
-def step_through(at, motion, slow, state, seen):
-    """Step on through the samples, tensions linear between them. `at.rest` are MuJoCo's rest angles, which creep moves.
+def step_through(at, motion, winding, slow, state, seen):
+    """Step on through the samples, commands linear between them but for currents, which are constant. `at.rest` are MuJoCo's rest
+    angles, which creep moves.
 
     Returns how many samples were seen, the time reached, and the joint that ran away in the last step, or -1.
     """
-    chain, time, tension, step = at.chain, motion.time, motion.tension, motion.step
+    chain, time, command, step, holds = at.chain, motion.time, motion.command, motion.step, some(winding.held.which)
     now, r, taken = motion.now, np.zeros(state.q.size), 0
     D = np.empty((chain.hand.size, 3, 3))
     for i in range(time.size):
         while i > 0 and now + step <= time[i]:
             w = (now + step - time[i - 1]) / (time[i] - time[i - 1])
             for t in range(state.T.size):
-                state.T[t] = (1.0 - w) * tension[i - 1, t] + w * tension[i, t]
-            route_tension(at, state, motion)
+                if not winding.held.which[t]:
+                    state.T[t] = (1.0 - w) * command[i - 1, t] + w * command[i, t]
+            if holds:
+                place(at, chain.qpos)
+            route_tension(at, state, motion, winding)
             if taken % REFRESH == 0:
-                apply(at, state, motion, r)
+                apply(at, state, motion, winding.bowing, r)
+            if holds:
+                hold(state, motion, winding, i, w)
             taken += 1
             mj_step(at.model, at.data)
             now += step
@@ -123,8 +169,11 @@ def step_through(at, motion, slow, state, seen):
                 if not abs(motion.velocity[k]) < FASTEST:
                     return i, now, k
         assign(state.q, chain.qpos)
+        if holds:
+            place(at, state.q)
+            take(at, state, winding)
         place(at, state.q + (time[i] - now) * motion.velocity)
-        look(at, state, motion, i, seen)
+        look(at, state, motion, winding, i, seen)
         place(at, state.q)
         if slow.amplitude.size and i > 0:
             bendings(state.q, chain, r, D)
@@ -139,7 +188,7 @@ class Moving:
     """A body in motion under given loads: what MuJoCo, the slip of its tendons and its creep carry from one call to the next."""
 
     def __init__(self, dynamics: Dynamics, problem: Problem) -> None:
-        """At rest in equilibrium under the problem's first tensions. The body's stiffness counts with its mean: temperature changes
+        """At rest in equilibrium under the problem's first commands. The body's stiffness counts with its mean: temperature changes
         little in a fast trial. Raises SolveError where there is no such equilibrium."""
         loads, route = problem.loads, problem.route
         scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
@@ -149,9 +198,13 @@ class Moving:
             problem, time=problem.time[:1], command=problem.command[:1], stiffness=np.array([scale]), delayed=delayed, near=None
         )
         self.start = start = dynamics.statics.solve(first)
+        self.drives = problem.drives or (Drive.TENSION,) * problem.command.shape[1]
         if not start.status.all():
-            raise SolveError(f"no equilibrium to start from under tensions {np.round(problem.command[0], 3).tolist()} N")
-        moving = Equilibrium(_loaded(dynamics.body, loads, scale))
+            raise SolveError(f"no equilibrium to start from under {self._shown(problem.command[0])}")
+        body = _loaded(dynamics.body, loads, scale)
+        self._pulled = problem.which(Drive.TENSION)
+        hang(body.spec, body, ~self._pulled)
+        moving = Equilibrium(body)
         self.model, self.data = model, data = moving.model, moving.data
         step = min(model.opt.timestep, STEP_PER_PRESLIDING * route.presliding) if route.mu > 0.0 else model.opt.timestep
         model.opt.timestep = step
@@ -161,28 +214,47 @@ class Moving:
         model.qpos_spring[:] = fixed + delayed.sum(axis=0)
         data.qpos[:] = start.q[0]
         mujoco.mj_forward(model, data)
+        self._winding = winding(problem, moving, start)
         motor, self._began = np.zeros(start.slip.shape, np.int64), float(problem.time[0])
         for t, d in ((t, d) for t, n in enumerate(moving.chain.pieces) for d in range(n)):
             motor[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id
         nt = problem.command.shape[1]
         self._motion = Motion(
-            self._began, float(step), data.qvel, data.ctrl, data.qfrc_applied, motor, fixed, np.zeros(0), np.zeros((0, nt))
+            self._began,
+            float(step),
+            data.qvel,
+            data.ctrl,
+            data.qfrc_applied,
+            motor,
+            fixed,
+            np.zeros(0),
+            np.zeros((0, nt)),
+            np.zeros(0),
         )
-        self.state = State(np.empty(nt), start.q[0].copy(), start.slip.copy(), start.distal.copy())
+        self.state = State(start.tension[0].copy(), start.q[0].copy(), start.slip.copy(), start.distal.copy())
         self._slow = Slow(amplitude, np.array(problem.creep.time, float), delayed)
         self._at, self._n_marker = moving.statics(problem)._replace(rest=model.qpos_spring), moving.chain.marker.size
 
-    def run(self, time: np.ndarray, tension: np.ndarray) -> tuple[Seen, int, str]:
-        """On through times (n,) s under base tensions (n, n_tendon) N, linear in between, from where it stands at the first.
+    def run(self, time: np.ndarray, command: np.ndarray, ambient: np.ndarray | None = None) -> tuple[Seen, int, str]:
+        """On through times (n,) s under commands (n, n_tendon), N and m linear in between, from where it stands at the first; A in
+        surroundings at `ambient` (n,) K are constant from one to the next.
 
         Returns what was seen, at how many samples, and why no further, in words.
         """
-        n, nt = tension.shape
-        seen = Seen(np.full((n, self._n_marker, 3), np.nan), np.full((n, nt), np.nan), np.full((n, self.model.nv), np.nan))
-        motion = self._motion._replace(time=np.array(time, float), tension=np.maximum(tension, 0.0, order="C"))
-        samples, now, lost = step_through(self._at, motion, self._slow, self.state, seen)
+        n, nt = command.shape
+        tension, path, temperature = np.full((3, n, nt), np.nan)
+        seen = Seen(np.full((n, self._n_marker, 3), np.nan), path, tension, temperature, np.full((n, self.model.nv), np.nan))
+        command = np.where(self._pulled, np.maximum(command, 0.0), command)
+        motion = self._motion._replace(
+            time=np.array(time, float), command=command, ambient=np.zeros(n) if ambient is None else np.array(ambient, float)
+        )
+        samples, now, lost = step_through(self._at, motion, self._winding, self._slow, self.state, seen)
         self._motion = self._motion._replace(now=now)
         return seen, samples, "" if lost < 0 else self._lost(now, lost)
+
+    def _shown(self, command: np.ndarray) -> str:
+        shown = (d.shown for d in self.drives)
+        return ", ".join(f"{factor * c:.3g} {unit}" for c, (unit, factor) in zip(command, shown, strict=True))
 
     def _lost(self, now: float, k: int) -> str:
         """What became of joint k in the last step."""
@@ -208,17 +280,19 @@ class Dynamics:
         return self.statics.n_slow
 
     def solve(self, problem: Problem) -> ChainPath:
-        """The motion under base tensions, from rest in equilibrium under the first ones.
+        """The motion under commands, from rest in equilibrium under the first ones.
 
         A motion has no neighbour to start from: `near`, `keep`, `once` and `tolerance` are of statics only. Where the motion is
         lost `ended` says how; samples from there on are NaN.
         """
         moving = Moving(self, problem)
-        seen, samples, ended = moving.run(problem.time, problem.command)
+        seen, samples, ended = moving.run(
+            problem.time, problem.command, None if problem.heating is None else problem.heating.ambient
+        )
         status = np.where(np.arange(len(problem.time)) < samples, DIRECT, NOT_FOUND)
         return ChainPath(
-            tension=np.array(problem.command), path=seen.path, markers=seen.markers, status=status, q=seen.q,
-            started=moving.start.started, slip=moving.state.z, distal=moving.state.s, ended=ended,
+            tension=seen.tension, path=seen.path, markers=seen.markers, status=status, q=seen.q, ended=ended,
+            others={"temperature": seen.temperature}, started=moving.start.started, slip=moving.state.z, distal=moving.state.s,
         )  # fmt: skip
 
 

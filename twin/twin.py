@@ -92,9 +92,9 @@ def is_dynamic(bench: Bench) -> bool:
 
     It is where its samples resolve the motion and some tension or displacement crosses its range (10 to 90 %, noise smoothed away)
     within one period of the robot's first bending mode. A ramp over n periods excites the mode to about 1/(pi n) of the static
-    motion.
+    motion. Currents heat springs, which is slow.
     """
-    if not can_step(bench):
+    if not can_step(bench) or Drive.CURRENT in bench.drives:
         return False
     period = 1.0 / bench.robot.build().first_mode()
     for trial in bench.inputs:

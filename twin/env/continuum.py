@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,10 +13,11 @@ from gymnasium import spaces
 
 from twin.body import Problem
 from twin.effects import Loads
+from twin.env.checks import Actions, chosen
 from twin.env.domain import Spread, draw, read_spread
 from twin.env.picture import Picture
 from twin.env.plant import Plant, Sensed
-from twin.errors import DataError, SolveError, UnknownNameError
+from twin.errors import SolveError
 from twin.rollout import full_pull
 from twin.storage import read_twin
 from twin.twin import Twin
@@ -68,6 +69,8 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
 
     With `observe="full"` there follow nv joint angles (rad) and nv joint speeds (10 rad/s).
 
+    `parts` names them: load_cells, encoders, commands, tip, goal, angles, speeds.
+
     Reward: -|tip - goal| / (0.1 L), of the true tip. `info`: distance (m), success (within `success`), tip, goal. An episode is
     truncated after 100 steps; it ends early, with a reward of -10 and the reason in `info["lost"]`, where the motion is lost.
     """
@@ -76,13 +79,7 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def __init__(self, twin: str | Path | Twin = "continuum", render_mode: str | None = None, **options: Any) -> None:
         """Raises UnknownNameError for an option there is not, DataError for a robot without dynamics."""
-        known = [f.name for f in fields(Options)]
-        for name in options:
-            if name not in known:
-                raise UnknownNameError("option", name, [*known, "twin", "render_mode"])
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise UnknownNameError("render_mode", str(render_mode), self.metadata["render_modes"])
-        self.options, self.render_mode = Options(**options), render_mode
+        self.options, self.render_mode = chosen(Options, options, render_mode, self.metadata["render_modes"]), render_mode
         self.described = twin if isinstance(twin, Twin) else read_twin(twin)
         unsaid = isinstance(twin, Twin) or not self.options.randomise
         self._spread = Spread() if unsaid else read_spread(twin, self.described)  # type: ignore[arg-type]
@@ -90,8 +87,11 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
         self.plant = Plant(self.described, self.options.interval)
         self._start = self.plant.sensed()
         self.length, self.n = float(self._start.tip[2]), self.described.robot.n_tendon
-        self._warned, self._picture = False, None
-        size = 3 * self.n + 6 + (2 * self.plant.moving.model.nv if self.options.observe == "full" else 0)
+        self._actions, self._picture = Actions(self.n), None
+        nv = self.plant.moving.model.nv if self.options.observe == "full" else 0
+        self.parts = {"load_cells": self.n, "encoders": self.n, "commands": self.n, "tip": 3, "goal": 3}
+        self.parts |= {"angles": nv, "speeds": nv} if nv else {}
+        size = sum(self.parts.values())
         self.action_space = spaces.Box(-1.0, 1.0, (self.n,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
 
@@ -114,7 +114,7 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Raises DataError for an action that is not n numbers."""
-        rate, o = self._checked(action), self.options
+        rate, o = self._actions.checked(action), self.options
         most = o.most * self.pull.tension
         self.command = np.clip(self.command + rate * o.rate * self.pull.tension * o.interval, 0.0, most)
         self._step += 1
@@ -158,19 +158,6 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
         if not path.status.all():
             raise SolveError("the described robot has no equilibrium under a goal's tensions")
         return path.markers[1:, -1]
-
-    def _checked(self, action: np.ndarray) -> np.ndarray:
-        rate = np.asarray(action, float)
-        if rate.shape != (self.n,):
-            raise DataError(f"an action of shape {rate.shape} came; ({self.n},) is needed, one number a tendon")
-        if not np.isfinite(rate).all():
-            k = int(np.flatnonzero(~np.isfinite(rate))[0])
-            raise DataError(f"action {k} is {rate[k]}: a finite number in [-1, 1] is needed")
-        if np.abs(rate).max() > 1.0 and not self._warned:
-            self._warned = True
-            k = int(np.argmax(np.abs(rate)))
-            gymnasium.logger.warn(f"action {k} is {rate[k]:g}: actions are clipped to [-1, 1] (said once)")
-        return np.clip(rate, -1.0, 1.0)
 
     def _observed(self, seen: Sensed) -> np.ndarray:
         o, F, rng = self.options, self.pull, self.np_random

@@ -19,6 +19,7 @@ import numpy as np
 
 from twin.body import Frame, marker_senses, tendon_ports, tendon_senses
 from twin.dynamics import Dynamics
+from twin.effects import Drive
 from twin.equilibrium import Equilibrium
 from twin.equilibrium.figure import ChainFigure
 from twin.hinges import HingeChain, JointSet
@@ -90,6 +91,7 @@ def _named(
             {"weight", "elasticity", "backbone", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity"}
         ),
         drives=tendon_ports(n_tendon, values.get("springs.resistance", 1.0)),
+        stepped=frozenset({Drive.TENSION, Drive.DISPLACEMENT, Drive.CURRENT}),
         senses=tendon_senses(n_tendon) | marker_senses([*markers, "tip"]),
         frame=Frame.of(values),
         joints=joints,

@@ -20,8 +20,10 @@ from twin.twin import Twin
 PROBE = 0.01  # N: bends the robots here by less than a degree, and is far above what a solve's tolerance lets through
 CO_CONTRACTION = 0.1
 RELAXED = 10.0  # retardation times of a body's creep between one rollout and the next: e^-10 of it is left
-UNITS = {"marker": "mm", "displacement": "mm", "tension": "N", "sensor": "ohm", "angle": "deg"}  # that people read them in
-INPUTS = {Drive.TENSION: "N", Drive.DISPLACEMENT: "mm"}
+# That people read them in.
+UNITS = {"marker": "mm", "displacement": "mm", "tension": "N", "sensor": "ohm", "angle": "deg", "temperature": "degC"}
+INPUTS = {Drive.TENSION: "N", Drive.DISPLACEMENT: "mm", Drive.CURRENT: "A"}
+DRAWN = (Drive.TENSION, Drive.DISPLACEMENT)
 
 
 class Pull(NamedTuple):
@@ -53,12 +55,13 @@ def full_pull(twin: Twin) -> Pull:
 
 
 def from_table(twin: Twin, path: Path) -> Recording:
-    """One rollout from a CSV or Parquet file in SI: `time` (s), and tendon_I_tension (N) or tendon_I_displacement (m) of each.
+    """One rollout from a CSV or Parquet file in SI: `time` (s), and tendon_I_tension (N) or tendon_I_displacement (m) of each,
+    or sma_I_current (A).
 
     Raises DataError for a column that is missing, a value that is no finite number and time that does not increase.
     """
     header = path.read_text("utf-8").partition("\n")[0] if path.suffix == ".csv" and path.is_file() else ""
-    drive = Drive.DISPLACEMENT if "_displacement" in header else Drive.TENSION
+    drive = next((d for d in INPUTS if f"_{d}" in header), Drive.TENSION)
     names = _inputs(twin.robot, drive)
     table = read_table(path, ["time", *names])
     for name, column in table.columns.items():
@@ -99,8 +102,8 @@ class Drawing:
     pull: float | None = None  # N or m; full_pull where it is not said
 
     def __post_init__(self) -> None:
-        if self.drive not in INPUTS:
-            raise DataError(f"controls by {self.drive} are not drawn; allowed: {', '.join(INPUTS)}")
+        if self.drive not in DRAWN:
+            raise DataError(f"controls by {self.drive} are not drawn; allowed: {', '.join(DRAWN)}")
         for name, value in (("seconds", self.seconds), ("rate", self.rate), ("pull", 1.0 if self.pull is None else self.pull)):
             if not (np.isfinite(value) and value > 0.0):
                 raise DataError(f"{name} = {value:g}; a number above zero is needed")
@@ -137,20 +140,20 @@ def _inputs(robot: Robot, drive: Drive) -> list[str]:
     return [p.channel for p in ports if p is not None]
 
 
-def _shown(robot: Robot, inputs: Mapping[str, object] | list[str]) -> list[Channel]:
+def _shown(robot: Robot, inputs: Mapping[str, object] | list[str], drive: Drive) -> list[Channel]:
     """All a robot shows but what drives it, and a tip that is its last marker once more."""
     body = robot.build()
     twice = bool(body.markers) and body.markers[-1] in body.markers[:-1]
     return [
         Channel(name, "output", UNITS.get(sense.group, "N"))
         for name, sense in body.senses.items()
-        if sense.only is None and sense.group in UNITS and name not in inputs and not (twice and name.startswith("tip_"))
+        if sense.only in (None, drive) and sense.group in UNITS and name not in inputs and not (twice and name.startswith("tip_"))
     ]
 
 
 def _controls(twin: Twin, trials: list[Trial], drive: Drive, title: str, more: list[Channel] | None = None) -> Recording:
     names = _inputs(twin.robot, drive)
-    outputs = _shown(twin.robot, names)
+    outputs = _shown(twin.robot, names, drive)
     channels = (*(Channel(n, "input", INPUTS[drive]) for n in names), *(more or []), *outputs)
     pause = RELAXED * max(twin.laws.creep.time, default=0.1)
     starts = np.cumsum([0.0, *(float(t.time[-1] - t.time[0]) + pause for t in trials)])
