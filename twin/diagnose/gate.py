@@ -57,7 +57,7 @@ def gate(study: Study, found: Search, screening: Screening) -> Gated:
         if not moved:
             return Gated(best, {}, tuple(small), tuple(doubts))
         least = min(moved, key=lambda e: moved[e])
-        if moved[least] < screening.bars.material or _may_be_form(study, moved, best, without[least], least):
+        if moved[least] < screening.bars.material or _may_be_form(study, screening.bars.material, best, without, least):
             small.append(Small(least, best, moved[least]))
             best = without[least]
             continue
@@ -77,12 +77,14 @@ def contribution(study: Study, best: Weighed, without: Weighed) -> float:
     return float(np.sqrt(max(0.0, fall) / study.objective.n))
 
 
-def _may_be_form(study: Study, moved: dict[str, float], best: Weighed, without: Weighed, least: str) -> bool:
+def _may_be_form(study: Study, material: float, best: Weighed, without: dict[str, Weighed], least: str) -> bool:
     """Whether an effect is so much smaller than another that it may be what that one's law gets wrong: unless it explains half of
-    all that is left without it, on trials left out in turn too. A large law's faults leave more."""
-    if moved[least] >= FORM * max(moved.values()):
+    all that is left without it, on trials left out in turn too. A large law's faults leave more. They show where that law acts: in
+    a group of outputs that it leaves alone, an effect is as large as it is there."""
+    moved = {e: np.sqrt(np.maximum(0.0, study.fall(w.fit, best.fit)) / study.objective.n) for e, w in without.items()}
+    if np.any((moved[least] >= material) & (moved[least] >= FORM * np.max(list(moved.values()), axis=0))):
         return False
-    sizes = [(w.discrepancy.size, left_out(study, w.fit).structure) for w in (best, without)]
+    sizes = [(w.discrepancy.size, left_out(study, w.fit).structure) for w in (best, without[least])]
     return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))
 
 

@@ -60,8 +60,9 @@ def _extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bar
 
 
 def _material(study: Study, base: Weighed, member: Weighed, bar: float) -> float:
-    """The fall of |z|^2 below which an effect added to `member` would be immaterial."""
-    explained = max(0.0, float(base.fit.z @ base.fit.z - member.fit.z @ member.fit.z))
+    """The fall of |z|^2 below which an effect added to `member` would be immaterial: in the group of outputs in which `member`
+    explains least, where its laws' faults show least."""
+    explained = max(0.0, float(study.fall(base.fit, member.fit).min()))
     return max(bar**2 * study.objective.n, FORM**2 * explained)
 
 

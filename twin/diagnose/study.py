@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from twin.bench import Bench
-from twin.calibrate import Objective
+from twin.calibrate import Fit, Objective
 from twin.diagnose.evidence import Evidence
 
 Progress = Callable[[str], None]
@@ -26,6 +28,12 @@ class Study:
     objective: Objective
     evidence: Evidence
     progress: Progress = silent
+
+    def fall(self, before: Fit, after: Fit) -> np.ndarray:
+        """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""
+        of = [o.group for o in self.bench.outputs]
+        z = (before.z**2 - after.z**2).reshape(-1, len(of)).sum(axis=0)
+        return np.array([z[[o == g for o in of]].sum() for g in dict.fromkeys(of)])
 
     @property
     def bench(self) -> Bench:
