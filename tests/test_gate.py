@@ -15,14 +15,19 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Screening
 
 N = 10_000  # samples
-STUDY: Any = SimpleNamespace(objective=SimpleNamespace(n=N), progress=lambda words: None)
 
 
 class World:
-    """Sets of effects whose |z|^2 falls by n a^2 for each effect of a sigmas."""
+    """Sets of effects whose |z|^2 falls by n a^2 for each effect of a sigmas: in the markers, or where `sensed` in the sensors."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **sigmas: float) -> None:
         self.sigmas = sigmas
+        self.sensed: set[str] = set()
+        self.history = 0.0  # what of an effect depends on more than the pose, sigma
+        self.study: Any = SimpleNamespace(
+            objective=SimpleNamespace(n=N), progress=lambda words: None, fall=lambda a, b: a.z**2 - b.z**2,
+            evidence=SimpleNamespace(beyond_pose=lambda z: self.history),
+        )  # fmt: skip
         self.harmful: set[str] = set()
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
@@ -30,8 +35,10 @@ class World:
         monkeypatch.setattr(stage, "extended", lambda study, rest, rival, start: self.of(*rest.effects, rival))
 
     def of(self, *effects: str) -> Any:
-        square = N * (1.0 + sum(a**2 for e, a in self.sigmas.items() if e not in effects))
-        fit = SimpleNamespace(z=np.array([np.sqrt(square)]), effects=tuple(sorted(effects)), fitted=lambda e: {})
+        missing = {e: a**2 for e, a in self.sigmas.items() if e not in effects}
+        square = N * (1.0 + sum(missing.values()))
+        felt = N * sum(a for e, a in missing.items() if e in self.sensed)
+        fit = SimpleNamespace(z=np.sqrt([square - felt, felt]), effects=tuple(sorted(effects)), fitted=lambda e: {})
         size = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
         return SimpleNamespace(effects=tuple(sorted(effects)), fit=fit, score=-square, discrepancy=SimpleNamespace(size=size))
 
@@ -41,12 +48,12 @@ class World:
             hurt=hurt, worse=lambda than: hurt > than.hurt, structure=self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[1]
         )
 
-    def gated(self, *effects: str, table: tuple[Visibility, ...] = (), material: float = 0.13) -> Any:
+    def gated(self, *effects: str, table: tuple[Visibility, ...] = (), accuracy: float = 0.0) -> Any:
         best = self.of(*effects)
         found: Any = SimpleNamespace(base=self.of(), best=best, all=(best, self.of()))
         pattern: Any = SimpleNamespace(effect="rival", start=None)
-        screening = Screening(SimpleNamespace(patterns=(pattern,)), Thresholds(material=material), table)  # type: ignore[arg-type]
-        return gate(STUDY, found, screening)
+        screening = Screening(SimpleNamespace(patterns=(pattern,)), Thresholds(accuracy=accuracy), table)  # type: ignore[arg-type]
+        return gate(self.study, found, screening)
 
 
 def row(effect: str, apart: float, rival: str = "rival") -> Visibility:
@@ -62,9 +69,28 @@ def test_an_effect_that_moves_too_little_is_listed_and_not_kept(monkeypatch: pyt
 
 
 def test_the_bar_is_the_twins_accuracy_where_that_is_higher(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = World(monkeypatch, friction=0.5).gated("friction", material=0.6)
+    found = World(monkeypatch, friction=0.5).gated("friction", accuracy=0.6)
     assert found.best.effects == ()
     assert found.without == {}
+
+
+@pytest.mark.parametrize(("history", "kept"), [(0.12, False), (0.14, True)])
+def test_what_depends_on_how_a_pose_was_reached_is_no_inaccuracy_of_the_description(
+    monkeypatch: pytest.MonkeyPatch, history: float, kept: bool
+) -> None:
+    world = World(monkeypatch, friction=0.5)
+    world.history = history
+    assert world.gated("friction", accuracy=0.6).best.effects == (("friction",) if kept else ())
+
+
+@pytest.mark.parametrize(("sensed", "kept"), [({"large"}, True), (set(), False), ({"large", "small"}, False)])
+def test_a_large_effect_on_the_sensors_alone_is_no_excuse_for_a_small_one_in_the_markers(
+    monkeypatch: pytest.MonkeyPatch, sensed: set[str], kept: bool
+) -> None:
+    """The large one leaves all of a smooth error either way."""
+    world = World(monkeypatch, large=4.0, small=0.5)
+    world.sensed, world.rest = sensed, {("large", "small"): (1.0, 1.0), ("large",): (1.0, 1.0)}
+    assert world.gated("large", "small").best.effects == (("large", "small") if kept else ("large",))
 
 
 @pytest.mark.parametrize(("left", "unseen", "kept"), [(0.1, 0.2, True), (0.1, 0.6, False), (0.9, 0.2, False)])

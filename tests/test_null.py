@@ -62,3 +62,25 @@ def test_noise_alone_stays_below_the_thresholds(calibrated: Any) -> None:
         assert np.mean(x > bar) <= 0.05
         assert bar == max(floor, quantile(getattr(d[0], name)))
         assert quantile(d[0].__dict__[name]) > np.quantile(x, 0.9), "a quantile shifted down would lie within the draws"
+
+
+def test_the_pose_explains_what_is_smooth_in_it_and_no_direction_of_pull(calibrated: Any) -> None:
+    """Cubic polynomials of the pulls are of the pose, to rounding. The sign of a pull's rate is not; what the few poses of one pass
+    alone share with it is less than half."""
+    evidence = calibrated.study.evidence
+    phi, m = evidence.phi, evidence.present.shape[1]
+    static, direction = (np.flatnonzero(phi.component == c) for c in (0, 1))
+    pose = np.outer(phi.matrix[:, static] @ np.linspace(-1.0, 1.0, len(static)), np.ones(m))
+    assert evidence.beyond_pose(pose) < 1e-5 * np.std(pose)
+    way = np.outer(phi.matrix[:, direction[0]], np.ones(m))
+    assert 0.5 < evidence.beyond_pose(pose + way) < 1.0
+    assert evidence.beyond_pose(pose + way) == pytest.approx(evidence.beyond_pose(way), rel=1e-4)
+
+
+def test_a_fit_that_cannot_win_is_not_finished(calibrated: Any) -> None:
+    """From parameters a standard deviation off; a cost that no fit beats ends it after a step, one that it may beat does not."""
+    objective, base = calibrated.study.objective, calibrated.base
+    start = base.model.at(base.model.vector() + 1.0)
+    whole, hopeless, hopeful = (fit(objective, start, tolerance=1e-9, beat=beat) for beat in (np.inf, -np.inf, 2.0 * base.cost))
+    assert hopeless.cost > whole.cost
+    assert hopeful.cost == whole.cost

@@ -12,7 +12,9 @@ from twin.diagnose import search as stage
 from twin.diagnose.null import Thresholds
 from twin.diagnose.search import search
 
-STUDY: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None)
+STUDY: Any = SimpleNamespace(
+    objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1)
+)
 
 
 class World:
@@ -23,7 +25,7 @@ class World:
         self.refitted: list[tuple[str, ...]] = []
         monkeypatch.setattr(stage, "dictionary", lambda objective, fit: None)
         monkeypatch.setattr(stage, "rank", self.rank)
-        monkeypatch.setattr(stage, "extended", lambda study, member, effect, start: self.of(*member.effects, effect))
+        monkeypatch.setattr(stage, "extended", lambda study, member, effect, start, beat: self.of(*member.effects, effect))
         monkeypatch.setattr(stage, "fuller", lambda study, w, effects, accept: w)
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
 

@@ -226,13 +226,14 @@ def prior_pull(model: Model) -> np.ndarray:
 
 def fit(
     objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, refresh: bool = False,
-    tolerance: float = 1e-5,
+    tolerance: float = 1e-5, beat: float = np.inf,
 ) -> Fit:  # fmt: skip
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
     Derivatives for the robot's own parameters, nearly linear, are taken once, or come as `J`, the whitened columns (n, m) of the
     first m free parameters from a neighbouring fit; those for effects are taken anew at every step. `refresh` takes them all again
-    at the solution, for standard errors and screening. Raises SolveError where the model cannot be solved at its start.
+    at the solution, for standard errors and screening. A fit that would not `beat` a cost though all further steps fell by as much
+    as its last ends there. Raises SolveError where the model cannot be solved at its start.
     """
     steps = np.array([f.parameter.step for f in model.free])
     low = np.array([f.parameter.low for f in model.free]) / steps
@@ -251,7 +252,7 @@ def fit(
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping = cost(at), 1e-4
-    for _ in range(STEPS):
+    for left in range(STEPS - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
         H = columns.T @ columns + np.diag(weight)
@@ -264,7 +265,7 @@ def fit(
         if better is None:
             break
         fall, at, now = now - cost(better), better, cost(better)
-        if fall < tolerance * now:
+        if fall < tolerance * now or now - left * fall > beat:
             break
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))

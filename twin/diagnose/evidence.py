@@ -190,6 +190,16 @@ class Evidence:
         found = self.discrepancy(z)
         return found.gain - float(z.ravel() @ z.ravel()), found
 
+    def beyond_pose(self, z: np.ndarray) -> float:
+        """Root-mean-square of what of z (n * m,) is no smooth function of the pose: least squares on the static regressors."""
+        Z = np.where(self.present, z.reshape(self.present.shape), 0.0)
+        pose = np.flatnonzero(self.phi.component == COMPONENTS.index("static"))
+        gram = self.gram[:, pose[:, None], pose] + 1e-9 * self.gram[:, pose, pose].max() * np.eye(len(pose))
+        b = (self.phi.matrix[:, pose].T @ Z).T
+        coefficients = np.linalg.solve(gram[self.kind], b[..., None])[..., 0]
+        left = (Z - self.phi.matrix[:, pose] @ coefficients.T)[self.present]
+        return float(np.sqrt(np.mean(left**2)))
+
     def strongest(self, discrepancy: Discrepancy, count: int = 5) -> list[tuple[str, float]]:
         """Regressors that carry most of a discrepancy: (name, RMS in sigmas)."""
         size = np.sqrt(np.mean(discrepancy.coefficients**2, axis=1))

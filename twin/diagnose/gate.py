@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.diagnose.left_out import left_out
+from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Screening
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
@@ -57,7 +58,7 @@ def gate(study: Study, found: Search, screening: Screening) -> Gated:
         if not moved:
             return Gated(best, {}, tuple(small), tuple(doubts))
         least = min(moved, key=lambda e: moved[e])
-        if moved[least] < screening.bars.material or _may_be_form(study, screening.bars.material, best, without, least):
+        if _immaterial(study, screening.bars, best, without[least]) or _may_be_form(study, screening.bars, best, without, least):
             small.append(Small(least, best, moved[least]))
             best = without[least]
             continue
@@ -77,12 +78,19 @@ def contribution(study: Study, best: Weighed, without: Weighed) -> float:
     return float(np.sqrt(max(0.0, fall) / study.objective.n))
 
 
-def _may_be_form(study: Study, material: float, best: Weighed, without: dict[str, Weighed], least: str) -> bool:
+def _immaterial(study: Study, bars: Thresholds, best: Weighed, without: Weighed) -> bool:
+    """Whether an effect moves too little, and too little of that depends on more than the pose."""
+    if contribution(study, best, without) >= bars.visible:
+        return False
+    return study.evidence.beyond_pose(without.fit.z - best.fit.z) < bars.material
+
+
+def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[str, Weighed], least: str) -> bool:
     """Whether an effect is so much smaller than another that it may be what that one's law gets wrong: unless it explains half of
     all that is left without it, on trials left out in turn too. A large law's faults leave more. They show where that law acts: in
     a group of outputs that it leaves alone, an effect is as large as it is there."""
     moved = {e: np.sqrt(np.maximum(0.0, study.fall(w.fit, best.fit)) / study.objective.n) for e, w in without.items()}
-    if np.any((moved[least] >= material) & (moved[least] >= FORM * np.max(list(moved.values()), axis=0))):
+    if np.any((moved[least] >= bars.material) & (moved[least] >= FORM * np.max(list(moved.values()), axis=0))):
         return False
     sizes = [(w.discrepancy.size, left_out(study, w.fit).structure) for w in (best, without[least])]
     return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))

@@ -25,12 +25,22 @@ from twin.information import solve
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What counts on this design: evidence of an effect, its contribution (sigma), structure left (sigma), a spectral line (z)."""
+    """What counts on this design: evidence of an effect, its contribution (sigma), structure left (sigma), a spectral line (z).
+
+    `accuracy` (sigma) is what the twin's description is good for. What it gets wrong is a function of the pose, so that it bounds
+    contributions (`visible`) but not the part of them that depends on how a pose was reached (`material`).
+    """
 
     accept: float = ACCEPT
     material: float = MATERIAL
+    accuracy: float = 0.0
     left: float = LEFT
     line: float = LINE
+
+    @property
+    def visible(self) -> float:
+        """The least contribution (sigma) worth claiming of what the pose alone decides."""
+        return max(self.material, self.accuracy)
 
     @property
     def faint(self) -> float:
@@ -53,7 +63,10 @@ def thresholds(study: Study, base: Fit, known: Dictionary, seed: int) -> Thresho
     """The larger of floor and null quantile, each."""
     d = draws(study, base, known, seed)
     return Thresholds(
-        max(ACCEPT, quantile(d.gain)), max(MATERIAL, quantile(d.moved)), max(LEFT, quantile(d.left)), max(LINE, quantile(d.line))
+        accept=max(ACCEPT, quantile(d.gain)),
+        material=max(MATERIAL, quantile(d.moved)),
+        left=max(LEFT, quantile(d.left)),
+        line=max(LINE, quantile(d.line)),
     )
 
 

@@ -28,12 +28,12 @@ def screen(study: Study, base: Weighed, seed: int) -> Screening:
     patterns = dictionary(study.objective, base.fit)
     study.progress("no-effect sets of this design")
     bars = thresholds(study, base.fit, patterns, seed)
-    bars = replace(bars, material=max(bars.material, _accuracy(study)))
-    return Screening(patterns, bars, tuple(identifiability(study.objective, base.fit, patterns, bars.material)))
+    bars = replace(bars, accuracy=_accuracy(study))
+    return Screening(patterns, bars, tuple(identifiability(study.objective, base.fit, patterns, bars.visible)))
 
 
 def _accuracy(study: Study) -> float:
-    """The twin's own accuracy in sigmas of the outputs it is declared for: no less can be claimed."""
+    """The twin's own accuracy in sigmas of the outputs it is declared for."""
     noise, outputs = study.objective.whitener.noise, study.bench.outputs
     sigma = np.array([s for s, o in zip(noise.sigma, outputs, strict=True) if o.group in ACCURATE])
     return study.bench.robot.accuracy / float(np.mean(sigma)) if sigma.size else 0.0

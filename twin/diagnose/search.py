@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from twin.diagnose.null import Thresholds
 from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.ranking import rank
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, PROMISE, WIDTH
+from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, HOPELESS, PROMISE, WIDTH
 from twin.diagnose.weigh import Weighed, better, extended, fuller, refit_without
 
 Known = dict[tuple[str, ...], Weighed]
@@ -51,10 +53,11 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
 def _extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
     """Into `fresh`: `member` with each of the effects whose pattern promises most."""
     for candidate in rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks):
-        if candidate.gain < max(bars.accept, PROMISE * _material(study, base, member, bars.material)):
+        if candidate.gain < max(bars.accept, PROMISE * _material(study, base, member, bars.visible)):
             continue
         study.progress(f"{' + '.join((*member.effects, candidate.effect))}")
-        found = extended(study, member, candidate.effect, candidate.start)
+        beat = HOPELESS * min((w.fit.cost for w in fresh.values()), default=np.inf)
+        found = extended(study, member, candidate.effect, candidate.start, beat)
         if found is not None and (found.effects not in fresh or better(found, fresh[found.effects])):
             fresh[found.effects] = found
 

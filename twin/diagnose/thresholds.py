@@ -189,6 +189,10 @@ DEEPEST = _row("DEEPEST", 3, "effects", "at once; four together are hardly ever 
 FORM = _row(
     "FORM", 0.15, "of the largest contribution", "a smaller effect may be what the large one's law gets wrong", BENCHMARK
 )  # fmt: skip
+HOPELESS = _row(
+    "HOPELESS", 2.0, "times the least cost", "a fit that could at best end there is not finished; evidence forgives a smooth "
+    "error, and that is less than what the best leaves", "judgement",
+)  # fmt: skip
 PROMISE = _row(
     "PROMISE", 0.25, "of a material gain", "what a first-order pattern must promise to be worth a refit",
     "derivation: a pattern right to half in size promises a quarter in square",

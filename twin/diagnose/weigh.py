@@ -33,11 +33,11 @@ def weigh(study: Study, fitted: Fit) -> Weighed:
     return Weighed(fitted, gain - prior - fitted.effective_parameters() * float(np.log(study.objective.n)), discrepancy)
 
 
-def extended(study: Study, member: Weighed, effect: str, start: Start) -> Weighed | None:
-    """`member` with one effect more; None without equilibrium."""
+def extended(study: Study, member: Weighed, effect: str, start: Start, beat: float = np.inf) -> Weighed | None:
+    """`member` with one effect more, fitted as far as it may `beat` a cost; None without equilibrium."""
     model = member.fit.model.with_effect(effect, dict(start.values), start.free, study.bench.n_tendon)
     try:
-        found = fit(study.objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY)
+        found = fit(study.objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY, beat=beat)
         return weigh(study, found)
     except SolveError:
         return None

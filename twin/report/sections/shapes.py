@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from twin.diagnose import Diagnosis
+from twin.report import skin
 from twin.report.numbers import MM
 from twin.report.plots import BEFORE, MEASURED, Plot, figure, numbers
 from twin.report.sections.section import Section, Story
@@ -20,7 +21,7 @@ def section(story: Story) -> Section:
     d = story.diagnosis
     whole = markers(d.bench)
     chosen = poses(d) if len(whole) > 1 else []
-    content = {"plot": _plot(d, chosen) if chosen else None, "poses": _words(d, chosen)}
+    content = {"plot": _plot(d, chosen) if chosen else None, "poses": _words(d, chosen), "skin": skin.plot(d), "off": skin.words(d)}
     return Section("shapes", "Shapes", "shapes.html", content)
 
 

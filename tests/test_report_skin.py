@@ -1,0 +1,62 @@
+"""The skin in the report: distances of clouds made from a known one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from twin.bench import prepare
+from twin.measurements import Clouds, read
+from twin.report import skin
+from twin.report.stages import before_and_after
+from twin.robots.robot import models_folder
+from twin.twin import Twin, simulate
+
+OFF = 8e-4  # m, of every point outside the true skin
+
+
+@pytest.fixture(scope="module")
+def story() -> Any:
+    """A sealed trial of five rows whose clouds stand 0.8 mm outside the skin of a twin with a turned mount."""
+    whole, true = read(models_folder() / "finger/samples/drift"), replace(Twin.of("finger"), values={"mounting.angle": 0.1})
+    trial = next(t for t in whole.trials if t.label == "sweep_1")
+    rows = slice(20, 60, 8)
+    short = replace(trial, time=trial.time[rows], values={n: v[rows] for n, v in trial.values.items()})
+    bench, drawn = prepare(replace(whole, trials=(short,)), true.robot), true.figure()
+    trace, loads = simulate(true, bench)[0], bench.inputs[0].loads
+    assert trace.path is not None
+    frames = drawn.frames(trace.path, loads, true.laws.route)
+    points = []
+    for at in frames.skin:
+        surface = trimesh.Trimesh(at, drawn.faces, process=False)
+        side = np.flatnonzero((surface.vertex_normals[:, 1] < -0.3) & (at[:, 2] > 0.02))  # the camera's
+        points.append(at[side] + OFF * surface.vertex_normals[side])
+    clouds = Clouds(np.concatenate(points), np.cumsum([0, *map(len, points)]), short.time)
+    seen = replace(bench, recording=replace(bench.recording, trials=(replace(bench.recording.trials[0], clouds=clouds),)))
+    return SimpleNamespace(bench=seen, folds=(), sealed_trials=(0,), claims=("one",), calibrated=Twin(true.robot), twin=true)
+
+
+def test_points_stand_off_the_true_skin_as_they_were_put(story: Any) -> None:
+    """To a twentieth of the distance: the skin is drawn in facets."""
+    before, after = (np.concatenate([b.off for b in skin.clouds(story, stage)]) for stage in before_and_after(story))
+    assert np.allclose(after, OFF, atol=0.05 * OFF)
+    assert np.std(before) > np.std(after)  # 0.1 rad of mount, felt where the finger is bent
+    assert "0.80 mm with the effects" in str(skin.words(story))
+
+
+def test_the_picture_has_both_stages_and_the_worst_apart(story: Any) -> None:
+    drawn = skin.plot(story)
+    assert drawn is not None
+    traces: Any = drawn.figure.data
+    assert [t.visible for t in traces] == [False] * 2 * skin.POSES + [True] * 2 * skin.POSES
+
+
+def test_a_robot_without_skin_or_clouds_has_no_picture(story: Any) -> None:
+    bare: Any = SimpleNamespace(**{**vars(story), "folds": ("each its own twin",)})
+    assert skin.plot(bare) is None
+    assert skin.words(bare) is None
