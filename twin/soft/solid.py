@@ -9,7 +9,7 @@ import numpy as np
 from numba import typeof
 
 from twin.soft.cables import Pulled
-from twin.soft.newton import NONE, OWN, Parts, State, Way, settle
+from twin.soft.newton import NONE, OWN, Found, Kept, Parts, State, Way, along
 from twin.soft.room import room_for, undeformed
 
 CLOSE = 2e-8  # m: a step after which a shape counts as found; with it goes some 1e-6 N
@@ -80,11 +80,16 @@ class Solid:
             pull.tension[None].copy(), pull.free[None].copy(), _plain(pull.held), pull.stretch[None].copy(), _plain(burden.force),
             _plain(burden.wall), one, float(pull.mu), float(pull.presliding), np.zeros(1), nothing, nothing, close, False, True,
         )  # fmt: skip
-        problem = self.parts, way, 0, state, self._room, inverse
+        nothing_kept = Kept(np.empty((0, nq)), np.empty((0, len(state.tension))), np.empty((0, nq, nq), np.float32))
+        found = Found(
+            np.empty((1, nq)), np.empty((1, len(state.tension))), np.empty((1, len(state.tension))), nothing_kept.inverse,
+            np.zeros(1, bool),
+        )  # fmt: skip
+        problem = self.parts, way, nothing_kept, 0, state, found, self._room
         if not self._compiled:  # else numba takes what it compiled before for other arrays, and the last bits depend on that
-            settle.compile(tuple(map(typeof, problem)))
+            along.compile(tuple(map(typeof, problem)))
             self._compiled = True
-        if not settle(*problem):
+        if along(*problem) == 0:
             return False
         shape.u, shape.tension, shape.slip, shape.beyond = state.u.reshape(-1, 3), state.tension, state.slip, state.beyond
         shape.inverse = state.inverse if state.has[0] == OWN else None
