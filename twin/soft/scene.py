@@ -61,9 +61,10 @@ class Thing:
 
 @dataclass(frozen=True)
 class Sight:
-    """An instant: time (s); shortenings of the tendons (finger, tendon) m; tensions (finger, tendon) N; nodes' displacements (finger, n_free, 3) m in
-    each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that is free its place (thing,
-    3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the hand touch something."""
+    """An instant: time (s); shortenings of the tendons (finger, tendon) m; tensions (finger, tendon) N; nodes' displacements
+    (finger, n_free, 3) m in each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that
+    is free its place (thing, 3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the
+    hand touch something."""
 
     time: float
     shortening: np.ndarray

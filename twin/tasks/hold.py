@@ -23,9 +23,9 @@ class Hold(Task):
         shape = str(rng.choice(["sphere", "cylinder", "box"]))
         r, turn = rng.uniform(0.020, 0.025), rng.uniform(-0.3, 0.3)
         size = {"sphere": (r,), "cylinder": (r, 0.02), "box": (0.9 * r, 0.9 * r, 0.02)}[shape]
-        half, place = size[-1], rng.uniform(-3e-3, 3e-3, 2)
+        half, (x, y) = size[-1], rng.uniform(-3e-3, 3e-3, 2)
         thing = Thing(
-            "object", shape, size, rng.uniform(0.012, 0.02), (*map(float, place), 0.088),
+            "object", shape, size, rng.uniform(0.012, 0.02), (x, y, 0.088),
             (float(np.cos(turn / 2)), 0.0, 0.0, float(np.sin(turn / 2))), rng.uniform(0.8, 1.2),
         )  # fmt: skip
         return thing, table(0.088 + half)

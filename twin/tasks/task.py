@@ -63,9 +63,9 @@ class Track:
 
 @dataclass(frozen=True)
 class Person:
-    """How one person closes the fingers: where on their backs (height and azimuth (f,) m, rad) and over what width (f,) m a fingertip
-    lies, with what force (f,) N in the end, how long it takes (s), and how the force trembles: amplitude, rates (2,) Hz, phases
-    (f, 2)."""
+    """How one person closes the fingers: where on their backs (height and azimuth (f,) m, rad) and over what width (f,) m a
+    fingertip lies, with what force (f,) N in the end, how long it takes (s), and how the force trembles: amplitude, rates (2,) Hz,
+    phases (f, 2)."""
 
     height: np.ndarray
     azimuth: np.ndarray
