@@ -68,7 +68,7 @@ class Imitate:
     """
 
     data: Positional[Annotated[Path, arg(help="folder that twin demonstrate made")]]
-    way: Annotated[str, arg(help="shape or strain")] = "shape"
+    way: Annotated[str, arg(help="shape, strain, or bend: what opposite cords differ by")] = "shape"
     hand: Annotated[int | None, arg(help="seed of the hand that acts; default: the one that was shown")] = None
     trials: Annotated[int, arg(help="how many")] = 20
     seed: Annotated[int, arg(help="draws the trials")] = 0

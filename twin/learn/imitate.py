@@ -25,7 +25,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from twin.control.shape import ShapeController
-from twin.control.shape_baselines import StrainTracking
+from twin.control.shape_baselines import BendTracking, StrainTracking
 from twin.errors import SolveError, UnknownNameError
 from twin.learn import lerobot
 from twin.learn.demonstrate import ENCODER, EVERY, RESISTANCE, body_of, read_bench
@@ -33,6 +33,8 @@ from twin.learn.hands import Eye, aligned, built, fingers
 from twin.robots import Robot
 from twin.tasks import STEP, Outcome, Task, Trial
 
+CORDS = 4  # of a finger
+PRESS = 0.1  # chosen, as AHEAD, on a hand and seeds that score nothing; at 0.2 things are squeezed up and out, at 0 spheres fall
 AHEAD = 5  # frames, 0.2 s: what is followed lags by some 0.05 s, and a frame is 0.04 s
 
 
@@ -82,10 +84,11 @@ class ByShape(Way):
 
 class ByStrain(Way):
     columns = ("observation.resistance",)
+    tracking = StrainTracking
 
     def __init__(self, robot: Robot, known: dict[str, float], hanging: np.ndarray) -> None:
         super().__init__(robot, known, hanging)
-        self.controllers = [StrainTracking(twin) for twin in fingers(robot, {})]
+        self.controllers = [self.tracking(twin) for twin in fingers(robot, {})]
         self.rest = np.stack([c.finger.strain() for c in self.controllers])
 
     @staticmethod
@@ -103,25 +106,47 @@ class ByStrain(Way):
         return np.stack([c.step(g, c.cords.rest * (1.0 + x) ** 2, STEP).shortening for c, g, x in each])
 
 
-WAYS: dict[str, type[Way]] = {"shape": ByShape, "strain": ByStrain}
+class ByBend(ByStrain):
+    """By what opposite cords of a finger differ by, alone: tendons compress a finger, a person's hand does not. x is that
+    difference, half of it in the one cord and half in the other."""
+
+    tracking = BendTracking
+
+    @staticmethod
+    def shown(episode: dict[str, np.ndarray]) -> np.ndarray:
+        return _opposed(ByStrain.shown(episode))
+
+    def see(self, resistance: np.ndarray, shortening: np.ndarray) -> np.ndarray:
+        return _opposed(super().see(resistance, shortening))
+
+
+def _opposed(x: np.ndarray) -> np.ndarray:
+    """x (..., f s) of fingers with CORDS cords each, the second half opposite to the first."""
+    cords = x.reshape(*x.shape[:-1], -1, 2, CORDS // 2)
+    return 0.5 * (cords - cords[..., ::-1, :]).reshape(x.shape)
+
+
+WAYS: dict[str, type[Way]] = {"shape": ByShape, "strain": ByStrain, "bend": ByBend}
 
 
 class Nearest:
-    """Of all frames shown that which x is nearest to, AHEAD frames later."""
+    """Of all frames shown that which x is nearest to, AHEAD frames later, exaggerated by PRESS: shapes tell no forces, and a finger
+    that is wanted where it was when it touched does not press."""
 
     def __init__(self, episodes: Sequence[np.ndarray]) -> None:
         self.frames = np.concatenate(episodes)
         ends = np.cumsum([len(e) for e in episodes])
         last = np.repeat(ends - 1, [len(e) for e in episodes])
-        self.later = np.minimum(np.arange(len(self.frames)) + AHEAD, last)
+        later = self.frames[np.minimum(np.arange(len(self.frames)) + AHEAD, last)]
+        hanging = np.mean([e[0] for e in episodes], axis=0)
+        self.wanted = later + PRESS * (later - hanging)
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        nearest = int(np.argmin(((self.frames - x) ** 2).sum(axis=1)))
-        return self.frames[self.later[nearest]]
+        return self.wanted[int(np.argmin(((self.frames - x) ** 2).sum(axis=1)))]
 
 
 def learn(way: str, folder: Path) -> Nearest:
-    """Raises UnknownNameError for another way than shape and strain, DataError for a folder without demonstrations."""
+    """Raises UnknownNameError for another way than shape, strain and bend, DataError for a folder without demonstrations."""
     if way not in WAYS:
         raise UnknownNameError("way", way, list(WAYS))
     return Nearest([WAYS[way].shown(episode) for episode in lerobot.read_episodes(folder, WAYS[way].columns)])

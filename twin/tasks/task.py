@@ -21,6 +21,7 @@ import numpy as np
 from twin.errors import UnknownNameError
 from twin.soft.scene import Sight, Thing
 
+STEP = 0.02  # s from look to look
 TABLE = "table"
 HALF = 5e-3  # m, half the table's thickness
 TOUCHED = 0.2  # s: touched for less than that an object was not reached
@@ -110,8 +111,8 @@ class Task(ABC):
     def things(self, rng: np.random.Generator) -> tuple[Thing, ...]:
         """The object and the table, in the palm's frame."""
 
-    def sideways(self, seen: Sight, start: Sight) -> float:
-        """N by which a person who sees this pushes each finger on around the palm's axis."""
+    def sideways(self, before: float, seen: Sight, start: Sight) -> float:
+        """N by which a person who pushed by `before` and sees this pushes each finger along its own y axis."""
         return 0.0
 
     @abstractmethod

@@ -9,9 +9,8 @@ from twin.factory.draw import Pushes
 from twin.factory.solve import surface
 from twin.soft import HandBody
 from twin.soft.scene import Scene, Sight
-from twin.tasks.task import TABLE, Outcome, Person, Task, Track
+from twin.tasks.task import STEP, TABLE, Outcome, Person, Task, Track
 
-STEP = 0.02  # s
 SINKS = 0.05  # m/s
 PAID_OUT = -15e-3  # m: slack
 
@@ -25,7 +24,7 @@ class Trial:
         self.scene = Scene(body, self.things, gravity)
         self.start = self.seen = self.scene.see()
         self._skins = [surface(finger.cone, finger.cells) for finger in body.fingers]
-        self._looks, self._lost = [self.seen], False
+        self._looks, self._lost, self._aside = [self.seen], False, 0.0
 
     @property
     def over(self) -> bool:
@@ -44,8 +43,9 @@ class Trial:
 
     def push(self, person: Person) -> None:
         """STEP s on under a person's hand, all tendons paid out."""
-        inwards, aside = person.squeeze(self.seen.time), self.task.sideways(self.seen, self.start)
-        force = np.column_stack([inwards, np.full(len(inwards), aside), np.zeros(len(inwards))])
+        inwards = person.squeeze(self.seen.time)
+        self._aside = self.task.sideways(self._aside, self.seen, self.start)
+        force = np.column_stack([inwards, np.full(len(inwards), self._aside), np.zeros(len(inwards))])
         self.scene.press(np.stack([
             skin.force(Pushes(person.height[k : k + 1], person.azimuth[k : k + 1], person.width[k : k + 1], force[k : k + 1]))
             for k, skin in enumerate(self._skins)

@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from twin.soft.scene import Sight, Thing
-from twin.tasks.task import Outcome, Task, Track, table
+from twin.tasks.task import STEP, Outcome, Task, Track, table
 
 WANTED, WITHIN = np.radians(30.0), np.radians(10.0)
 BEGINS, TAKES = 1.3, 1.0  # s
-STIFF, DAMPED = 1.2, 0.12  # N/rad, N s/rad, of a person who sees how far it has turned
+EAGER, STRONGEST = 1.5, 0.6  # N/(rad s), N: how a person who sees that it lags pushes harder; force, not speed, is what hands give
 AWAY, TILTED = 10e-3, np.radians(20.0)
 
 
@@ -19,6 +19,7 @@ class Turn(Task):
     about = "turn a cylinder of 40 to 48 mm that stands on a table by 30 degrees about its axis"
     success = "in the last 0.4 s it stays turned by 20 to 40 degrees, within 10 mm of its place and tilted by less than 20 degrees"
     seconds: ClassVar[float] = 3.0
+    strength: ClassVar[float] = 0.7
 
     def things(self, rng: np.random.Generator) -> tuple[Thing, ...]:
         x, y = rng.uniform(-2e-3, 2e-3, 2)
@@ -28,11 +29,12 @@ class Turn(Task):
         )  # fmt: skip
         return thing, table(0.110)
 
-    def sideways(self, seen: Sight, start: Sight) -> float:
-        """A spring and a damper to where it should be by now; a finger's own y axis goes around against the palm's z axis."""
-        turned = 2.0 * np.arctan2(seen.turn[0, 3], seen.turn[0, 0]) - 2.0 * np.arctan2(start.turn[0, 3], start.turn[0, 0])
+    def sideways(self, before: float, seen: Sight, start: Sight) -> float:
+        """Ever harder until it is where it should be by now; a finger's own y axis goes around against the palm's z axis."""
         x = float(np.clip((seen.time - start.time - BEGINS) / TAKES, 0.0, 1.0))
-        return -float(STIFF * (WANTED * x * x * (3.0 - 2.0 * x) - turned) - DAMPED * seen.velocity[0, 5])
+        turned = 2.0 * np.arctan2(seen.turn[0, 3], seen.turn[0, 0])
+        push = before - EAGER * STEP * (WANTED * x * x * (3.0 - 2.0 * x) - turned)
+        return float(np.clip(push, -STRONGEST, STRONGEST))
 
     def judge(self, track: Track) -> Outcome:
         yaw, last = track.yaw(), track.last
