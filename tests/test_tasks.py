@@ -14,7 +14,7 @@ from twin.errors import DataError, UnknownNameError
 from twin.learn import lerobot
 from twin.learn.demonstrate import ATTEMPTS, FPS, Order, body_of, demonstrate, read
 from twin.learn.hands import LEFT, Eye, aligned, built, fingers
-from twin.learn.imitate import AHEAD, Actor, ByStrain, Nearest, learn
+from twin.learn.imitate import AHEAD, PRESS, Actor, ByStrain, Nearest, learn
 from twin.robots import load
 from twin.sensors import resistance
 from twin.tasks import Outcome, Track, Trial, task, tasks
@@ -191,9 +191,8 @@ def test_an_alignment_knows_cords_and_not_the_silicone() -> None:
 def test_the_nearest_frame_answers_with_what_came_after() -> None:
     one, other = np.arange(20.0)[:, None] * [1.0, 0.0], np.arange(30.0)[:, None] * [0.0, 1.0]
     policy = Nearest([one, other])
-    np.testing.assert_array_equal(policy(np.array([7.3, -0.1])), [7.0 + AHEAD, 0.0])
-    np.testing.assert_array_equal(policy(np.array([18.0, 1.0])), [19.0, 0.0])  # an episode's end holds on
-    np.testing.assert_array_equal(policy(np.array([0.4, 21.0])), [0.0, 21.0 + AHEAD])
+    for x, answer in (([7.3, -0.1], [7 + AHEAD, 0]), ([18.0, 1.0], [19, 0]), ([0.4, 21.0], [0, 21 + AHEAD])):  # an end holds on
+        np.testing.assert_allclose(policy(np.array(x)), (1.0 + PRESS) * np.array(answer), rtol=1e-12)
 
 
 def test_strains_are_tared(shown: Path) -> None:
