@@ -11,7 +11,7 @@ from twin.tasks.task import Outcome, Task, Track, lifted, table
 
 
 class Hold(Task):
-    about = "grasp a ball, cylinder or box of 40 to 50 mm and keep it when its table sinks away"
+    about = "grasp a ball, cylinder or box of 36 to 50 mm and keep it when its table sinks away"
     success = (
         "1.4 s after the table began to sink (50 mm/s) the object is within 10 mm of its height and has moved by less than 3 mm in "
         "the last 0.4 s"
