@@ -18,6 +18,7 @@ from tyro.conf import Positional, arg
 
 from twin.errors import DataError, TwinError
 from twin.finger_commands import Align, Generate, Shape, Train
+from twin.task_commands import Demonstrate, Imitate, Tasks
 from twin.terminal import command_line, cores, err, out, plain, working
 
 if TYPE_CHECKING:
@@ -338,7 +339,10 @@ def _fitted_table(fitted: Fit) -> Table:
     return table
 
 
-Command = New | Robots | Diagnose | Evaluate | Simulate | Rollout | View | Calibrate | Effects | Generate | Train | Align | Shape
+Command = (
+    New | Robots | Diagnose | Evaluate | Simulate | Rollout | View | Calibrate | Effects | Generate | Train | Align | Shape | Tasks
+    | Demonstrate | Imitate
+)  # fmt: skip
 
 
 def main() -> None:

@@ -61,6 +61,7 @@ GROUPS = {
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
     "shape": Group(("twin/shape/*.py",), ("tests/test_shape.py", "-k", "error_bar or nothing")),
     "control": Group(("twin/control/*.py",), ("tests/test_control.py", "tests/test_shape_control.py")),
+    "tasks": Group(("twin/tasks/*.py",), ("tests/test_tasks.py", "-k", "judged or nothing or lists")),
     "kinematics": Group(("twin/kinematics/*.py",), ("tests/test_kinematics.py",)),
     "equilibrium": Group(
         ("twin/equilibrium/*.py",), ("tests/test_balance.py", "tests/test_equilibrium.py", "tests/test_lengths.py")

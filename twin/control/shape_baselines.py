@@ -24,6 +24,15 @@ class StrainTracking(ShapeController):
         return LENGTH * (wanted - seen.strain)[:, None], LENGTH * strains[:, None]
 
 
+class BendTracking(StrainTracking):
+    """Matches what opposite cords, the first half against the second, differ by: how the finger bends, not how it is compressed."""
+
+    def aim(self, wanted: np.ndarray, seen: Seen, points: np.ndarray, strains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        apart, slope = super().aim(wanted, seen, points, strains)
+        half = len(apart) // 2
+        return apart[:half] - apart[half:], slope[:half] - slope[half:]
+
+
 class TipTracking(ShapeController):
     """Brings the centre of the tip's face to where the wanted shape has it."""
 

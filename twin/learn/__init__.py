@@ -1,6 +1,8 @@
-"""What is learned from data where the physics ends; always beside the physical attribution, never in it.
+"""What is learned from data where the physics ends, always beside the physical attribution, never in it; and from being shown.
 
-remainder.py  a small regularised map from pulls to what the twin leaves
+remainder.py    a small regularised map from pulls to what the twin leaves
+hands.py        built hands, and the shape of all their fingers     demonstrate.py  tasks shown by a person's hand
+lerobot.py      their files                                         imitate.py      what was shown, done by tendons
 """
 
 from twin.learn.remainder import Remainder

@@ -31,7 +31,7 @@ REST = 1e-4  # m, what the modes leave out
 
 
 class Modal(Learned):
-    """Remembers nothing."""
+    """Remembers nothing. `mean` (P, 3) m and `basis` (k, P, 3), orthonormal: displacements of the points are mean + z @ basis."""
 
     about = "a small network onto the twin's deformation modes"
 
@@ -39,11 +39,11 @@ class Modal(Learned):
         super().__init__(twin, arrays)
         self.net = Network(self.arrays)
         weights = self.body.lattice.weights(self.points.rest)
-        self._mean, basis = self.net.modes.mean.reshape(-1, 3), self.net.modes.basis.reshape(len(self.net.modes.basis), -1, 3)
-        if self._mean.shape[0] != weights.shape[1]:
+        self.mean, basis = self.net.modes.mean.reshape(-1, 3), self.net.modes.basis.reshape(len(self.net.modes.basis), -1, 3)
+        if self.mean.shape[0] != weights.shape[1]:
             raise DataError(f"{twin.robot.folder / self.file()} was trained for another lattice; train it again: twin train")
-        self._basis = np.einsum("pn,knc->kpc", weights, basis)
-        self._mean = weights @ self._mean
+        self.basis = np.einsum("pn,knc->kpc", weights, basis)
+        self.mean = weights @ self.mean
 
     @classmethod
     def lesson(cls, data: Data) -> Lesson:
@@ -51,9 +51,9 @@ class Modal(Learned):
 
     def decode(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
         z, std = self.net(felt)
-        k, p = self._basis.shape[:2]
-        moved = self._mean + (z @ self._basis.reshape(k, -1)).reshape(-1, p, 3)
-        return moved, np.sqrt(std**2 @ (self._basis**2).sum(axis=2) + REST**2)
+        k, p = self.basis.shape[:2]
+        moved = self.mean + (z @ self.basis.reshape(k, -1)).reshape(-1, p, 3)
+        return moved, np.sqrt(std**2 @ (self.basis**2).sum(axis=2) + REST**2)
 
 
 class Network:

@@ -1,7 +1,7 @@
-"""A hand among rigid things that it may touch, hold and move: one MuJoCo model, driven by its servos.
+"""A hand among rigid things that it may touch, hold and move: one MuJoCo model, driven by its servos or tendon by tendon.
 
 A servo drives a pair of antagonist tendons: it pulls the first in by as much as it pays the second out. Fingers touch things,
-things touch each other and the table; fingers do not touch each other."""
+things touch each other and the table; fingers do not touch each other. Forces on the skin stand for a person's hand."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from twin.errors import DataError, SolveError
 from twin.soft.flex import FINGER, THING
 from twin.soft.hand import HandBody, moving, stand
 
+STICKS = 20.0  # MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 1 mm/s, with its usual 1 by 14
 SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
 SHAPES = {
     "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
@@ -60,12 +61,13 @@ class Thing:
 
 @dataclass(frozen=True)
 class Sight:
-    """An instant: time (s); servos (finger, pair) m; tensions (finger, tendon) N; nodes' displacements (finger, n_free, 3) m in
-    each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that is free its place (thing,
-    3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the hand touch something."""
+    """An instant: time (s); shortenings of the tendons (finger, tendon) m; tensions (finger, tendon) N; nodes' displacements
+    (finger, n_free, 3) m in each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that
+    is free its place (thing, 3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the
+    hand touch something."""
 
     time: float
-    servos: np.ndarray
+    shortening: np.ndarray
     tension: np.ndarray
     nodes: np.ndarray
     strain: np.ndarray
@@ -74,6 +76,12 @@ class Sight:
     turn: np.ndarray
     velocity: np.ndarray
     touching: int
+
+    @property
+    def servos(self) -> np.ndarray:
+        """(finger, pair) m: by how much more the first of each pair is pulled in than half of both."""
+        first, second = np.split(self.shortening, 2, axis=1)
+        return 0.5 * (first - second)
 
 
 class Scene:
@@ -98,20 +106,22 @@ class Scene:
             thing.add(spec)
         self.moving = moving(started, spec)
         self.model, self.data = self.moving.model, self.moving.data
-        self.model.opt.solver = mujoco.mjtSolver.mjSOL_CG  # Newton factorises 816 unknowns at every step: half as fast
+        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # one iteration a step; CG leaves 0.3 N of jitter in the tendons
+        self.model.opt.cone, self.model.opt.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, STICKS
         joints = [self.model.joint(t.name) for t in things if not t.fixed]
         self._at = np.array([j.qposadr[0] + np.arange(7) for j in joints], int).reshape(-1, 7)
         self._speed = np.array([j.dofadr[0] + np.arange(6) for j in joints], int).reshape(-1, 6)
-        self._servos = np.zeros((len(started), self.pairs))
-        self._kept = [self.data.qpos.copy(), *(a.copy() for a in self._memory())]
+        self._pulled = np.zeros((len(started), tendons))
+        self._kept = [self.data.qpos.copy(), self.model.body_pos.copy(), *(a.copy() for a in self._memory())]
 
     def reset(self) -> Sight:
         """Back to rest, as it was made."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:] = self._kept[0]
-        for array, kept in zip(self._memory(), self._kept[1:], strict=True):
+        self.model.body_pos[:] = self._kept[1]
+        for array, kept in zip(self._memory(), self._kept[2:], strict=True):
             array[:] = kept
-        self._servos[:] = 0.0
+        self._pulled[:] = 0.0
         mujoco.mj_forward(self.model, self.data)
         return self.see()
 
@@ -121,12 +131,19 @@ class Scene:
         Raises DataError for a command that is not finite, SolveError naming the finger, or the thing, and the time where it is
         lost.
         """
-        told = np.asarray(servos, float).reshape(self._servos.shape)
+        told = np.asarray(servos, float).reshape(-1, self.pairs)
         if not np.isfinite(told).all():
             raise DataError(f"servo {int(np.flatnonzero(~np.isfinite(told))[0]) + 1} is told {told.tolist()}; a number is needed")
+        return self.pull(np.concatenate([told, -told], axis=1), seconds)
+
+    def pull(self, shortening: ArrayLike, seconds: float) -> Sight:
+        """As `step`, each tendon by itself: shortened by (finger, tendon) m from the hanging rest; far below zero it is slack."""
+        told = np.asarray(shortening, float).reshape(self._pulled.shape)
+        if not np.isfinite(told).all():
+            raise DataError(f"tendon {int(np.flatnonzero(~np.isfinite(told))[0]) + 1} is told {told.tolist()}; a number is needed")
         steps = max(1, round(seconds / self.moving.step))
-        self.moving.run(self._tendons(self._servos), self._tendons(told), steps)
-        self._servos = told.copy()
+        self.moving.run(self._pulled, told, steps)
+        self._pulled = told.copy()
         lost = ~np.isfinite(self.data.qpos[self._at]).all(axis=1)
         if lost.any():
             name = [t.name for t in self.things if not t.fixed][int(np.argmax(lost))]
@@ -135,23 +152,29 @@ class Scene:
             )
         return self.see()
 
+    def press(self, force: ArrayLike) -> None:
+        """From now on forces (finger, n_free, 3) N act on the fingers' nodes, in each finger's own frame."""
+        for limb, one in zip(self.moving.limbs, np.asarray(force, float), strict=True):
+            limb.force[:] = one.ravel()
+
+    def shift(self, name: str, way: ArrayLike) -> None:
+        """Move a fixed thing on by (3,) m of the palm's frame: what it carries does not feel its speed."""
+        self.model.body(name).pos += np.asarray(way, float)
+
     def see(self) -> Sight:
         """Where all is now."""
         data, hand = self.data, self.moving
         nodes = np.stack([hand.u(k) for k in range(len(hand.limbs))])
         felt = [s.statics.sensed(u[None]) for s, u in zip(hand.started, nodes, strict=True)]
         return Sight(
-            float(data.time), self._servos.copy(), np.stack([limb.tension for limb in hand.limbs]), nodes,
+            float(data.time), self._pulled.copy(), np.stack([limb.tension for limb in hand.limbs]), nodes,
             np.concatenate([f["strain"] for f in felt]), np.concatenate([f["sensor"] for f in felt]),
             data.qpos[self._at[:, :3]], data.qpos[self._at[:, 3:]], data.qvel[self._speed], self._touching(),
         )  # fmt: skip
 
-    def _tendons(self, servos: np.ndarray) -> np.ndarray:
-        return np.concatenate([servos, -servos], axis=1)
-
     def _memory(self) -> list[np.ndarray]:
         """What the fingers carry from step to step beside MuJoCo's state."""
-        return [a for limb in self.moving.limbs for a in (limb.slip, limb.beyond, limb.tension)]
+        return [a for limb in self.moving.limbs for a in (limb.slip, limb.beyond, limb.tension, limb.force)]
 
     def _touching(self) -> int:
         return int((self.data.contact.flex >= 0).any(axis=1).sum()) if self.data.ncon else 0

@@ -1,0 +1,100 @@
+"""Commands of tasks on a hand: `twin tasks`, `demonstrate`, `imitate`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from rich.table import Table
+from tyro.conf import Positional, arg
+
+from twin.errors import DataError
+from twin.terminal import cores, out, working
+
+if TYPE_CHECKING:
+    from twin.tasks import Outcome
+
+HAND = "hand"
+
+
+@dataclass(frozen=True)
+class Tasks:
+    """List the tasks a hand can be shown, and what counts as success."""
+
+    def run(self) -> None:
+        from twin.tasks import tasks
+
+        table = Table("task", "what it is", "success", "takes, s")
+        for name, law in tasks().items():
+            table.add_row(name, law.about, law.success, f"{law.seconds:g}")
+        out.print(table)
+
+
+@dataclass(frozen=True)
+class Demonstrate:
+    """Show a hand a task: a person's pushes on fingers whose tendons are slack, recorded as a bench would record them.
+
+    Keeps the attempts that succeed, in the layout of LeRobot's datasets; the same whatever the number of jobs; run again to go on
+    after a stop.
+    """
+
+    task: Positional[Annotated[str, arg(help="which task; a wrong name lists those there are")]]
+    n: Annotated[int, arg(help="how many demonstrations")]
+    out: Annotated[Path, arg(help="folder for them")]
+    seed: Annotated[int, arg(help="builds the hand and draws everything")] = 0
+    jobs: Annotated[int, arg(help="worker threads")] = cores()
+
+    def run(self) -> None:
+        from twin.learn.demonstrate import Order, demonstrate
+        from twin.robots import load
+        from twin.tasks import task
+
+        if self.n < 1 or self.seed < 0 or self.jobs < 1:
+            raise DataError(f"--n {self.n} --seed {self.seed} --jobs {self.jobs}: n and jobs from 1 on, seed from 0 on are needed")
+        order = Order(task(self.task), load(HAND), self.n, self.seed)
+        out.print(f"{self.task}: success is that {order.task.success}", highlight=False, markup=False)
+        with working(f"showing {self.task}") as progress:
+            outcomes = demonstrate(order, self.out, self.jobs, progress)
+        out.print(f"demonstrations: {self.out}; attempts: {counts(outcomes)}", highlight=False, markup=False)
+
+
+@dataclass(frozen=True)
+class Imitate:
+    """Do by tendons what was shown by hand, and count what becomes of fresh trials.
+
+    The nearest frame shown says what is wanted next, of shapes or of raw strains; control by shape, or strain tracking, follows.
+    """
+
+    data: Positional[Annotated[Path, arg(help="folder that twin demonstrate made")]]
+    way: Annotated[str, arg(help="shape, strain, or bend: what opposite cords differ by")] = "shape"
+    hand: Annotated[int | None, arg(help="seed of the hand that acts; default: the one that was shown")] = None
+    trials: Annotated[int, arg(help="how many")] = 20
+    seed: Annotated[int, arg(help="draws the trials")] = 0
+    jobs: Annotated[int, arg(help="worker threads")] = cores()
+
+    def run(self) -> None:
+        from twin.learn.demonstrate import read
+        from twin.learn.imitate import Actor, learn
+        from twin.robots import load
+        from twin.tasks import task
+
+        if self.trials < 1 or min(self.seed, self.hand or 0) < 0 or self.jobs < 1:
+            raise DataError("--trials and --jobs from 1 on, --seed and --hand from 0 on are needed")
+        order = read(self.data)
+        policy, what = learn(self.way, self.data), task(order["task"])
+        hand = order["seed"] if self.hand is None else self.hand
+        out.print(f"{what.name()}: success is that {what.success}", highlight=False, markup=False)
+        with working(f"{what.name()} by {self.way}") as progress:
+            found = Actor(what, load(HAND), hand, self.way, policy).score(self.trials, self.seed, self.jobs, progress)
+        whose = "the hand shown" if hand == order["seed"] else f"hand {hand}, shown on hand {order['seed']}"
+        out.print(f"{what.name()} by {self.way}, {whose}, seed {self.seed}: {counts(found)}", highlight=False, markup=False)
+
+
+def counts(found: Counter[Outcome]) -> str:
+    """`48 of 50 success; 2 slipped`."""
+    from twin.tasks import Outcome
+
+    rest = [f"{n} {what}" for what, n in found.items() if what is not Outcome.SUCCESS]
+    return "; ".join([f"{found[Outcome.SUCCESS]} of {sum(found.values())} success", *rest])
