@@ -5,8 +5,8 @@
                                        task_index
     meta/info.json, meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet
 
-Written by pyarrow: LeRobot's own library (0.4.4, the last for Python 3.11) asks for a torch below 2.11, and for half a gigabyte of
-cameras, video and logging. `observation.state` is the shape of all fingers, coordinates of its modes, m; `action` how it changes to
+Written by pyarrow: LeRobot's own library (0.4.4, the last for Python 3.11) asks for a torch below 2.11, which the learned
+estimators here are not trained with. `observation.state` is the shape of all fingers, coordinates of its modes, m; `action` how it changes to
 the next frame.
 
 Source: huggingface/lerobot, `datasets/io_utils.py` and `dataset_writer.py`.
