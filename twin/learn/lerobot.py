@@ -5,9 +5,9 @@
                                        task_index
     meta/info.json, meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet
 
-Written by pyarrow: LeRobot's own library (0.4.4, the last for Python 3.11) asks for a torch below 2.11, which the learned
-estimators here are not trained with. `observation.state` is the shape of all fingers, coordinates of its modes, m; `action` how it changes to
-the next frame.
+Written by pyarrow: LeRobot's own library (0.4.4, the last for Python 3.11) asks for a torch below 2.11, which the estimators here
+are not trained with. `observation.state` is the shape of all fingers, coordinates of its modes, m; `action` how it changes to the
+next frame.
 
 Source: huggingface/lerobot, `datasets/io_utils.py` and `dataset_writer.py`.
 """
