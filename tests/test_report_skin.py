@@ -46,17 +46,15 @@ def test_points_stand_off_the_true_skin_as_they_were_put(story: Any) -> None:
     before, after = (np.concatenate([b.off for b in skin.clouds(story, stage)]) for stage in before_and_after(story))
     assert np.allclose(after, OFF, atol=0.05 * OFF)
     assert np.std(before) > np.std(after)  # 0.1 rad of mount, felt where the finger is bent
-    assert "0.80 mm with the effects" in str(skin.words(story))
+    assert "0.80 mm with the effects" in skin.words(story, skin.before_after(story))
 
 
 def test_the_picture_has_both_stages_and_the_worst_apart(story: Any) -> None:
-    drawn = skin.plot(story)
-    assert drawn is not None
+    drawn = skin.plot(story, skin.before_after(story))
     traces: Any = drawn.figure.data
     assert [t.visible for t in traces] == [False] * 2 * skin.POSES + [True] * 2 * skin.POSES
 
 
 def test_a_robot_without_skin_or_clouds_has_no_picture(story: Any) -> None:
     bare: Any = SimpleNamespace(**{**vars(story), "folds": ("each its own twin",)})
-    assert skin.plot(bare) is None
-    assert skin.words(bare) is None
+    assert skin.before_after(bare) == []

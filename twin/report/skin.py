@@ -65,25 +65,26 @@ def _beside(trial: int, time: float, points: np.ndarray, drawn: Figure, frames: 
     return Beside(trial, float(time), points, skin, ((points - skin[nearest]) * normals).sum(axis=1))
 
 
-def words(d: Diagnosis) -> str | None:
+def before_after(d: Diagnosis) -> list[list[Beside]]:
+    """`clouds` of each stage that the report compares; none where a stage has none."""
+    each = [clouds(d, stage) for stage in before_and_after(d)]
+    return each if all(each) else []
+
+
+def words(d: Diagnosis, each: list[list[Beside]]) -> str:
     """Median distances of the sealed clouds before and after."""
     said = []
-    for stage in before_and_after(d):
-        if not (each := clouds(d, stage)):
-            return None
-        off = MM * np.abs(np.concatenate([b.off for b in each]))
+    for stage, found in zip(before_and_after(d), each, strict=True):
+        off = MM * np.abs(np.concatenate([b.off for b in found]))
         said.append(f"{np.median(off):.2f} mm {stage.words} (90 % within {np.quantile(off, 0.9):.2f})")
     told = ", ".join(said)
     return f"Points of the clouds of sealed trials, which nothing was fitted to, stand off the predicted skin by {told}; medians."
 
 
-def plot(d: Diagnosis) -> Plot | None:
-    """A few clouds of sealed trials, the most bent first, on the predicted skin, coloured by their distance from it; before and
+def plot(d: Diagnosis, each: list[list[Beside]]) -> Plot:
+    """A few clouds of sealed trials, those that differ most, on the predicted skin, coloured by their distance from it; before and
     after at a click."""
     stages = before_and_after(d)
-    each = [clouds(d, stage) for stage in stages]
-    if not all(each):
-        return None
     chosen = _apart(each[-1])
     faces = d.twin.figure().faces
     up, sight = _view(d, [each[-1][i] for i in chosen])

@@ -15,13 +15,10 @@ from twin.body import Port, Sense
 from twin.robots import soft
 from twin.robots.hand_schema import SCHEMA, Hand, of_finger
 from twin.soft import HandBody, HandDynamics, HandStatics
-from twin.soft.figure import HandFigure
+from twin.soft.figure import PALM, THICK, HandFigure
 from twin.soft.statics import turned
 
 __all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
-
-PALM = [0.35, 0.37, 0.4, 1.0]
-THICK = 5e-3  # m, of the drawn palm
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HandBody:
@@ -34,8 +31,8 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HandB
     turns = np.stack([turned(a + np.pi) for a in angle])
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[values["palm.radius"], THICK, 0], pos=[0, 0, -THICK], rgba=PALM, contype=0,
-        conaffinity=0,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[values["palm.radius"], THICK, 0], pos=[0, 0, -THICK],
+        rgba=[*(c / 255 for c in PALM), 1.0], contype=0, conaffinity=0,
     )  # fmt: skip
     for k, finger in enumerate(fingers):
         quat = [np.cos(0.5 * (angle[k] + np.pi)), 0.0, 0.0, np.sin(0.5 * (angle[k] + np.pi))]

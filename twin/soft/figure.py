@@ -14,7 +14,7 @@ from twin.soft.room import parts_of, undeformed
 from twin.soft.statics import turned
 
 RINGS, AROUND = 28, 32  # of the drawn skin
-PALM, THICK = (89, 94, 102), 5e-3  # colour, and m
+PALM, THICK = (89, 94, 102), 5e-3  # colour, and m, of a hand's palm
 
 
 class SoftFigure:

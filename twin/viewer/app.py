@@ -32,7 +32,12 @@ DESCRIBED, BETTER = "as described", "with effects"
 REPLAY, BY_HAND = "replay", "by hand"
 BY = {  # what is pulled by: name, unit, meaning, SI of one
     Drive.TENSION: ("tension", "N", "tension as its load cell reads it", 1.0),
-    Drive.DISPLACEMENT: ("displacement", "mm", "taken up by its motor from the hanging rest; all others are held too", 1e-3),
+    Drive.DISPLACEMENT: (
+        "displacement",
+        "mm",
+        "taken up by its motor from the hanging rest, negative let out; the others hold",
+        1e-3,
+    ),
 }
 NOW = {"label": "now", "stroke": "#d62728"}
 
@@ -105,11 +110,15 @@ class App:
         full, ports = full_pull(self.twin), self.twin.robot.build().drives
         ways = [d for d in (Drive.TENSION, Drive.DISPLACEMENT) if all(any(p.drive is d for p in port) for port in ports)]
         most = {Drive.TENSION: round(MOST * full.tension, 1), Drive.DISPLACEMENT: round(MOST * 1e3 * full.displacement, 1)}
+        least = {
+            Drive.TENSION: 0.0,
+            Drive.DISPLACEMENT: -most[Drive.DISPLACEMENT],
+        }  # one motor can take up only what others let out
         with self._driving:
             self.by = gui.add_dropdown("pull by", tuple(BY[d][0] for d in ways), visible=len(ways) > 1, hint="what motors hold")
             self.sliders = {
                 d: [
-                    gui.add_slider(f"tendon {i}, {BY[d][1]}", 0.0, most[d], 0.01, 0.0, hint=BY[d][2], visible=d is ways[0])
+                    gui.add_slider(f"tendon {i}, {BY[d][1]}", least[d], most[d], 0.01, 0.0, hint=BY[d][2], visible=d is ways[0])
                     for i in range(1, robot.n_tendon + 1)
                 ]
                 for d in ways

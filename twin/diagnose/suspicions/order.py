@@ -53,7 +53,7 @@ def markers(case: Case) -> Iterator[Suspicion]:
     for group, (names, columns) in groups.items():
         alive = np.flatnonzero(~np.isin(columns, dead).any(axis=1))
         names, columns = [names[a] for a in alive], columns[alive]
-        left = _followed if group in BUILT else rms_of
+        left = _followed if group in BUILT else _left
         cost = np.array([[left(y[:, a], p[:, b]) for b in columns] for a in columns])
         if len(columns) < 2 or not np.isfinite(cost).all():
             continue
@@ -70,13 +70,13 @@ def markers(case: Case) -> Iterator[Suspicion]:
             )
 
 
-def rms_of(y: np.ndarray, p: np.ndarray) -> float:
+def _left(y: np.ndarray, p: np.ndarray) -> float:
     """RMS of what a prediction leaves of readings."""
     return rms(y - p)
 
 
 def _followed(y: np.ndarray, p: np.ndarray) -> float:
-    """RMS of what the best rising straight line in a prediction leaves of readings, over their level."""
+    """RMS of what the best rising straight line in a prediction leaves of readings, both about their means."""
     y, p = y[:, 0], p[:, 0]
     known = np.isfinite(y)
     y, p = y[known] - y[known].mean(), p[known] - p[known].mean()

@@ -21,7 +21,9 @@ def section(story: Story) -> Section:
     d = story.diagnosis
     whole = markers(d.bench)
     chosen = poses(d) if len(whole) > 1 else []
-    content = {"plot": _plot(d, chosen) if chosen else None, "poses": _words(d, chosen), "skin": skin.plot(d), "off": skin.words(d)}
+    content = {"plot": _plot(d, chosen) if chosen else None, "poses": _words(d, chosen)}
+    beside = skin.before_after(d)
+    content |= {"skin": skin.plot(d, beside), "off": skin.words(d, beside)} if beside else {"skin": None, "off": None}
     return Section("shapes", "Shapes", "shapes.html", content)
 
 
