@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from twin.errors import DataError
-from twin.factory import Order, generate, named_points, shard
+from twin.factory import Order, draw, generate, named_points, shard, varied
 from twin.factory.solve import hang, weight_of
 from twin.robots import load
 from twin.soft import SoftBody, SoftStatics
@@ -106,3 +106,40 @@ def test_a_broken_shard_is_named(tmp_path: Path) -> None:
     (tmp_path / "samples-00000.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(DataError, match="cannot be read"):
         shard.read(tmp_path, ["nodes"])
+
+
+def test_routing_differs_between_fingers_by_the_spread_that_was_ordered(tmp_path: Path) -> None:
+    """Each tendon by a draw of its own; shapes follow their own finger's tendons, and what is not ordered stays as it was."""
+    robot = load("finger")
+    routing = varied(robot, ["tendons.azimuth = 3 deg", "tendons.radius_end = 0.4 mm"])
+    assert [p.name for p in routing] == [*(f"tendons.azimuth_{i}" for i in range(1, 5)), "tendons.radius_end"]
+    generator = [draw.generator(5, c) for c in range(300)]
+    body, azimuth = robot.build(), np.zeros(4)
+    assert isinstance(body, SoftBody)
+    drawn = [draw.draw(g, body.cone, azimuth, routing).values for g in generator]
+    for p in routing:  # 300 draws: a standard deviation is known to 4 %
+        assert np.std([v[p.name] for v in drawn]) == pytest.approx(p.std, rel=0.13)
+    assert abs(np.corrcoef([[v[p.name] for v in drawn] for p in routing])[0, 1]) < 0.2
+    for name, vary in (("as described", ()), ("varied", routing)):
+        generate(Order(robot, 16, 3, vary), tmp_path / name, jobs=1)
+    plain, other = (shard.read(tmp_path / n, ["nodes", "converged"]) for n in ("as described", "varied"))
+    assert plain["converged"].all()
+    assert other["converged"].all()
+    assert np.abs(plain["nodes"] - other["nodes"]).max() > 5e-4  # m: 3 deg of 60 degrees' bend move a tip by millimetres
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("tendons.azimuth", "says no spread"),
+        ("tendons.azimut = 2 deg", "did you mean"),
+        ("tendons.azimuth = 2 mm", "wrong dimension"),
+        ("tendons.azimuth = 2", "unit"),
+        ("tendons.radius_end = 0 mm", "above zero"),
+        ("tendons.radius_end = 9 mm", "at most 0.00115 m"),
+        ("tendons.radius_end = nan mm", "above zero"),
+    ],
+)
+def test_a_spread_that_makes_no_sense_is_refused(text: str, said: str) -> None:
+    with pytest.raises(DataError, match=said):
+        varied(load("finger"), [text])

@@ -24,11 +24,14 @@ class Generate:
     out: Annotated[Path, arg(help="folder for the shards")]
     jobs: Annotated[int, arg(help="worker processes")] = cores()
     seed: Annotated[int, arg(help="draws everything")] = 0
+    vary: Annotated[tuple[str, ...], arg(help="what else differs between fingers, as 'tendons.azimuth = 2 deg'")] = ()
 
     def run(self) -> None:
-        from twin.factory import Order, doubts, generate, need
+        from twin.factory import Order, doubts, generate, need, varied
 
         robot, drawn = doubts(self.twin)
+        also = {p.name: p for p in (*drawn, *varied(robot, self.vary))}
+        drawn = tuple(also.values())
         out.print(
             f"{self.samples} samples take about {need(self.samples) / 1e6:.0f} MB in {self.out}", highlight=False, markup=False
         )
