@@ -1,10 +1,10 @@
-"""The data factory under random kills: the same order made at once, and made by a process killed again and again, compared bit for bit.
+"""The data factory under random kills: one order made at once, and made by a process killed again and again, compared bit for bit.
 
     python -m tools.factory_kills OUT [--samples 4000] [--kills 20] [--longest 30] [--seed 0]
 
-A kill (SIGKILL to the whole process group, workers too) comes a random time after a start, up to `--longest` s; then the same command
-goes on. Prints how many shards the killed one had at each kill, whether both folders hold the same bytes, and how many samples found
-no equilibrium.
+A kill (SIGKILL to the whole process group, workers too) comes a random time after a start, up to `--longest` s; then the same
+command goes on. Prints how many shards the killed one had at each kill, and whether both folders hold the same bytes; each run says
+how many samples found no equilibrium.
 """
 
 from __future__ import annotations
