@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tools.bench.finger.equilibria import Finger, equilibrium
-from twin.body import Problem
+from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.effects import Drive, Loads, Route, Signals, named
 from twin.robots import load
 from twin.sensors import Cords, resistance, strain
@@ -257,3 +257,12 @@ def test_a_sensor_that_lags_closes_its_loop() -> None:
     behind = (0.06 / 29.0) * decay / (1.0 - decay)  # of a ramp, in steps of 1 s, once settled
     np.testing.assert_allclose([read["share"][25], read["share"][55]], [-0.2 * behind, 0.2 * behind], rtol=1e-3)
     assert abs(read["share"][-1]) < 1e-8  # 40 s is 20 of its times
+
+
+def test_the_first_command_that_cannot_be_reached_ends_a_trial() -> None:
+    """60 mm of one tendon are more than a finger of 100 mm gives way by. What was found before stands, what comes after is not
+    sought from there."""
+    command = pulled(0, np.array([2e-3, 60e-3, 2e-3]))
+    path = SoftStatics(body()).solve(Problem(np.arange(3.0), command, Loads(HANGING), drives=HELD))
+    assert path.status.tolist() == [DIRECT, NOT_FOUND, NOT_FOUND]
+    assert np.allclose(path.markers[0], solve(body(), command[:1]).markers[0], atol=1e-9)

@@ -56,8 +56,8 @@ class SoftStatics:
     def solve(self, problem: Problem) -> SoftPath:
         """Equilibria in order; tendons held at lengths are measured from the hanging rest, and so is `path`.
 
-        Where none was found the sample's status is NOT_FOUND and its shape is the one before. Raises SolveError for springs
-        that pull, which nothing here solves.
+        The first sample without one ends the trial: from there on the status is NOT_FOUND and no shape is given. Raises SolveError
+        for springs that pull, which nothing here solves.
         """
         if problem.heating is not None:
             raise SolveError("SMA springs are not solved for a silicone body; remove that drive")
@@ -167,7 +167,7 @@ class Trial:
         return found.digest()
 
     def run(self) -> None:
-        """At rest under its loads, then all samples in order."""
+        """At rest under its loads, then all samples in order, up to the first that has no equilibrium."""
         self.hangs = self._one(0, self.at, np.zeros(len(self.at), bool))
         if self.hangs:
             self.hanging = self.room.pulled.length.copy()
@@ -183,7 +183,9 @@ class Trial:
             i = end
             if i < n:  # Newton's method is lost between two commands: in parts
                 self.at = self.problem.command[i - 1] if i else self.at
-                self.status[i] = DIRECT if self._in_parts(i) else NOT_FOUND
+                if not self._in_parts(i):
+                    return  # what comes after would be sought from a shape that is none
+                self.status[i] = DIRECT
                 i += 1
 
     def inverses(self) -> np.ndarray:
