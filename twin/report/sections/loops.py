@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from twin.report import strains
 from twin.report.loops import loop_words
 from twin.report.numbers import SHOWN, number
 from twin.report.sections.section import Section, Story
@@ -23,4 +24,4 @@ def section(story: Story) -> Section:
         }
         for name, loop in zip(names, d.loops.each, strict=True)
     ]
-    return Section("loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": loop_words(d)})
+    return Section("loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": loop_words(d), "strains": strains.plot(d)})

@@ -1,0 +1,59 @@
+"""Strain loops in the report: what is drawn is what was measured, and what the twins say of the same trial."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from twin.bench import prepare
+from twin.measurements import read
+from twin.report import strains
+from twin.robots.robot import models_folder
+from twin.twin import Twin
+
+
+@pytest.fixture(scope="module")
+def story() -> Any:
+    """A day whose twin reads every cord's change 10 % too large; nothing is simulated."""
+    robot = Twin.of("finger").robot
+    bench = prepare(read(models_folder() / "finger/samples/drift"), robot)
+    sealed = tuple(k for k, i in enumerate(bench.inputs) if i.name.startswith("sweep_1"))
+    cords = [j for j, o in enumerate(bench.outputs) if o.group == "sensor"]
+    off = [y.copy() for y in bench.measured]
+    for y in off:
+        y[:, cords] = y[:1, cords] * (np.sqrt(y[:, cords] / y[:1, cords]) * 1.1 - 0.1) ** 2
+    predictions = {"calibrated": off, "after": list(bench.measured)}
+    return SimpleNamespace(bench=bench, sealed_trials=sealed, claims=("one",), predictions=predictions)
+
+
+def test_loops_are_of_the_tendon_that_moves_the_cords_most(story: Any) -> None:
+    drawn = strains.plot(story)
+    assert drawn is not None
+    traces: Any = drawn.figure.data
+    before, after, dots = traces[:4], traces[4:8], traces[8:]
+    assert [t.name for t in dots] == [f"sensor_{i}_resistance" for i in range(1, 5)]
+    layout: Any = drawn.figure.layout
+    assert "tendon_1_displacement (mm)" in layout.xaxis.title.text  # sweep 1 is of tendon 1
+    for one, other, dot in zip(before, after, dots, strict=True):
+        assert np.allclose(other.y, dot.y, equal_nan=True)  # this twin predicts what was measured
+        moved = np.abs(dot.y) > 1.0
+        assert np.allclose((one.y / other.y)[moved], 1.1, rtol=1e-4)
+    assert np.nanmax(np.abs(dots[0].y)) > 5.0  # %: a finger bent by some 60 degrees
+
+
+def test_apparent_strain_is_kappa_times_strain_since_the_first_reading() -> None:
+    R = np.array([[np.nan, 1000.0], [900.0, 1000.0], [900.0 * 1.1**2, 810.0]])
+    assert np.allclose(strains.apparent(R)[1:], [[0.0, 0.0], [0.1, -0.1]])
+
+
+def test_a_robot_without_cords_and_a_trial_at_rest_have_no_loops(story: Any) -> None:
+    none: Any = SimpleNamespace(**{**vars(story), "sealed_trials": ()})
+    assert strains.plot(none) is None
+    still = SimpleNamespace(
+        **{**vars(story.bench), "inputs": [SimpleNamespace(command=np.zeros((5, 4))) for _ in story.bench.inputs]}
+    )
+    resting: Any = SimpleNamespace(**{**vars(story), "bench": still})
+    assert strains.plot(resting) is None
