@@ -40,8 +40,8 @@ def test_loops_are_of_the_tendon_that_moves_the_cords_most(story: Any) -> None:
     for one, other, dot in zip(before, after, dots, strict=True):
         assert np.allclose(other.y, dot.y, equal_nan=True)  # this twin predicts what was measured
         moved = np.abs(dot.y) > 1.0
-        assert np.allclose((one.y / other.y)[moved], 1.1, rtol=1e-4)
-    assert np.nanmax(np.abs(dots[0].y)) > 5.0  # %: a finger bent by some 60 degrees
+        assert moved.sum() > 20
+        assert np.allclose(one.y[moved] / other.y[moved], 1.1, rtol=1e-4)
 
 
 def test_apparent_strain_is_kappa_times_strain_since_the_first_reading() -> None:
