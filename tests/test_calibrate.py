@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -246,8 +246,9 @@ class Linear(Objective):
         super().__init__(nothing, [], nothing, 1)
         self.A, self.y = A, y
 
-    def evaluate(self, model: Model, near: list[Trace] | None = None) -> Evaluation:
-        return Evaluation(model, [], [], self.y - self.A @ model.vector())
+    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+        z = self.y - self.A @ model.vector()
+        return Evaluation(model, {}, [], z) if z @ z <= most else None
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
         return -self.A[:, list(which)]

@@ -7,7 +7,7 @@ changed twin is solved from the equilibria and tangents of the unchanged one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,6 +29,7 @@ ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 BOUND = 1e-3  # of a parameter's range: closer to an end of it, it stands there
 STEPS = 12  # at most, of a fit
+TRUSTED = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
 UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
 
 
@@ -108,13 +109,27 @@ class Objective:
         self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
     ) -> tuple[dict[int, Trace], list[np.ndarray]]:
         way = Way(near or {}, keep, once, TOLERANCE if keep else ROUGH)
-        traces = simulated(twin, self.bench, self.trials, way)
+        traces = dict(simulated(twin, self.bench, self.trials, way))
         return traces, [readings(self.bench, report(twin.effects, traces[k].true)) for k in self.trials]
 
     def evaluate(self, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation:
-        traces, predicted = self.predict(model.twin, near, keep=True)
-        raw = [self.bench.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]
-        return Evaluation(model, traces, raw, self.white(raw))
+        found = self.within(np.inf, model, near)
+        assert found is not None
+        return found
+
+    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+        """The evaluation of a model whose |z|^2 is `most` at most, else None, without a look at the trials that are left then."""
+        at, traces, total = {k: i for i, k in enumerate(self.trials)}, {}, 0.0
+        raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
+        for k, trace in simulated(model.twin, self.bench, self.trials, Way(near or {}, keep=True)):
+            traces[k] = trace
+            if (i := at.get(k)) is not None:
+                raw[i] = self.bench.measured[k] - readings(self.bench, report(model.twin.effects, trace.true))
+                z[i] = self.whitener.trial(i, raw[i]).ravel()
+                total += float(z[i] @ z[i])
+                if total > most:
+                    return None
+        return Evaluation(model, traces, raw, np.concatenate(z))
 
     def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
@@ -241,8 +256,11 @@ def fit(
     prior = np.array([f.parameter.value for f in model.free]) / steps
     weight = prior_weight(model) ** 2
 
+    def believed(x: np.ndarray) -> float:
+        return float(weight @ (x - prior) ** 2)
+
     def cost(e: Evaluation) -> float:
-        return float(e.z @ e.z + weight @ (e.model.vector() - prior) ** 2)
+        return float(e.z @ e.z) + believed(e.model.vector())
 
     at = objective.evaluate(model, near.traces if near else None)
     fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
@@ -260,11 +278,13 @@ def fit(
         better = None
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
-            better = _improved(objective, at, x + d, now, cost)
-            damping = max(0.1 * damping, 1e-6) if better else 10.0 * damping
+            better = _improved(objective, at, x + d, now - believed(x + d))
+            damping *= 1.0 if better else 10.0
         if better is None:
             break
         fall, at, now = now - cost(better), better, cost(better)
+        if fall > TRUSTED * -(2.0 * g @ d + d @ H @ d):
+            damping = max(0.1 * damping, 1e-6)
         if fall < tolerance * now or now - left * fall > beat:
             break
     if refresh:
@@ -282,12 +302,10 @@ def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarra
     return lsq_linear(L.T, -np.linalg.solve(L, g), bounds=(low, low + room), method="bvls").x
 
 
-def _improved(
-    objective: Objective, at: Evaluation, x: np.ndarray, now: float, cost: Callable[[Evaluation], float]
-) -> Evaluation | None:
-    """The evaluation at x if it is better than `now`, else None; a model without equilibrium is not better."""
+def _improved(objective: Objective, at: Evaluation, x: np.ndarray, now: float) -> Evaluation | None:
+    """The evaluation at x if its |z|^2 is below `now`, else None; a model without equilibrium is not better."""
     try:
-        moved = objective.evaluate(at.model.at(x), at.traces)
+        moved = objective.within(now, at.model.at(x), at.traces)
     except SolveError:
         return None
-    return moved if cost(moved) < now else None
+    return moved if moved is not None and float(moved.z @ moved.z) < now else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -134,25 +134,26 @@ def simulate(
     Raises SolveError where a static equilibrium was not found, DataError for an effect that finds nothing to act on.
     """
     wanted = range(len(bench.inputs)) if trials is None else trials
-    found = simulated(twin, bench, wanted, way, dynamic)
+    found = dict(simulated(twin, bench, wanted, way, dynamic))
     return [found[k] for k in wanted]
 
 
-def simulated(twin: Twin, bench: Bench, wanted: Sequence[int], way: Way | None = None, dynamic: bool = False) -> dict[int, Trace]:
-    """As `simulate`, by trial; with creep all before the last wanted one, since the body remembers."""
+def simulated(
+    twin: Twin, bench: Bench, wanted: Sequence[int], way: Way | None = None, dynamic: bool = False
+) -> Iterator[tuple[int, Trace]]:  # fmt: skip
+    """As `simulate`, one trial after another; with creep all before the last wanted one, since the body remembers."""
     way, laws, body = way or Way(), twin.laws, twin.body()
     solver, creep = twin.robot.solver(body, dynamic=dynamic and set(bench.drives) <= body.stepped), laws.creep
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.n_slow))
-    traces, rested = {}, 0.0
+    rested = 0.0
     for k in run:
         inputs = bench.inputs[k]
         pause = max(0.0, float(inputs.clock[0]) - rested)
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
         close = way.near[k].path if k in way.near else None
-        traces[k] = _trial(twin, body, solver, inputs, delayed, close, way)
-    return traces
+        yield k, _trial(twin, body, solver, inputs, delayed, close, way)
 
 
 def alone(twin: Twin, inputs: Inputs) -> Trace:
