@@ -8,7 +8,8 @@ Both days are of one finger (one seed) of the independent finite element bench, 
 DAY stand for what is logged along the way, spread evenly over the 14 hours. Of SHAPE those with clouds are taken when the finger is
 new, those that are judged after the last cycle. Resistances are multiplied by 1 + drift t / 14 h; the largest drift of the four is
 8.3 %, all cords drift the same way. With --settling drift is not in proportion to time, as the catalogue's law has it: of 1 -
-exp(-t / 4 h), scaled to the same end. Then, as on the command line: diagnose DAY; align SHAPE with the twin found; estimate.
+exp(-t / 4 h), scaled to the same end. Then, as on the command line: diagnose DAY; align SHAPE with the twin found; estimate, which
+undoes what drift is left and a free trial tells (`twin/shape/drift.py`).
 """
 
 from __future__ import annotations
@@ -78,8 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     without, with_drift = drifted(shape, 0.0 * drift, late), drifted(shape, drift, late, args.settling)
     ways = {
         "without drift": (without, align(without, nominal).twin),
-        "drift, not corrected": (with_drift, align(with_drift, nominal).twin),
-        "drift, corrected": (with_drift, align(with_drift, found.twin).twin),
+        "drift, not diagnosed": (with_drift, align(with_drift, nominal).twin),
+        "drift, diagnosed": (with_drift, align(with_drift, found.twin).twin),
     }
     for name in args.estimators.split(","):
         base = None
