@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 WIDTH, LAYERS = 192, 3
 ALONE = [256, 256]  # widths of the network of `free.py`
 RARE = 0.999  # of held-out factory fingers are nearer
+FURTHER = 1.4  # times as far lie free motions of seven days of another simulator at most, on which this was chosen
 LEAST, MOST = -8.0, 3.0  # of log std z over the spread of z
 REST = 1e-4  # m, what the modes leave out
 
@@ -64,7 +65,7 @@ class Modal(Learned):
         return "twin-modal/4"
 
     def estimate(self, felt: Felt) -> Shapes:
-        pressed = self.unexplained(felt) > self.arrays["free_far"]
+        pressed = self.unexplained(felt) > FURTHER * self.arrays["free_far"]
         shapes = super().estimate(replace(felt, pushed=felt.pushed or bool(pressed.all())))
         if felt.pushed:
             return replace(shapes, pressed=pressed)
