@@ -63,7 +63,7 @@ def score(truth: Path, arrays: dict[str, np.ndarray], seconds: float) -> Score:
     frames = sum(len(v) for k, v in arrays.items() if k.endswith("_time"))
     shares, apart = ({name: float(part.mean()) for name, part in parts.items()} for parts in (inside, flagged))
     held, out, off = (np.concatenate(list(parts.values())) for parts in (inside, flagged, each))
-    kept, worst = float(held[~out].mean()), float(off[~out].max(initial=0.0))
+    kept, worst = float(held[~out].mean()) if not out.all() else 1.0, float(off[~out].max(initial=0.0))
     return Score(error, shares, apart, float(held.mean()), float(out.mean()), kept, worst, 1e3 * seconds / frames)
 
 
