@@ -19,6 +19,7 @@ from twin.robots import load
 from twin.shape.align import Aligned, align
 from twin.shape.align_report import bands_of, write_alignment
 from twin.shape.constant_curvature import ConstantCurvature
+from twin.shape.drift import steadied
 from twin.shape.estimator import Z90, Estimator, Felt, estimator, estimators
 from twin.shape.modal import Modal
 from twin.shape.modes import Habit
@@ -65,10 +66,10 @@ def only(day: Recording, *trials: str) -> Recording:
 
 
 def test_alignment_finds_the_built_finger(aligned: Aligned) -> None:
-    """Bars: 0.5 deg moves a tip bent by 30 mm by 0.26 mm; 5 % of kappa is a twentieth of a bend, some 0.5 mm of 10."""
+    """Bars: 0.2 deg moves a tip bent by 30 mm by 0.1 mm; 5 % of kappa is a twentieth of a bend, some 0.5 mm of 10."""
     true = json.loads((DATA / "finger_shape_truth.json").read_text())["finger"]
     found = {n: f.value for n, f in aligned.fitted.items()}
-    assert np.rad2deg(found["mounting.angle"]) == pytest.approx(true["phi_deg"], abs=0.5)
+    assert np.rad2deg(found["mounting.angle"]) == pytest.approx(true["phi_deg"], abs=0.2)
     for i in range(4):
         assert found[f"sensors.resistance_{i + 1}"] == pytest.approx(true["R0_ohm"][i], rel=2e-3)
         assert found[f"sensors.stretch_{i + 1}"] == pytest.approx(true["kappa_stretch"][i], rel=0.05)
@@ -157,16 +158,97 @@ def test_the_band_holds_what_it_says(name: str, shapes: Callable[[str], dict[str
 
 
 def test_a_push_that_nobody_declared_is_flagged(day: Recording, aligned: Aligned) -> None:
-    """A hand in a trial that is said to be free: wherever that puts the points off by more than a millimetre, the strains say so;
-    in free motion nothing is flagged."""
-    silent = replace(day, trials=tuple(replace(t, other={}) for t in only(day, "test_1", "test_2").trials))
-    arrays, _ = predict(silent, Physics(aligned.twin))
+    """A hand in a trial that is said to be free: wherever it moves the points by more than a millimetre (all tendons are paid out),
+    the strains say so, and the shape is sought as if it had been declared; in free motion nothing is flagged."""
+    arrays, _ = predict(silent(day), Modal(aligned.twin), aligned.bands)
     assert not arrays["test_1_outside"].any()
     true = np.load(DATA / "finger_shape_truth.npz")
     at = np.abs(arrays["test_2_time"][None] - true["test_2_time"][:, None]).argmin(axis=1)
-    off = errors(arrays, "test_2")[0].mean(axis=1) > 1e-3
-    assert off.sum() > 10
-    assert arrays["test_2_outside"][at][off].all()
+    moved = np.linalg.norm(true["test_2_vertices"] - true["test_2_vertices"][0], axis=2).mean(axis=1) * float(true["unit_mm"]) > 1.0
+    assert moved.sum() > 10
+    assert arrays["test_2_outside"][at][moved].all()
+    away, std = errors(arrays, "test_2")
+    assert away.mean() < BARS["modal"]
+    assert (away < Z90 * std).mean() > 0.8
+
+
+def test_physics_knows_a_push_that_nobody_declared(day: Recording, aligned: Aligned) -> None:
+    """In frames of a free trial and of a pushed one, taken for free; the latter's shapes are those of a declared push."""
+    law, (free, hand) = Physics(aligned.twin), sense(only(day, "test_1", "test_2"), aligned.twin)[0]
+    for trial, presses in ((free, False), (hand, True)):
+        some = slice(60, 63)
+        felt = Felt(trial.strain(law.body.cords)[some], trial.displacement[some], pushed=False)
+        shapes = law.estimate(felt)
+        assert (shapes.outside == presses).all()
+        assert shapes.pressed is not None
+        assert (shapes.pressed == presses).all()
+        if presses:
+            declared = law.estimate(replace(felt, pushed=True))
+            assert np.abs(shapes.moved - declared.moved).max() < 5e-5  # found from other starts
+
+
+def silent(day: Recording) -> Recording:
+    return replace(day, trials=tuple(replace(t, other={}) for t in only(day, "test_1", "test_2").trials))
+
+
+def test_what_pushed_in_no_alignment_is_outside(day: Recording, aligned: Aligned) -> None:
+    """The same push under another name: marked where the finger is pressed, and only there."""
+    trial, law = only(day, "test_2").trials[0], Modal(aligned.twin)
+    strange = replace(day, trials=(replace(trial, other={"external_contact": "two edges"}),))
+    known, other = (predict(r, law, aligned.bands)[0]["test_2_outside"] for r in (only(day, "test_2"), strange))
+    assert not known.any()
+    assert other.mean() > 0.5
+    assert not other[0]  # it begins at rest
+
+
+def test_the_free_strains_are_those_of_the_twin(aligned: Aligned) -> None:
+    """Of a pull, of two antagonists against each other, and of nothing but slack tendons: the network against the twin's own
+    equilibria, to 1.5e-3, three times what a strain is wrong by anyhow."""
+    asked = 1e-3 * np.array([[8.0, -9.0, -9.0, -9.0], [3.0, -6.0, 0.0, -6.0], [-9.0, -15.0, -6.0, -15.0]])
+    walk = Physics(aligned.twin)
+    shapes = walk.estimate(Felt(np.full((3, 4), np.nan), asked, pushed=False)).moved
+    nodes = np.linalg.lstsq(walk.weights, shapes.transpose(1, 0, 2).reshape(len(walk.points.rest), -1), rcond=None)[0]
+    strains = walk.statics.sensed(nodes.reshape(-1, 3, 3).transpose(1, 0, 2))["strain"]
+    assert np.abs(Modal(aligned.twin).net.free(asked) - strains).max() < 1.5e-3
+
+
+# ---- drift --------------------------------------------------------------------------------------------------------------------
+
+
+def drifted(day: Recording, by: dict[str, float]) -> Recording:
+    names = [f"sensor_{i}_resistance" for i in (1, 2)]
+    return day.with_values([{n: t.values[n] * by[t.label] for n in names} for t in day.trials], day.source)
+
+
+def test_drift_of_any_kind_is_told_by_free_motion_and_undone(day: Recording, aligned: Aligned) -> None:
+    """Two sensors read 8 % more in both tests, the first of which is free: the error under the hand rises by 0.06 mm at most, the
+    bar of issue 16, where without the free trial it rises by more than ten times that."""
+    law, tests = Modal(aligned.twin), only(day, "test_1", "test_2")
+
+    def error(recording: Recording) -> float:
+        return float(errors(predict(recording, law)[0], "test_2")[0].mean())
+
+    lying, good = drifted(tests, {"test_1": 1.08, "test_2": 1.08}), error(tests)
+    assert abs(error(lying) - good) < 0.06e-3
+    assert error(only(lying, "test_2")) - good > 0.6e-3
+    assert "drift, undone" in predict(lying, law)[1][-1]
+
+
+def test_between_free_trials_drift_goes_by_the_clock(day: Recording, aligned: Aligned) -> None:
+    free, hand = (sense(only(day, name), aligned.twin)[0][0] for name in ("test_1", "test_2"))
+    late = replace(free, resistance=1.08 * free.resistance)
+    found, said = steadied([free, hand, late], [0.0, 900.0, 1000.0], aligned.twin)
+    by = [np.median(b.resistance / a.resistance) for a, b in zip((free, hand, late), found, strict=True)]
+    assert np.log(by) == pytest.approx([0.0, -0.9 * np.log(1.08), -np.log(1.08)], abs=4e-3)  # g itself is good to 2e-3
+    assert len(said) == 1
+
+
+def test_a_push_that_nobody_declared_is_no_drift(day: Recording, aligned: Aligned) -> None:
+    """Nor is what sensors that do not drift are off by anyhow."""
+    sensed = sense(silent(day), aligned.twin)[0]
+    found, said = steadied(sensed, [0.0, 100.0], aligned.twin)
+    assert not said
+    assert all(a is b for a, b in zip(sensed, found, strict=True))
 
 
 def test_the_band_is_wider_the_harder_the_push(aligned: Aligned) -> None:
@@ -177,7 +259,8 @@ def test_the_band_is_wider_the_harder_the_push(aligned: Aligned) -> None:
 
 
 def test_knowing_that_nothing_presses_narrows_the_band(aligned: Aligned) -> None:
-    strain, taut = np.array([[0.03, -0.02, -0.03, 0.02]]), np.array([[-6e-3, -6e-3, 6e-3, 6e-3]])
+    taut = np.array([[-6e-3, -6e-3, 6e-3, 6e-3]])
+    strain = Modal(aligned.twin).net.free(taut)  # which tendons alone make: nothing is felt pressing
     for law in (Physics(aligned.twin), Modal(aligned.twin)):
         pushed, free = (law.estimate(Felt(strain, taut, p)).std.mean() for p in (True, False))
         assert free < pushed

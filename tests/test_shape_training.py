@@ -41,7 +41,8 @@ def shapes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     nodes += 2e-4 * rng.normal(size=(n, 1, 3)) * up[:, None]
     kind = np.array(["free", "pushed", "both"])[np.arange(n) // LENGTH % 3]
     table = pa.table({"sample": np.arange(n), "converged": np.ones(n, bool), "kind": kind})
-    lists = {"nodes": nodes.astype(np.float32), "strain": SoftStatics(body).sensed(nodes)["strain"], "command": np.zeros((n, 4))}
+    lists = {"nodes": nodes.astype(np.float32), "strain": SoftStatics(body).sensed(nodes)["strain"]}
+    lists |= {"command": np.zeros((n, 4)), "tension": np.zeros((n, 4))}
     for name, values in lists.items():
         flat = values.reshape(n, -1)
         table = table.append_column(name, pa.FixedSizeListArray.from_arrays(pa.array(flat.ravel()), flat.shape[1]))

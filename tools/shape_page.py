@@ -191,7 +191,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m tools.shape_page", description=__doc__)
     parser.add_argument("days", type=Path, nargs="+")
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--estimators", default=",".join(sorted(estimators(), key=lambda n: n != "physics")))
+    parser.add_argument("--estimators", default=",".join(sorted(estimators(), key=lambda n: n != "modal")))
     args = parser.parse_args(arguments)
     names, days = args.estimators.split(","), [Day.of(folder) for folder in args.days]
     frames = {name: [Frames.of(day, name) for day in days] for name in names}

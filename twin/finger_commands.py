@@ -105,7 +105,7 @@ class Shape:
     set: Positional[Annotated[Path, arg(help="folder of a measurement set")]]
     twin: Annotated[str, arg(help="an aligned twin: its folder or twin.toml, or a robot's name")]
     out: Annotated[Path, arg(help="the npz file to write")]
-    estimator: Annotated[str, arg(help="which estimator; a wrong name lists those there are")] = "physics"
+    estimator: Annotated[str, arg(help="which estimator; a wrong name lists those there are")] = "modal"
 
     def run(self) -> None:
         from twin.shape.align_report import bands_of

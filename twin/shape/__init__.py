@@ -10,6 +10,7 @@ folding.py     KineSoft's decoder, a baseline                          training.
 deepsoro.py    a decoder trained by chamfer distance, a baseline                     differs between them, judge.py their bands
 constant_curvature.py  an arc, a baseline
 
+free.py        strains that tendons alone make                         drift.py      what sensors drifted by, from free motion
 sensing.py     a trial to strains and displacements                    align.py      R0, kappa and mounting angle from clouds
 band.py        how wide a band is to be, from clouds
 predict.py     a recording's shapes as a file                          cloud_fit.py, sensor_fit.py, skin.py  what it is made of

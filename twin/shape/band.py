@@ -14,7 +14,7 @@ a stranger, which may hold the finger as no hand of the factory's does; its band
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,9 +34,11 @@ class Bands:
     hands: tuple[str, ...] = ()
 
     def of(self, law: Estimator, contact: str) -> float:
-        if not self.hands:
-            return 1.0
-        return self.by.get(law.name(), 1.0) if contact in self.hands else STRANGER
+        return STRANGER if self.strange(contact) else self.by.get(law.name(), 1.0)
+
+    def strange(self, contact: str | None) -> bool:
+        """Whether this pushed in no alignment; never where nothing did. None: a push that nobody named."""
+        return bool(self.hands) and contact not in self.hands
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,11 @@ def _needed(law: Estimator, trial: Behind) -> np.ndarray:
     return np.sqrt(np.maximum(apart**2 - trial.std**2 - own**2, 0.0)) / spread
 
 
-def widened(shapes: Shapes, by: float) -> Shapes:
-    """With the spread beyond the twin's own error widened."""
+def widened(shapes: Shapes, by: float | np.ndarray) -> Shapes:
+    """With the spread beyond the twin's own error widened, by the same everywhere or (n,)."""
     spread, own = _parts(shapes)
-    return Shapes(shapes.moved, np.hypot(by * spread, own), shapes.outside)
+    by = np.reshape(by, (-1, 1))
+    return replace(shapes, std=np.hypot(by * spread, own))
 
 
 def _parts(shapes: Shapes) -> tuple[np.ndarray, np.ndarray]:

@@ -16,10 +16,10 @@ import numpy as np
 
 from twin.shape.estimator import Felt
 from twin.shape.features import features
-from twin.shape.folding import MOVE, PLACE, relu
+from twin.shape.folding import MOVE, PLACE
 from twin.shape.learned import Pointwise
 from twin.shape.lesson import Data, Lesson, layers_of, torch_perceptron
-from twin.shape.weights import pack, perceptron, unpack
+from twin.shape.weights import pack, perceptron, relu, unpack
 
 if TYPE_CHECKING:
     import torch

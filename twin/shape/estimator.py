@@ -40,11 +40,13 @@ class Felt:
 @dataclass(frozen=True)
 class Shapes:
     """Displacements (n, P, 3) m of the named points in the finger's own frame; `std` (n, P) m, of
-    which 1.645 hold the point with a probability of 90 %; `outside` (n,): what was felt is unlike all that the estimator knows."""
+    which 1.645 hold the point with a probability of 90 %; `outside` (n,): what was felt is unlike all that the estimator knows;
+    `pressed` (n,): tendons alone do not make it (None: not told)."""
 
     moved: np.ndarray
     std: np.ndarray
     outside: np.ndarray
+    pressed: np.ndarray | None = None
 
 
 def own_error(moved: np.ndarray) -> np.ndarray:

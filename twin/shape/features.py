@@ -12,5 +12,10 @@ SLACK = -12e-3  # m: a tendon paid out further holds nothing
 def features(strain: np.ndarray, displacement: np.ndarray, pushed: np.ndarray | bool) -> np.ndarray:
     """(n, 2 s + t + 1) of strains (n, s), NaN where missing, displacements (n, t) m and `pushed` (n,)."""
     there, pressed = np.isfinite(strain), np.broadcast_to(pushed, len(strain))[:, None]
-    parts = [np.where(there, strain, 0.0) / STRAIN, there, np.maximum(displacement, SLACK) / LENGTH, pressed]
+    parts = [np.where(there, strain, 0.0) / STRAIN, there, lengths(displacement), pressed]
     return np.concatenate(parts, axis=1, dtype=np.float64)
+
+
+def lengths(displacement: np.ndarray) -> np.ndarray:
+    """(n, t) of displacements (n, t) m."""
+    return np.maximum(displacement, SLACK) / LENGTH

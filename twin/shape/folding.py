@@ -5,7 +5,8 @@
 Two folds (Yang et al. 2018, arXiv 1712.07262), the grid in place of which the finger's own points are folded; trained by the mean
 squared displacement error, correspondence known (Yoo et al. 2025, arXiv 2503.01078; layer sizes are not published, these are ours).
 The paper feeds a history of strains. This one remembers nothing: the factory's shapes are equilibria of an elastic body, each
-following from what acts on it now, and its chains have no clock; hysteresis and drift of sensors are undone before.
+following from what acts on it now, and its chains have no clock; hysteresis and drift of sensors are undone before, which left
+0.03 mm (`modal`, bench day 515, a lag of 27 % over 4.5 s) for a history to gain.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from twin.shape.estimator import Felt
 from twin.shape.features import features
 from twin.shape.learned import Pointwise
 from twin.shape.lesson import Data, Lesson, layers_of, torch_perceptron
-from twin.shape.weights import pack, perceptron, unpack
+from twin.shape.weights import pack, perceptron, relu, unpack
 
 if TYPE_CHECKING:
     import torch
@@ -43,10 +44,6 @@ class Folding(Pointwise):
     @classmethod
     def lesson(cls, data: Data) -> Lesson:
         return FoldingLesson(data)
-
-
-def relu(x: np.ndarray) -> np.ndarray:
-    return np.maximum(x, 0.0)
 
 
 def _fold(c: np.ndarray, places: np.ndarray, layers: Any) -> np.ndarray:

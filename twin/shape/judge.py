@@ -43,6 +43,7 @@ def judged(law: type[Learned], arrays: dict[str, Any], data: Data, robot: Robot)
     for row, rows in enumerate((data.pushed[held], ~data.pushed[held])):
         if rows.any():
             arrays["levels"][row], arrays["widen"][row] = _widened(ratio[rows], tried.level[rows])
+            arrays |= _levels(law, arrays, data, robot, held[rows])
             inside[rows] = ratio[rows] < Z90 * at_level(tried.level[rows], arrays["levels"][row], arrays["widen"][row])
     each, kind, moved = 1e3 * away.mean(axis=1), data.kind[held], 1e3 * size.mean(axis=1)
     by_size = {f"{a:g}-{b:g}": (moved >= a) & (moved < b) for a, b in pairwise(SIZES)}
@@ -79,7 +80,7 @@ class Tried:
 def _tried(law: type[Learned], arrays: dict[str, Any], data: Data, robot: Robot, held: np.ndarray) -> Tried:
     """Of held-out samples, disturbed as in training."""
     strain, displacement = disturbed(np.random.default_rng(1), data, held, dead=0.0)
-    decode = law(Twin.of(robot), {n: a.astype(float) if a.dtype == np.float32 else a for n, a in arrays.items()}).decode
+    decode = law(Twin.of(robot), _double(arrays)).decode
     away, std, size = (np.empty((len(held), len(data.weights))) for _ in range(3))
     levels = np.empty(len(held))
     for pushed in (True, False):
@@ -91,6 +92,17 @@ def _tried(law: type[Learned], arrays: dict[str, Any], data: Data, robot: Robot,
             size[part] = np.linalg.norm(true, axis=2)
             levels[part] = level(moved)
     return Tried(away, std, size, levels)
+
+
+def _levels(law: type[Learned], arrays: dict[str, Any], data: Data, robot: Robot, rows: np.ndarray) -> dict[str, Any]:
+    """Of held-out samples, all of which are pushed or none, disturbed anew."""
+    strain, displacement = disturbed(np.random.default_rng(2), data, rows, dead=0.0)
+    felt = Felt(strain, displacement, bool(data.pushed[rows[0]]))
+    return {name: np.array(value) for name, value in law(Twin.of(robot), _double(arrays)).levels(felt).items()}
+
+
+def _double(arrays: dict[str, Any]) -> dict[str, Any]:
+    return {n: a.astype(float) if a.dtype == np.float32 else a for n, a in arrays.items()}
 
 
 def _widened(ratio: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -63,6 +63,10 @@ class Learned(Estimator):
     def decode(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
         """Displacements (n, P, 3) m of the points and how widely (n, P) m they are spread, before it is widened."""
 
+    def levels(self, felt: Felt) -> dict[str, float]:
+        """More that it wants to know of held-out samples, by names in its weights' file."""
+        return {}
+
     def estimate(self, felt: Felt) -> Shapes:
         moved, spread = self.decode(felt)
         row = 0 if felt.pushed else 1

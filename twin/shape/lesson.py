@@ -18,11 +18,13 @@ import numpy as np
 from twin.errors import DataError
 from twin.factory import Points, named_points, shard
 from twin.factory.draw import LENGTH as CHAIN
+from twin.factory.solve import hang, weight_of
 from twin.robots import Robot
 from twin.shape.features import features
 from twin.shape.skin import Skin
 from twin.shape.weights import Layers
-from twin.soft import SoftBody
+from twin.soft import SoftBody, SoftStatics
+from twin.soft.solid import Solid
 
 if TYPE_CHECKING:
     import torch
@@ -37,16 +39,19 @@ DOUBT = 0.3  # of the free motions are shown as if something might press
 @dataclass(frozen=True)
 class Data:
     """Converged samples: strain (n, s), displacement (n, t) m, free nodes' displacements (n, 3 n_free) m, whether a hand is on the
-    finger (n,), which are held out (n,); and of the finger its points, their weights (P, n_free) and its skin."""
+    finger (n,), which are held out (n,); and of the finger its points, their weights (P, n_free), its skin, and the strains (s,) of
+    its hanging rest. tension (n, t) N of the tendons."""
 
     strain: np.ndarray
     displacement: np.ndarray
+    tension: np.ndarray
     nodes: np.ndarray
     kind: np.ndarray
     held: np.ndarray
     points: Points
     weights: np.ndarray
     skin: Skin
+    hanging: np.ndarray
 
     @property
     def pushed(self) -> np.ndarray:
@@ -60,7 +65,7 @@ def load(folder: Path, robot: Robot) -> Data:
         raise DataError(f"robot {robot.name!r} is no soft body; shape is learned of fingers")
     points = named_points(robot)
     weights = body.lattice.weights(points.rest)
-    d = shard.read(folder, ["sample", "converged", "nodes", "strain", "command", "kind"])
+    d = shard.read(folder, ["sample", "converged", "nodes", "strain", "command", "tension", "kind"])
     if d["nodes"].shape[1] != 3 * weights.shape[1]:
         raise DataError(f"{folder}: shapes of another body than robot {robot.name!r}; make them with twin generate")
     good = d["converged"].astype(bool)
@@ -68,7 +73,16 @@ def load(folder: Path, robot: Robot) -> Data:
     if not held.any():
         raise DataError(f"{folder}: fewer than {HELD_OUT} fingers of {CHAIN} samples; none can be held out, ask for more samples")
     nodes, kind = d["nodes"][good].astype(np.float32), d["kind"][good].astype(str)
-    return Data(d["strain"][good], d["command"][good], nodes, kind, held, points, weights, Skin.of(body))
+    felt = d["strain"][good], d["command"][good], d["tension"][good]
+    return Data(*felt, nodes, kind, held, points, weights, Skin.of(body), _hanging(robot, body))
+
+
+def _hanging(robot: Robot, body: SoftBody) -> np.ndarray:
+    statics = SoftStatics(body)
+    solid = Solid(statics.parts)
+    shape = solid.rest()
+    hang(solid, shape, weight_of(body, robot.gravity))
+    return statics.sensed(shape.u[None])["strain"][0]
 
 
 def disturbed(rng: np.random.Generator, data: Data, pick: np.ndarray, dead: float = DEAD) -> tuple[np.ndarray, np.ndarray]:

@@ -3,8 +3,8 @@
     max over a   -|a|^2 - |(eps(u(a)) - eps_felt) / sigma|^2,       push on the nodes f = B a,  a ~ N(0, 1)
 
 B is the root of the covariance of the factory's hands, so that a is a Gaussian process of smooth loads on the skin; u(a) is the
-equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before. Without a push u is what the
-tendons make of it.
+equilibrium with tendons that hold or are slack. Gauss-Newton steps, each sample from the one before. Where nothing is said to push
+u is what the tendons make of it, unless the strains say otherwise: such a frame is marked, and solved for its push.
 
 How wide the error bar is: hands press gently or hard, so that for it a ~ N(0, s^2), and which strength s the strains speak for that
 tendons alone leave, delta = eps_felt - eps + J a, is weighed by Bayes. With J / sigma = U diag(d) V' and y = U' delta / sigma,
@@ -24,13 +24,13 @@ import numpy as np
 from twin.factory.draw import PUSHES, draw_pushes
 from twin.factory.solve import Surface, hang, march, surface, weight_of
 from twin.shape.estimator import Estimator, Felt, Shapes, own_error
+from twin.shape.free import far, wrong_by
 from twin.soft import Cone, SoftStatics
 from twin.soft.solid import Solid
 from twin.soft.statics import single_thread
 from twin.twin import Twin
 
 HANDS, RANK = 4000, 60  # hands drawn for the prior, components kept: the others push with less than 1 % of it
-STRAIN, GAIN = 5e-4, 0.01  # what a felt strain is wrong by, the twin's own error with it: so much, and this share of it
 ROUNDS = 4
 SETTLED = 0.02  # of a step in a
 LONGEST = 4.0  # of a step in a
@@ -39,6 +39,9 @@ STRENGTH, FALL = 1.3, 10.0  # of the factory's hands: the likeliest for 140 of i
 S = np.geomspace(0.02, 8.0, 40)
 PRIOR = np.where(S < STRENGTH, S, S * (STRENGTH / S) ** FALL)  # on this grid, whose cells are as wide as s
 BAND = 0.92  # so that 1.645 std holds 90 % of the points of held-out factory fingers: python -m tools.shape_band
+
+
+Sample = tuple[np.ndarray, np.ndarray, bool, bool]  # displacements (P, 3) m, std (P,) m, whether outside, whether pressed
 
 
 class Physics(Estimator):
@@ -56,12 +59,13 @@ class Physics(Estimator):
 
     def estimate(self, felt: Felt) -> Shapes:
         n, p = len(felt), len(self.points.rest)
-        moved, std, outside = np.empty((n, p, 3)), np.empty((n, p)), np.zeros(n, bool)
+        moved, std, (outside, pressed) = np.empty((n, p, 3)), np.empty((n, p)), np.zeros((2, n), bool)
         with single_thread():
             walk = _Walk(self)
             for i in range(n):
-                moved[i], std[i], outside[i] = (walk.pushed if felt.pushed else walk.free)(felt.displacement[i], felt.strain[i])
-        return Shapes(moved, std, outside)
+                step = walk.pushed if felt.pushed else walk.free
+                moved[i], std[i], outside[i], pressed[i] = step(felt.displacement[i], felt.strain[i])
+        return Shapes(moved, std, outside, pressed)
 
 
 @lru_cache(maxsize=4)
@@ -72,10 +76,6 @@ def _prior(cone: Cone, cells: int) -> np.ndarray:
     forces = np.stack([skin.force(draw_pushes(rng, cone, PUSHES)).ravel() for _ in range(HANDS)])
     values, vectors = np.linalg.eigh(forces.T @ forces / HANDS)
     return vectors[:, -RANK:] * np.sqrt(np.maximum(values[-RANK:], 0.0))
-
-
-def _noise(strain: np.ndarray) -> np.ndarray:
-    return np.hypot(STRAIN, GAIN * strain)
 
 
 def _left_open(G: np.ndarray, J: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -99,21 +99,22 @@ class _Walk:
         self.hanging = hang(self.solid, self.shape, owner.weight)
         self.at, self.burden, self.a = np.zeros(len(self.hanging)), owner.weight, np.zeros(RANK)
 
-    def free(self, displacement: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Displacements (P, 3), std (P,) and whether this is outside, of the next sample, if nothing pushes; strains that tendons
-        alone do not make say that something does."""
+    def free(self, displacement: np.ndarray, strain: np.ndarray) -> Sample:
+        """The next sample, if nothing pushes; strains that tendons alone do not make say that something does."""
         found = self._march(displacement, np.zeros(RANK))
-        moved, there = self.owner.weights @ self.shape.u, np.isfinite(strain)
-        away = np.abs(self._strain()[0] - strain)[there] / _noise(strain[there])
-        return moved, own_error(moved), not found or bool((away > OUTSIDE).any())
+        if np.isfinite(strain).any() and far(self._strain()[0][None], strain[None])[0] > OUTSIDE:
+            moved, std, *_ = self.pushed(displacement, strain)
+            return moved, std, True, True
+        moved = self.owner.weights @ self.shape.u
+        return moved, own_error(moved), not found, False
 
-    def pushed(self, displacement: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    def pushed(self, displacement: np.ndarray, strain: np.ndarray) -> Sample:
         """The same, if something may push."""
         there = np.isfinite(strain)
         if not there.any():
             return self.free(displacement, strain)
         felt, wrong, step = strain[there], np.zeros(there.sum()), np.zeros(RANK)
-        noise, response, found = _noise(felt), np.zeros((self.shape.u.size, RANK)), True
+        noise, response, found = wrong_by(felt), np.zeros((self.shape.u.size, RANK)), True
         J = np.zeros((len(felt), RANK))
         for _ in range(ROUNDS):
             if not self._march(displacement, self.a):
@@ -133,8 +134,8 @@ class _Walk:
         G = np.einsum("pn,nck->pck", self.owner.weights, response.reshape(-1, 3, RANK))
         by_push = wrong + J @ (self.a - step)  # J and what is wrong are those before the step
         variance = BAND**2 * _left_open(G, J / noise[:, None], by_push / noise) + own_error(moved) ** 2
-        far = not found or np.linalg.norm(self.a) > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
-        return moved, np.sqrt(variance), bool(far)
+        outside = not found or np.linalg.norm(self.a) > OUTSIDE or np.abs(wrong / noise).max() > OUTSIDE
+        return moved, np.sqrt(variance), bool(outside), bool(np.abs(by_push / noise).max() > OUTSIDE)
 
     def _again(self, displacement: np.ndarray) -> np.ndarray:
         """Back to rest and to the tendons alone, where a push led nowhere; the response there."""

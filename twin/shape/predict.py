@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from twin.errors import DataError
 from twin.measurements import Recording
-from twin.shape.band import Bands, widened
+from twin.shape.band import STRANGER, Bands, widened
+from twin.shape.drift import steadied
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.shape.sensing import Sensed, sense
 from twin.shape.skin import Skin
@@ -21,13 +23,13 @@ def predict(recording: Recording, estimator: Estimator, bands: Bands = PLAIN) ->
     """NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3) m of each trial,
     and what a reader should know. `bands`: how wide they are to be where something may press."""
     sensed, notices = sense(recording, estimator.twin)
+    sensed, drift = steadied(sensed, [t.start for t in recording.trials], estimator.twin)
     arrays, skin = {}, SkinOf(estimator)
     for trial in sensed:
         label = next(t.label for t in recording.trials if t.name == trial.name)
         with single_thread():
             shapes = estimator.estimate(felt(trial, estimator))
-        if trial.contact is not None:
-            shapes = widened(shapes, bands.of(estimator, trial.contact))
+        shapes = judged(shapes, trial.contact, estimator, bands)
         turn = turned(estimator.body.turn).T
         arrays |= {
             f"{label}_time": trial.time,
@@ -36,7 +38,15 @@ def predict(recording: Recording, estimator: Estimator, bands: Bands = PLAIN) ->
             f"{label}_outside": shapes.outside,
             f"{label}_cloud": skin(shapes) @ turn,
         }
-    return arrays, notices
+    return arrays, (*notices, *drift)
+
+
+def judged(shapes: Shapes, contact: str | None, law: Estimator, bands: Bands) -> Shapes:
+    """With the band that goes with what pushes; a frame where something presses that pushed in no alignment is outside."""
+    if contact is None:  # frames marked as outside are those where strains say that something presses
+        return widened(shapes, np.where(shapes.outside & bands.strange(None), STRANGER, 1.0))
+    strange = bands.strange(contact) & (True if shapes.pressed is None else shapes.pressed)
+    return replace(widened(shapes, bands.of(law, contact)), outside=shapes.outside | strange)
 
 
 def felt(trial: Sensed, estimator: Estimator) -> Felt:

@@ -54,6 +54,10 @@ def silu(x: np.ndarray) -> np.ndarray:
     return x / (1.0 + np.exp(-x))
 
 
+def relu(x: np.ndarray) -> np.ndarray:
+    return np.maximum(x, 0.0)
+
+
 def perceptron(x: np.ndarray, layers: Layers, bend: Callable[[np.ndarray], np.ndarray] = silu) -> np.ndarray:
     """(..., out) of x (..., in): linear layers with `bend` between them."""
     for weight, bias in layers[:-1]:

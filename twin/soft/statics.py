@@ -92,11 +92,17 @@ class SoftStatics:
 
     def sensed(self, u: np.ndarray) -> dict[str, np.ndarray]:
         """What the cords feel of nodes' displacements u (n, n_free, 3) m, by group as in `SoftPath.others`."""
-        shape = (len(u), *self.body.cord_paths.shape)
-        moved = self.body.cord_paths + (self._cords @ u).reshape(shape)
-        strain = np.linalg.norm(np.diff(moved, axis=2), axis=3).sum(axis=2) / self._cord_rest - 1.0
+        strain = self.strain(self.cords(u))
         rest = np.broadcast_to(self.body.cords.rest, strain.shape)
         return {"strain": strain, "sensor": resistance(strain, self.body.cords), "sensor_rest": rest}
+
+    def cords(self, u: np.ndarray) -> np.ndarray:
+        """Paths (n, s, p, 3) m of the cords in the finger's own frame at nodes' displacements u (n, n_free, 3) m."""
+        return self.body.cord_paths + (self._cords @ u).reshape(len(u), *self.body.cord_paths.shape)
+
+    def strain(self, cords: np.ndarray) -> np.ndarray:
+        """(n, s) of paths (n, s, p, 3) m."""
+        return np.linalg.norm(np.diff(cords, axis=2), axis=3).sum(axis=2) / self._cord_rest - 1.0
 
     def strain_slope(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Strains (s,) of the cords at nodes' displacements u (n_free, 3) m, and their derivatives (s, 3 n_free) 1/m."""
