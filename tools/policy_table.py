@@ -3,7 +3,7 @@
     python -m tools.policy_table --out results/ [--seeds 5] [--jobs 1] [--table-only]
 
 Days of four effects that nobody declared (tools/policy/days.py) are made, calibrated and diagnosed; a policy is trained on each
-twin by `tools.examples.reach_policy`, with and without a tip camera, and tried on 100 goals of the robot of its day: the
+twin by `tools.examples.reach_policy`, with and without a tip camera, and tried on 50 goals of the robot of its day: the
 independent bench's (tools/policy/bench_reach.py). Inverse kinematics on the same twins stands beside it. A goal counts as reached
 where the true tip is within 5 mm of it at the end of an episode of 4 s. One file a cell: an interrupted run goes on.
 """

@@ -12,16 +12,16 @@ import argparse
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
-import torch
-from stable_baselines3 import SAC
-from stable_baselines3.common.callbacks import BaseCallback, EveryNTimesteps
 
-import twin.env  # noqa: F401  registers the environments
 from twin.env.continuum import ContinuumReach
+from twin.errors import TwinError
+
+if TYPE_CHECKING:
+    from stable_baselines3 import SAC
 
 MOVES, STEPS = 20, 4000
 TASK: dict[str, Any] = {"interval": 0.2, "dynamic": False, "tension_noise": 0.01, "tip_noise": 2.5e-4}
@@ -59,7 +59,13 @@ def task(source: str | Path, blind: bool, randomise: bool = False) -> gymnasium.
 
 
 def train(env: gymnasium.Env, seed: int, steps: int = STEPS, look: Callable[[int, Act], None] = lambda step, act: None) -> SAC:
-    """A policy for `env`; `look` is shown it every ON_THE_WAY steps."""
+    """A policy for `env`; `look` is shown it every ON_THE_WAY steps. Raises TwinError without Stable-Baselines3."""
+    try:
+        import torch
+        from stable_baselines3 import SAC
+        from stable_baselines3.common.callbacks import BaseCallback, EveryNTimesteps
+    except ModuleNotFoundError as fault:
+        raise TwinError(f"training needs {fault.name}: pip install '.[policy]'") from None
     torch.set_num_threads(1)
     model = SAC(
         "MlpPolicy", env, policy_kwargs={"net_arch": [64, 64]}, learning_rate=lambda left: 3e-3 * max(left, 0.02),
@@ -98,7 +104,7 @@ def distances(env: gymnasium.Env, act: Act, episodes: int, begin: Callable[[], N
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("twin", help="a twin.toml, a report's folder or a robot's name")
-    asked.add_argument("out", type=Path, help="the policy's weights, a zip of tensors (torch.load reads it with weights_only)")
+    asked.add_argument("out", type=Path, help="the policy, as Stable-Baselines3 keeps it")
     asked.add_argument("--blind", action="store_true")
     asked.add_argument("--randomise", action="store_true", help="draw each episode's twin from the diagnosis's own uncertainty")
     asked.add_argument("--seed", type=int, default=0)
@@ -112,7 +118,7 @@ def main() -> None:
         print(f"{took:5.1f} s, step {step}: {100 * np.mean(near < 3e-3):.0f} % within 3 mm, median {1e3 * np.median(near):.2f} mm")
 
     model = train(task(said.twin, said.blind, said.randomise), said.seed, said.steps, look)
-    torch.save(model.policy.state_dict(), said.out)
+    model.save(said.out)
     print(said.out)
 
 

@@ -14,7 +14,7 @@ from tools.policy.bench_reach import BenchReach, robot_of
 from tools.policy.days import DAYS, twin_of
 from tools.policy.inverse import InverseKinematics
 
-EPISODES, ON_THE_WAY = 100, 25  # on the bench and on the own twin at the end; on the own twin while it learns
+EPISODES, ON_THE_WAY = 50, 25  # on the bench and on the own twin at the end; on the own twin while it learns
 
 
 @dataclass(frozen=True)
