@@ -14,7 +14,7 @@ from tools.policy.bench_reach import BenchReach, robot_of
 from tools.policy.days import DAYS, twin_of
 from tools.policy.inverse import InverseKinematics
 
-EPISODES, ON_THE_WAY = 50, 25  # on the bench and on the own twin at the end; on the own twin while it learns
+EPISODES, GLANCE = 50, 25  # on the bench and on the own twin at the end; on the own twin while it learns
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def run(cell: Cell, out: Path, steps: int = STEPS, episodes: int = EPISODES) -> 
         trial = task(source, cell.blind)
 
         def look(step: int, act: Act) -> None:
-            curve.append((step, distances(trial, act, min(ON_THE_WAY, episodes))))
+            curve.append((step, distances(trial, act, min(GLANCE, episodes))))
 
         act = acting(train(task(source, cell.blind, cell.twin == "randomised"), cell.seed, steps, look))
         own = distances(trial, act, episodes)
