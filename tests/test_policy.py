@@ -117,7 +117,7 @@ def test_the_table_does_no_cell_twice(tmp_path: Path) -> None:
     (tmp_path / cell.file).write_text('{"bench": {"tip_payload": [0.001, 0.006]}}')
     run(cell, tmp_path, episodes=3)
     kept = {cell: json.loads((tmp_path / cell.file).read_text())}
-    assert "| tip_payload |  |  |  |  |  | 50 |  |" in table(kept, blind=True)  # one of two goals; not done again
+    assert "| tip payload |  |  |  |  |  | 50 |  |" in table(kept, blind=True)  # one of two goals; not done again
     (tmp_path / cell.file).unlink()
     run(cell, tmp_path, episodes=3)
     assert (tmp_path / cell.file).read_bytes() == written

@@ -58,10 +58,13 @@ def table(results: Results, blind: bool) -> str:
         f"| {'load cells only' if blind else 'load cells and tip camera'}, % within 5 mm | {' | '.join(heads)} |",
         "|---" * 8 + "|",
     ]
+    columns = [(twin, False) for twin in TWINS] + [(twin, True) for twin in TWINS[:3]]
     for effect in DAYS:
-        row = [shown(shares(results, t, effect, blind)) for t in TWINS]
-        row += [shown(shares(results, t, effect, blind, inverse=True)) for t in TWINS[:3]]
-        lines.append(f"| {effect} | {' | '.join(row)} |")
+        row = [shown(shares(results, twin, effect, blind, inverse)) for twin, inverse in columns]
+        lines.append(f"| {effect.replace('_', ' ')} | {' | '.join(row)} |")
+    each = [[shares(results, twin, effect, blind, inverse) for effect in DAYS] for twin, inverse in columns]
+    means = [f"{np.mean([np.mean(of) for of in column]):.0f}" if all(column) else "" for column in each]
+    lines.append(f"| mean of the four | {' | '.join(means)} |")
     return "\n".join(lines)
 
 

@@ -110,6 +110,14 @@ def main() -> None:
     asked.add_argument("--seed", type=int, default=0)
     asked.add_argument("--steps", type=int, default=STEPS)
     said = asked.parse_args()
+    try:
+        learn(said)
+    except TwinError as fault:
+        asked.error(str(fault))
+
+
+def learn(said: argparse.Namespace) -> None:
+    """Train as asked, and keep the policy."""
     began, trial = time.perf_counter(), task(said.twin, said.blind)
 
     def look(step: int, act: Act) -> None:
