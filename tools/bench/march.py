@@ -53,60 +53,77 @@ class Record(NamedTuple):
     moment: np.ndarray  # (m, N, G, 3) N m, carried by the rod, world frame
 
 
-def march(mesh: Mesh, body: Body, load: Load, friction: Friction, creep: Creep | None, path: Path, record: Record) -> None:
-    """March and fill `record`, from the unloaded rod at rest: curvature = rest + delayed strain, zero slip."""
-    N, G = body.rest.shape[:2]
-    T = body.holes.shape[1]
-    pose = new_pose(N, G, T, len(friction.stroke))
-    delayed = np.zeros((0, N, G, 3)) if creep is None else creep.delayed
-    share, tau = (np.zeros(0), np.zeros(0)) if creep is None else (creep.share, creep.time)
-    share, tau = share[:, None, None, None], tau[:, None, None, None]
-    u = body.rest + delayed.sum(axis=0)
-    elastic = np.zeros_like(u)
-    T_base = np.zeros(T)
-    integrate(u, body.pitch, mesh, pose.node_R, pose.node_r, pose.disk_R, pose.disk_r)
-    lay(pose.disk_R, pose.disk_r, body.holes, pose.hole, pose.toward_base, pose.length)
-    friction.z[:] = 0.0
-    friction.distal[:] = distal_lengths(pose.length)
-    drive = pose.length.sum(axis=0) if load.by_length else np.zeros(T)
-    before = (drive, 0.0, path.softness[0])
-    stored = 0
-    for row in range(len(path.drive)):
-        after = (path.drive[row], path.weight[row], path.softness[row])
+class Standing:
+    """A rod in equilibrium with the slip and the delayed strain of its way there, led on row by row."""
+
+    def __init__(
+        self, mesh: Mesh, body: Body, load: Load, friction: Friction, creep: Creep | None, softness: float = 1.0
+    ) -> None:  # fmt: skip
+        """Unloaded, at rest: curvature = rest + delayed strain, zero slip."""
+        N, G = body.rest.shape[:2]
+        T = body.holes.shape[1]
+        self._mesh, self._body, self._load, self._friction = mesh, body, load, friction
+        self.pose = pose = new_pose(N, G, T, len(friction.stroke))
+        self._delayed = np.zeros((0, N, G, 3)) if creep is None else creep.delayed
+        share, tau = (np.zeros(0), np.zeros(0)) if creep is None else (creep.share, creep.time)
+        self._share, self._tau = share[:, None, None, None], tau[:, None, None, None]
+        self.u = body.rest + self._delayed.sum(axis=0)
+        self._elastic = np.zeros_like(self.u)
+        self.tension = np.zeros(T)  # at the base
+        integrate(self.u, body.pitch, mesh, pose.node_R, pose.node_r, pose.disk_R, pose.disk_r)
+        lay(pose.disk_R, pose.disk_r, body.holes, pose.hole, pose.toward_base, pose.length)
+        friction.z[:] = 0.0
+        friction.distal[:] = distal_lengths(pose.length)
+        self._before: tuple = (pose.length.sum(axis=0) if load.by_length else np.zeros(T), 0.0, softness)
+
+    def to(self, drive: np.ndarray, weight: float, softness: float, dt: float) -> None:
+        """One row on, in parts where that is too far at once. Raises NoEquilibrium."""
+        after, friction, share = (drive, weight, softness), self._friction, self._share
         done, part = 0.0, 1.0
         while done < 1.0:
             part = min(part, 1.0 - done)
-            drive, weight, softness = (a + (done + part) * (b - a) for a, b in zip(before, after, strict=True))
-            step = load._replace(
-                disk_force=weight * load.disk_force,
-                line_force=weight * load.line_force,
+            drive, weight, softness = (a + (done + part) * (b - a) for a, b in zip(self._before, after, strict=True))
+            step = self._load._replace(
+                disk_force=weight * self._load.disk_force,
+                line_force=weight * self._load.line_force,
                 tension=drive,
                 free_length=drive,
             )
-            keep, early, late = _creep_weights(path.dt[row] * part, tau)
+            keep, early, late = _creep_weights(dt * part, self._tau)
             raised = 1.0 + float((share * late).sum())
-            rest = body.rest + (keep * delayed + share * early * elastic).sum(axis=0)
-            now = body._replace(compliance=body.compliance * (softness * raised), rest=rest)
-            u_old, T_old = u.copy(), T_base.copy()
-            if not equilibrium(u, T_base, mesh, now, step, friction, pose):
-                u[:], T_base[:] = u_old, T_old
+            rest = self._body.rest + (keep * self._delayed + share * early * self._elastic).sum(axis=0)
+            now = self._body._replace(compliance=self._body.compliance * (softness * raised), rest=rest)
+            u_old, T_old = self.u.copy(), self.tension.copy()
+            if not equilibrium(self.u, self.tension, self._mesh, now, step, friction, self.pose):
+                self.u[:], self.tension[:] = u_old, T_old
                 part *= 0.5
                 if part < SMALLEST:
-                    raise NoEquilibrium(f"row {row} of {len(path.drive)}: no balance at drive {drive}, weight {weight}")
+                    raise NoEquilibrium(f"no balance at drive {drive}, weight {weight}")
                 continue
-            _commit(friction, pose)
-            elastic_old, elastic = elastic, (u - rest) / raised
-            delayed[:] = keep * delayed + share * (early * elastic_old + late * elastic)
+            _commit(friction, self.pose)
+            elastic_old, self._elastic = self._elastic, (self.u - rest) / raised
+            self._delayed[:] = keep * self._delayed + share * (early * elastic_old + late * self._elastic)
             done += part
             part *= 2.0
-        before = after
+        self._before = after
+
+
+def march(mesh: Mesh, body: Body, load: Load, friction: Friction, creep: Creep | None, path: Path, record: Record) -> None:
+    """March and fill `record`, from the unloaded rod at rest."""
+    rod = Standing(mesh, body, load, friction, creep, path.softness[0])
+    stored = 0
+    for row in range(len(path.drive)):
+        try:
+            rod.to(path.drive[row], path.weight[row], path.softness[row], path.dt[row])
+        except NoEquilibrium as fault:
+            raise NoEquilibrium(f"row {row} of {len(path.drive)}: {fault}") from None
         if record.keep[row]:
-            record.disk_r[stored] = pose.disk_r
-            record.disk_R[stored] = pose.disk_R
-            record.length[stored] = pose.length.sum(axis=0)
-            record.tension[stored] = T_base * pose.ratio
-            record.curvature[stored] = u
-            record.moment[stored] = pose.moment
+            record.disk_r[stored] = rod.pose.disk_r
+            record.disk_R[stored] = rod.pose.disk_R
+            record.length[stored] = rod.pose.length.sum(axis=0)
+            record.tension[stored] = rod.tension * rod.pose.ratio
+            record.curvature[stored] = rod.u
+            record.moment[stored] = rod.pose.moment
             stored += 1
 
 

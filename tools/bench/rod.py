@@ -102,6 +102,12 @@ def straight_lengths(rod: Rod) -> np.ndarray:
     return np.linalg.norm(np.diff(hole, axis=0), axis=-1).sum(axis=0)
 
 
+def mechanics(rod: Rod, nodes: int) -> Body:
+    """The rod as the solver has it."""
+    rest = np.repeat(rod.precurvature[:, None, :], nodes, axis=1)
+    return Body(np.array(rod.pitch, float), rod.compliance(nodes), rest, rod.holes())
+
+
 def follow(
     rod: Rod,
     drive: ArrayLike,  # (n, T) base tension in N; by_length: the tendon's free length minus its straight length, m; springs: A
@@ -142,8 +148,7 @@ def follow(
         kept, np.zeros((m, N + 1, 3)), np.zeros((m, N + 1, 3, 3)), np.zeros((m, T)), np.zeros((m, N, T)),
         np.zeros((m, N, nodes, 3)), np.zeros((m, N, nodes, 3)),
     )  # fmt: skip
-    rest = np.repeat(rod.precurvature[:, None, :], nodes, axis=1)
-    body = Body(np.array(rod.pitch, float), rod.compliance(nodes), rest, rod.holes())
+    body = mechanics(rod, nodes)
     ones = np.ones((N, T)) if share is None else np.array(share, float)
     load = Load(
         disk_force, rod.backbone_mass / rod.length * g, np.array(fields, float), np.zeros(T), ones, np.zeros(T),

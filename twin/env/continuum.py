@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from twin.body import Problem
+from twin.dynamics import Moving
 from twin.effects import Loads
 from twin.env.checks import Actions, chosen
 from twin.env.domain import Spread, draw, read_spread
 from twin.env.picture import Picture
 from twin.env.plant import Plant, Sensed
-from twin.errors import SolveError
+from twin.errors import DataError, SolveError, UnknownNameError
 from twin.rollout import full_pull
 from twin.storage import read_twin
 from twin.twin import Twin
@@ -25,6 +26,7 @@ from twin.twin import Twin
 REDRAWS = 20  # of a twin or a goal that has no equilibrium
 LEAST_BEND, MOST_BEND = 0.2, 1.2  # of goals, in full pulls
 LAP = 80  # steps of a tracked path
+SENSORS = ("load_cells", "encoders", "tip")
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,11 @@ class Options:
     """What `gymnasium.make` takes beside the twin and `render_mode`."""
 
     interval: float = 0.05  # s between two actions
+    dynamic: bool = True  # by MuJoCo's steps; else at rest at each interval's end, for a robot moved slowly
     rate: float = 1.0  # full pulls a second that an action of 1 adds
     most: float = 1.5  # full pulls: the largest tension
     observe: Literal["sensors", "full"] = "sensors"
+    sensors: tuple[str, ...] = SENSORS  # those that the robot has
     tension_noise: float = 0.0  # N, one standard deviation of a load cell
     displacement_noise: float = 0.0  # m, of an encoder
     tip_noise: float = 0.0  # m, of the camera
@@ -67,7 +71,8 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
     | 3n..3n+2 | tip x, y, z by camera | L |
     | 3n+3..3n+5 | goal x, y, z | L |
 
-    With `observe="full"` there follow nv joint angles (rad) and nv joint speeds (10 rad/s).
+    With `observe="full"` there follow nv joint angles (rad) and nv joint speeds (10 rad/s). Of a robot without encoders or without
+    a camera (`sensors=("load_cells", "tip")`, say) those rows are left out.
 
     `parts` names them: load_cells, encoders, commands, tip, goal, angles, speeds.
 
@@ -78,8 +83,14 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
     def __init__(self, twin: str | Path | Twin = "continuum", render_mode: str | None = None, **options: Any) -> None:
-        """Raises UnknownNameError for an option there is not, DataError for a robot without dynamics."""
+        """Raises UnknownNameError for an option or a sensor there is not, DataError for a robot without dynamics and for joint
+        speeds of one that is at rest."""
         self.options, self.render_mode = chosen(Options, options, render_mode, self.metadata["render_modes"]), render_mode
+        for name in self.options.sensors:
+            if name not in SENSORS:
+                raise UnknownNameError("sensor", name, SENSORS)
+        if self.options.observe == "full" and not self.options.dynamic:
+            raise DataError('observe="full" shows joint speeds, which a robot at rest has not: leave out observe or dynamic=False')
         self.described = twin if isinstance(twin, Twin) else read_twin(twin)
         unsaid = isinstance(twin, Twin) or not self.options.randomise
         self._spread = Spread() if unsaid else read_spread(twin, self.described)  # type: ignore[arg-type]
@@ -88,9 +99,10 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
         self._start = self.plant.sensed()
         self.length, self.n = float(self._start.tip[2]), self.described.robot.n_tendon
         self._actions, self._picture = Actions(self.n), None
-        nv = self.plant.moving.model.nv if self.options.observe == "full" else 0
+        nv = len(self.plant.q) if self.options.observe == "full" else 0
         self.parts = {"load_cells": self.n, "encoders": self.n, "commands": self.n, "tip": 3, "goal": 3}
         self.parts |= {"angles": nv, "speeds": nv} if nv else {}
+        self.parts = {name: size for name, size in self.parts.items() if self._has(name)}
         size = sum(self.parts.values())
         self.action_space = spaces.Box(-1.0, 1.0, (self.n,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
@@ -98,11 +110,9 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
         """Slack and at rest, a twin, a payload and a goal drawn. Raises SolveError where draw after draw has no equilibrium."""
         super().reset(seed=seed)
-        o = self.options
         for attempt in range(REDRAWS):
             try:
-                twin = draw(self.described, self._spread, o.ranges, self.np_random)
-                self.plant = Plant(twin, o.interval, float(self.np_random.uniform(*o.payload)))
+                self.plant = self._drawn()
                 self._path = self._goals()
                 break
             except SolveError as fault:
@@ -131,7 +141,7 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.render_mode is None:
             return None
         self._picture = self._picture or Picture(self.plant.body, self.length)
-        return self._picture.draw(self.plant.moving.data.qpos, self.goal)
+        return self._picture.draw(self.plant.q, self.goal)
 
     def close(self) -> None:
         if self._picture is not None:
@@ -142,6 +152,12 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
     def goal(self) -> np.ndarray:
         """(3,) m, where the tip should be now."""
         return self._path[min(self._step, len(self._path) - 1)]
+
+    def _drawn(self) -> Plant:
+        """An episode's robot, at rest. Raises SolveError where it stands nowhere."""
+        o, rng = self.options, self.np_random
+        twin = draw(self.described, self._spread, o.ranges, rng)
+        return Plant(twin, o.interval, float(rng.uniform(*o.payload)), o.dynamic)
 
     def _goals(self) -> np.ndarray:
         """(1, 3) m: where the described robot's tip rests under drawn pulls."""
@@ -160,16 +176,25 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
         return path.markers[1:, -1]
 
     def _observed(self, seen: Sensed) -> np.ndarray:
+        return np.concatenate(list(self._shown(seen).values())).astype(np.float32)
+
+    def _shown(self, seen: Sensed) -> dict[str, np.ndarray]:
+        """The observation by the names of its parts."""
         o, F, rng = self.options, self.pull, self.np_random
         tension = seen.tension + o.tension_noise * rng.standard_normal(self.n)
         travel = seen.displacement + o.displacement_noise * rng.standard_normal(self.n)
         tip = seen.markers[-1] + o.tip_noise * rng.standard_normal(3)
-        pulls = [tension / F.tension, travel / F.displacement, self.command / F.tension]
-        parts = [*pulls, tip / self.length, self.goal / self.length]
+        shown = {
+            "load_cells": tension / F.tension, "encoders": travel / F.displacement, "commands": self.command / F.tension,
+            "tip": tip / self.length, "goal": self.goal / self.length,
+        }  # fmt: skip
         if o.observe == "full":
-            data = self.plant.moving.data
-            parts += [data.qpos, data.qvel / 10.0]
-        return np.concatenate(parts).astype(np.float32)
+            data = cast(Moving, self.plant.moving).data
+            shown |= {"angles": data.qpos, "speeds": data.qvel / 10.0}
+        return {name: part for name, part in shown.items() if self._has(name)}
+
+    def _has(self, part: str) -> bool:
+        return part not in SENSORS or part in self.options.sensors
 
     def _info(self, seen: Sensed) -> dict[str, Any]:
         distance = float(np.linalg.norm(seen.tip - self.goal))
