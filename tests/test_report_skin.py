@@ -58,3 +58,12 @@ def test_the_picture_has_both_stages_and_the_worst_apart(story: Any) -> None:
 def test_a_robot_without_skin_or_clouds_has_no_picture(story: Any) -> None:
     bare: Any = SimpleNamespace(**{**vars(story), "folds": ("each its own twin",)})
     assert skin.before_after(bare) == []
+
+
+def test_distances_are_to_the_surface_and_not_to_its_corners() -> None:
+    """A can of 10 mm across: a point on the middle of its lid, 2 mm from the rim, is on it, whatever the normals at the rim."""
+    can = trimesh.creation.cylinder(5e-3, 30e-3, sections=64)
+    points = np.array([[3e-3, 0.0, 15e-3], [3e-3, 0.0, 16e-3], [3e-3, 0.0, 14.5e-3], [5.5e-3, 0.0, 0.0], [0.0, 4.6e-3, 14e-3]])
+    assert np.allclose(
+        skin.off(points, can), [0.0, 1e-3, -5e-4, 5e-4, -4e-4], atol=1e-5
+    )  # m: 64 sections are 6e-6 inside the circle

@@ -60,9 +60,19 @@ def clouds(d: Diagnosis, stage: Stage) -> list[Beside]:
 
 def _beside(trial: int, time: float, points: np.ndarray, drawn: Figure, frames: Frames) -> Beside:
     skin = frames.skin[0]
-    nearest = KDTree(skin).query(points)[1]
-    normals = trimesh.Trimesh(skin, drawn.faces, process=False).vertex_normals[nearest]
-    return Beside(trial, float(time), points, skin, ((points - skin[nearest]) * normals).sum(axis=1))
+    return Beside(trial, float(time), points, skin, off(points, trimesh.Trimesh(skin, drawn.faces, process=False)))
+
+
+def off(points: np.ndarray, skin: trimesh.Trimesh) -> np.ndarray:
+    """How far points (m, 3) m stand off a skin, (m,) m, outwards positive: off the nearest of those triangles that meet at the
+    nearest corner."""
+    around = skin.vertex_faces[KDTree(skin.vertices).query(points)[1]]  # (m, k), -1 where fewer meet
+    each = np.repeat(points[:, None], around.shape[1], axis=1)
+    nearest = trimesh.triangles.closest_point(skin.triangles[around].reshape(-1, 3, 3), each.reshape(-1, 3)).reshape(each.shape)
+    away = np.where(around < 0, np.inf, np.linalg.norm(each - nearest, axis=2))
+    row, best = np.arange(len(points)), away.argmin(axis=1)
+    outwards = ((points - nearest[row, best]) * skin.face_normals[around[row, best]]).sum(axis=1)
+    return np.copysign(away[row, best], outwards)
 
 
 def before_after(d: Diagnosis) -> list[list[Beside]]:
@@ -101,7 +111,7 @@ def plot(d: Diagnosis, each: list[list[Beside]]) -> Plot:
     menu = {"type": "buttons", "direction": "right", "buttons": buttons, "active": len(stages) - 1}
     menu |= {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "pad": {"t": 4}}
     hidden = {"visible": False}
-    scene = {"aspectmode": "data", "camera": _camera(up, sight), **{f"{a}axis": hidden for a in "xyz"}}
+    scene = {"aspectmode": "data", "dragmode": "orbit", "camera": _camera(up, sight), **{f"{a}axis": hidden for a in "xyz"}}
     out = figure(traces, HEIGHT, scene=scene, updatemenus=[menu], showlegend=False, margin={"l": 0, "r": 0, "t": 10, "b": 44})
     return Plot("Point clouds of sealed trials on the predicted skin, coloured by their distance from it", HEIGHT, out)
 
