@@ -268,6 +268,10 @@ class Page:
         box.press("Enter")
 
 
+def _tip_x(app: App) -> float:
+    return float(app.words.content.split("**")[1])
+
+
 def test_a_slider_moves_the_robot(browser, by_hand: Served) -> None:  # type: ignore[no-untyped-def]
     page = Page(browser, by_hand.address)
     assert page.there()
@@ -277,6 +281,11 @@ def test_a_slider_moves_the_robot(browser, by_hand: Served) -> None:  # type: ig
     assert page.changed(before)
     assert by_hand.app.words.content != words
     assert "2.00 N" in by_hand.app.words.content
+    before, x = page.scene(), _tip_x(by_hand.app)
+    page.put("push at the tip, N", "0.1")
+    assert page.until(lambda: by_hand.app.push.value == 0.1)
+    assert page.changed(before)
+    assert _tip_x(by_hand.app) > x + 1.0  # mm, along x: 0.1 N sideways bend a rod and a finger by far more
 
 
 def test_scrubber_and_effect_switch_change_picture_and_numbers(browser, replayed: Served) -> None:  # type: ignore[no-untyped-def]

@@ -27,6 +27,7 @@ from twin.viewer.scene import Scene
 
 RATE = 60.0  # Hz, of the loop
 MOST = 1.5  # full pulls at a slider's end
+MOST_PUSH = 0.2  # N: bends the rod and the finger by centimetres
 TELLING, PLOTTING = 0.1, 1.0  # s between words and between plots of a running replay: a reader needs no more
 DESCRIBED, BETTER = "as described", "with effects"
 REPLAY, BY_HAND = "replay", "by hand"
@@ -126,8 +127,17 @@ class App:
             self.payload = gui.add_slider("payload, g", 0.0, 30.0, 1.0, 0.0, hint="at the tip", visible=not len(self._figure.faces))
             self.tilt = gui.add_slider("gravity tilt, deg", 0, 180, 5, 0, hint="of its direction from that described")
             self.azimuth = gui.add_slider("gravity azimuth, deg", 0, 355, 5, 0, hint="about the robot's axis")
+            self.push = gui.add_slider("push at the tip, N", 0.0, MOST_PUSH, 0.005, 0.0, hint="sideways, of a fixed direction")
+            self.aside = gui.add_slider("push azimuth, deg", 0, 355, 5, 0, hint="its direction about the robot's axis")
             self.slack = gui.add_button("let go", hint="all tendons slack, friction's history forgotten")
-        for handle in (*(s for of in self.sliders.values() for s in of), self.payload, self.tilt, self.azimuth):
+        for handle in (
+            *(s for of in self.sliders.values() for s in of),
+            self.payload,
+            self.tilt,
+            self.azimuth,
+            self.push,
+            self.aside,
+        ):
             self._noted(handle)
         self.by.on_update(lambda _: self._let_go())
         self.slack.on_click(lambda _: self._let_go())
@@ -250,7 +260,8 @@ class App:
         g = self.twin.robot.gravity
         axis = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         along = g * np.cos(tilt) + np.cross(axis, g) * np.sin(tilt) + axis * (axis @ g) * (1.0 - np.cos(tilt))  # Rodrigues
-        return Loads(along, 1e-3 * self.payload.value)
+        aside = np.deg2rad(self.aside.value)
+        return Loads(along, 1e-3 * self.payload.value, self.push.value * np.array([np.cos(aside), np.sin(aside), 0.0]))
 
     def _coloured(self, over: Range) -> None:
         if over != self._range:

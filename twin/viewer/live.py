@@ -27,7 +27,7 @@ class Live:
     def shape(self, pull: np.ndarray, loads: Loads) -> Frames:
         """One instant under pulls (n_tendon,), N as load cells read them or m as drives report. Raises SolveError where there is
         none."""
-        if self._loads is None or loads.payload != self._loads.payload or not np.array_equal(loads.gravity, self._loads.gravity):
+        if self._loads is None or not _same(loads, self._loads):
             self._turns, self._loads = [np.zeros_like(pull)], loads
         turns = [*(self._turns if _turned(self._turns, pull) else self._turns[:-1]), pull][-TURNS:]
         command, time = np.stack(turns), np.arange(float(len(turns)))
@@ -36,6 +36,10 @@ class Live:
         assert trace.path is not None  # statics without one raise
         self._turns = turns
         return self._figure.frames(trace.path, self._twin.laws.surround(loads), self._twin.laws.route).at(-1)
+
+
+def _same(a: Loads, b: Loads) -> bool:
+    return a.payload == b.payload and np.array_equal(a.gravity, b.gravity) and np.array_equal(a.force, b.force)
 
 
 def _turned(turns: list[np.ndarray], pull: np.ndarray) -> bool:
