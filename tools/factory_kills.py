@@ -1,6 +1,6 @@
 """The data factory under random kills: one order made at once, and made by a process killed again and again, compared bit for bit.
 
-    python -m tools.factory_kills OUT [--samples 4000] [--kills 20] [--longest 30] [--seed 0]
+    python -m tools.factory_kills OUT [--samples 4000] [--kills 20] [--longest 90] [--seed 0]
 
 A kill (SIGKILL to the whole process group, workers too) comes a random time after a start, up to `--longest` s; then the same
 command goes on. Prints how many shards the killed one had at each kill, and whether both folders hold the same bytes; each run says
@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--samples", type=int, default=4000)
     parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--longest", type=float, default=30.0, help="s from a start to its kill")
+    parser.add_argument("--longest", type=float, default=90.0, help="s from a start to its kill")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
