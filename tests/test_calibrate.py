@@ -12,6 +12,7 @@ import pytest
 
 from tests.conftest import Day
 from tools.bench.nuisance import built
+from twin import twin as twin_module
 from twin.bench import Bench, prepare
 from twin.calibrate import Evaluation, Fit, Free, Model, Objective, fit, prior_weight
 from twin.diagnose import Settings, calibration
@@ -24,6 +25,7 @@ from twin.quantities import Parameter
 from twin.residual import Noise, Whitener
 from twin.robots import load
 from twin.twin import Trace, Twin
+from twin.twin import _trial as one
 
 SEEDS = (5, 6)
 ROBOT = load("continuum")
@@ -233,6 +235,28 @@ def test_standard_errors_widen_where_the_residual_is_larger_than_its_noise() -> 
     assert spread(1.0) == pytest.approx(noise)
     assert spread(3.0) == pytest.approx(3.0 * noise)
     assert spread(0.5) == pytest.approx(noise)
+
+
+def test_a_model_that_is_too_far_off_is_seen_at_the_first_trials(bench: Day, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`within` answers as `evaluate` where the bound holds, and simulates no trial after the one that breaks it."""
+    prepared = prepare(few(bench), ROBOT)
+    m, n, trials = len(prepared.outputs), prepared.n_tendon, [0, 2, 5]
+    noise = Noise(np.full(m, 2e-4), np.full(n, 1e-3), np.zeros(m), "given")
+    measured = [prepared.measured[k] for k in trials]
+    seen = Whitener(noise, measured, [np.zeros((*y.shape, n)) for y in measured], [prepared.inputs[k].command for k in trials])
+    objective, model, ran = Objective(prepared, trials, seen, 1), Model.base(ROBOT), []
+    monkeypatch.setattr(twin_module, "_trial", lambda *a: ran.append(a[3].name) or one(*a))
+    whole = objective.evaluate(model)
+    assert ran == [prepared.inputs[k].name for k in trials]
+    z = np.split(whole.z, np.cumsum([y.size for y in measured])[:-1])
+    first, second = float(z[0] @ z[0]), float(z[1] @ z[1])
+    enough = objective.within(1.001 * float(whole.z @ whole.z), model)
+    assert enough is not None
+    assert np.array_equal(enough.z, whole.z)
+    for most, after in ((0.999 * first, 1), (first + 0.999 * second, 2)):
+        ran.clear()
+        assert objective.within(most, model) is None
+        assert len(ran) == after
 
 
 # ---- coverage: do intervals hold the truth as often as they say ----------------------------------------------------------------
