@@ -243,6 +243,15 @@ def test_between_free_trials_drift_goes_by_the_clock(day: Recording, aligned: Al
     assert len(said) == 1
 
 
+def test_a_twin_whose_tendons_make_other_strains_tells_no_drift(day: Recording, aligned: Aligned) -> None:
+    """Its network knows the finger as described; a sensor's own effect changes nothing of that."""
+    free = sense(only(day, "test_1"), aligned.twin)[0][0]
+    lying = replace(free, resistance=1.08 * free.resistance)
+    for effect, told in (("stiffness_asymmetry", False), ("sensor_gain", True)):
+        twin = replace(aligned.twin, effects=(named(effect)({}, aligned.twin.robot.n_tendon),))
+        assert bool(steadied([lying], [0.0], twin)[1]) == told
+
+
 def test_a_push_that_nobody_declared_is_no_drift(day: Recording, aligned: Aligned) -> None:
     """Nor is what sensors that do not drift are off by anyhow."""
     sensed = sense(silent(day), aligned.twin)[0]
