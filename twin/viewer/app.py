@@ -111,10 +111,8 @@ class App:
         full, ports = full_pull(self.twin), self.twin.robot.build().drives
         ways = [d for d in (Drive.TENSION, Drive.DISPLACEMENT) if all(any(p.drive is d for p in port) for port in ports)]
         most = {Drive.TENSION: round(MOST * full.tension, 1), Drive.DISPLACEMENT: round(MOST * 1e3 * full.displacement, 1)}
-        least = {
-            Drive.TENSION: 0.0,
-            Drive.DISPLACEMENT: -most[Drive.DISPLACEMENT],
-        }  # one motor can take up only what others let out
+        # One motor can take up only what others let out.
+        least = {Drive.TENSION: 0.0, Drive.DISPLACEMENT: -most[Drive.DISPLACEMENT]}
         with self._driving:
             self.by = gui.add_dropdown("pull by", tuple(BY[d][0] for d in ways), visible=len(ways) > 1, hint="what motors hold")
             self.sliders = {
