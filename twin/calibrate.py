@@ -165,10 +165,9 @@ class Objective:
 
 def _same_simulation(a: Twin, b: Twin) -> bool:
     """Whether two twins differ in what sensors report of outputs only, so that one simulation serves both."""
-    physical = ("command", "drive", "edit", "soften", "surround", "route", "spring", "deform")
 
     def acting(t: Twin) -> list[Effect]:
-        return [e for e in t.effects if e.acts_in(*physical)]
+        return [e for e in t.effects if e.physical]
 
     return a.values == b.values and acting(a) == acting(b)
 

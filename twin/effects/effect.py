@@ -217,6 +217,11 @@ class Effect(ABC):
         """Whether the law overrides any of the named places."""
         return any(getattr(type(self), p) is not getattr(Effect, p) for p in places)
 
+    @property
+    def physical(self) -> bool:
+        """Whether the law acts on the robot and its drives, not only on what sensors report of outputs."""
+        return self.acts_in("command", "drive", "edit", "soften", "surround", "route", "spring", "deform")
+
     # ---- the places, in the order of the signal -----------------------------------------------------------------------
 
     def command(self, reported: Signals) -> Signals:

@@ -6,8 +6,8 @@ Where nothing pushes, tendons give the strains (`free.py`), and so the resistanc
 
 is drift where it is one factor for the whole trial: with it undone, tendons explain half of the samples or more. A push nobody
 declared is no factor, and such a trial tells nothing. Drift is taken for a random walk: between trials that tell it its mean is a
-straight line in time, before the first and after the last it stays. A twin with an effect of mechanics tells nothing: the strains
-are those of the finger as described.
+straight line in time, before the first and after the last it stays. A twin with an effect on more than its sensors tells nothing:
+the strains are those of the finger as described.
 """
 
 from __future__ import annotations
@@ -26,13 +26,12 @@ from twin.soft import SoftBody
 from twin.twin import Twin
 
 LEAST = 0.005  # of log R: 0.0017 at most was seen of sensors that do not drift (bench days 501, 512, 513 and one of another bench)
-MECHANICAL = ("drive", "edit", "soften", "surround", "route", "deform")
 EXPLAINED = 6.0  # standard deviations of the strains, below which half of the samples must be
 
 
 def steadied(trials: Sequence[Sensed], starts: Sequence[float | None], twin: Twin) -> tuple[tuple[Sensed, ...], tuple[str, ...]]:
     """The trials with drift undone, and what was found; `starts` (s) on the day's clock, by order where one is not known."""
-    if any(effect.acts_in(*MECHANICAL) for effect in twin.effects):
+    if any(effect.physical for effect in twin.effects):
         return tuple(trials), ()  # its tendons make other strains than those the network has learnt
     try:
         free, body = Network.of(twin.robot).free, twin.body()
