@@ -11,13 +11,14 @@ import cma
 import numpy as np
 
 from twin.measurements import Recording
+from twin.measurements.patches import side
 from twin.sensors import Cords, strain
 from twin.shape.cloud_fit import BEYOND, CLOUD
 from twin.shape.estimator import Felt
 from twin.shape.modal import Network
 from twin.shape.sensing import sense
-from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody
+from twin.soft.skin import Skin, distances, facing
 from twin.soft.statics import single_thread, turned
 from twin.twin import Twin
 
@@ -32,6 +33,7 @@ def search(recording: Recording, twin: Twin, seed: int = 1) -> tuple[dict[str, f
     free = [p for p in twin.robot.nuisance if p.name.startswith(("sensors.", "mounting."))]
     skin, net = Skin.of(body), Network.of(twin.robot)
     clouds = {t.name: t.clouds for t in recording.trials}
+    camera = side([c for c in clouds.values() if c is not None])
     frames = []
     for s in sense(recording, twin)[0]:
         c = clouds[s.name]
@@ -50,7 +52,7 @@ def search(recording: Recording, twin: Twin, seed: int = 1) -> tuple[dict[str, f
         turn, total = turned(values["mounting.angle"]), 0.0
         for u, (_, _, cloud) in zip(nodes, frames, strict=True):
             place, normals = skin.at(u)
-            d = distances(cloud @ turn, place, normals, facing(normals, turn))[0] / (BEYOND * CLOUD)
+            d = distances(cloud @ turn, place, normals, facing(normals, turn, camera))[0] / (BEYOND * CLOUD)
             total += float((np.sqrt(1.0 + d**2) - 1.0).mean())
         return total + 1e-3 * float(x @ x)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from twin.effects import Drive, Drives, Loads, Signals, driven_by
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.measurements.channels import meaning
+from twin.measurements.patches import PATCHES, SHARED, Patches, cut, scatter, side
 from twin.robots import Robot
 
 CONTACT = "external_contact"  # a trial's condition: a hand deforms the robot
@@ -20,7 +22,8 @@ ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quo
 @dataclass(frozen=True)
 class Inputs:
     """One trial as the twin is driven: time and clock (n,) s, reported command (n, n_tendon), SI, of what drives each tendon
-    (`drives`), a current constant from one time to the next; temperature (n,) K of the room, its loads."""
+    (`drives`), a current constant from one time to the next; temperature (n,) K of the room, its loads; `seen`, patches of skin
+    that clouds show, where these are compared."""
 
     name: str
     time: np.ndarray
@@ -29,6 +32,7 @@ class Inputs:
     drives: Drives
     temperature: np.ndarray
     loads: Loads
+    seen: Patches | None = None
 
     @property
     def signals(self) -> Signals:
@@ -107,6 +111,8 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
     if Drive.CURRENT in drives:
         robot.springs(body.n_tendon)  # described, or refused
     outputs, unknown = _outputs(recording, body, drives)
+    skin, camera, note = _skin(recording, body, outputs)
+    outputs, notices = (*outputs, *skin), [*notices, *note]
     if not outputs:
         raise DataError(f"{_where(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
     notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
@@ -119,10 +125,12 @@ def prepare(recording: Recording, robot: Robot) -> Bench:
         notices += note
         notices += [f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in trial.other]
         loads = _loads(recording, trial, robot, body)
+        seen = cut(trial.clouds, camera) if skin else None
         inputs.append(
-            Inputs(trial.name, trial.time, clocks[k], readings @ pull, drives, _temperature(recording, trial), loads)
+            Inputs(trial.name, trial.time, clocks[k], readings @ pull, drives, _temperature(recording, trial), loads, seen)
         )  # fmt: skip
-        measured.append(np.stack([trial.values[o.channel.name] for o in outputs], axis=1))
+        columns = [trial.values[o.channel.name][:, None] for o in outputs if o not in skin]
+        measured.append(np.hstack([*columns, seen.at(trial.time)] if seen else columns))
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return Bench(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
 
@@ -184,6 +192,23 @@ def _outputs(recording: Recording, body: Body, drives: Drives) -> tuple[tuple[Ou
         else:
             found.append(Output(channel, sense.group, sense.index, sense.axis))
     return tuple(found), unknown
+
+
+def _skin(recording: Recording, body: Body, outputs: Sequence[Output]) -> tuple[tuple[Output, ...], np.ndarray, list[str]]:
+    """Patches of skin as outputs, where a body has skin that clouds show and no markers are compared: beside these clouds stay what
+    no fit has seen. With them the direction (3,) to the camera, and what a reader should know."""
+    clouds = [t.clouds for t in recording.trials if t.clouds is not None and len(t.clouds.points)]
+    if not clouds or "skin" not in body.parts or any(o.group == "marker" for o in outputs):
+        return (), np.zeros(3), []
+    camera, noise = side(clouds), SHARED * scatter(clouds)
+    if not camera.any() or not noise > 0.0:
+        why = "have too few points" if camera.any() else "do not show one side of the robot"
+        return (), np.zeros(3), [f"the point clouds {why}; they are not compared"]
+    named = [Channel(f"skin_{j}", "output", "mm", noise) for j in range(1, PATCHES + 1)]
+    said = (
+        f"no markers: the point clouds are compared, as {PATCHES} patches of skin, each taken to be known to {1e3 * noise:.2g} mm"
+    )
+    return tuple(Output(c, "skin", j, 0) for j, c in enumerate(named)), camera, [said]
 
 
 def _clocks(recording: Recording) -> tuple[list[np.ndarray], list[str]]:

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.effects import Creep, Drive, Drives, Loads, Route, driven_by
+from twin.measurements.patches import Patches
 from twin.springs.spring import Spring
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
@@ -72,7 +73,8 @@ class Body:
     can show, by channel. `loads`: inputs that load it, by channel, and which of `Loads` each is. `parts`: what an effect may need
     to act on: "weight", "elasticity" (one stiffness for all of it), "backbone" (hinges that may rest bent), "markers", "load
     cells", "strain sensors", "antagonists"; and what it offers to change: "planes" of bending and stiffness along its "length"
-    (`bend_unequally`, `grade`), "holes" (`reroute`), a "surface" that may touch, "viscosity" that may creep. `antagonists` as in
+    (`bend_unequally`, `grade`), "holes" (`reroute`), a "surface" that may touch, "viscosity" that may creep; "skin", whose patches
+    it compares with clouds (`Problem.seen`). `antagonists` as in
     `Signals`; `frame` is that of the markers; `tendons` are the sites each tendon passes, base to tip, and `markers` those that are
     seen.
     """
@@ -141,7 +143,8 @@ class Problem:
 
     A command is what its tendon's drive says (all tensions if not said). `delayed` are the strains that creep has left, the body's
     own business, advanced in place. `stiffness` (n,) scales the body's. `near`, the kept answer to a neighbouring problem on the
-    same samples, speeds a solve up; with `once` one Newton step a sample is taken from it; `keep` keeps what that needs.
+    same samples, speeds a solve up; with `once` one Newton step a sample is taken from it; `keep` keeps what that needs. `seen` are
+    patches of skin that a camera saw, where a body is asked for those.
     """
 
     time: np.ndarray
@@ -157,6 +160,7 @@ class Problem:
     keep: bool = False
     once: bool = False
     tolerance: float = TOLERANCE
+    seen: Patches | None = None
 
     def which(self, kind: Drive) -> np.ndarray:
         """(n_tendon,) whether a tendon is driven in this way."""

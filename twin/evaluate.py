@@ -14,24 +14,26 @@ from twin.twin import Twin, is_dynamic, readings, report, simulate
 UNIT = {  # group of outputs -> unit it is shown in, factor from SI
     "marker": ("mm", 1e3), "displacement": ("mm", 1e3), "tension": ("N", 1.0), "temperature": ("K", 1.0),
     "resistance": ("ohm", 1.0), "sensor": ("ohm", 1.0), "angle": ("deg", 180.0 / np.pi), "torque": ("N*m", 1.0),
+    "skin": ("mm", 1e3),
 }  # fmt: skip
 KIND = {  # group of outputs -> kind in reports
     "marker": "position", "displacement": "tendon_displacement", "tension": "tendon_tension", "temperature": "sma_temperature",
     "resistance": "sma_resistance", "sensor": "sensor_resistance", "angle": "joint_angle", "torque": "joint_torque",
+    "skin": "skin",
 }  # fmt: skip
 
 POINTS = ("marker",)  # groups whose channels are the x, y and z of points
-ACCURATE = ("marker", "angle")  # groups that a robot's declared accuracy speaks of
+ACCURATE = ("marker", "skin", "angle")  # groups that a robot's declared accuracy speaks of
 TYPICAL = {  # group of outputs -> noise (SI) of a usual sensor, where nothing is known yet
     "marker": 2.5e-4, "displacement": 5e-5, "tension": 2e-2, "temperature": 0.5, "resistance": 5e-3, "sensor": 0.5,
-    "angle": 2e-3, "torque": 1e-3,
+    "angle": 2e-3, "torque": 1e-3, "skin": 2e-4,
 }  # fmt: skip
 
 
 def headline(groups: Iterable[str]) -> str:
-    """The group of outputs whose error stands for the twin: markers where there are any, else the first."""
+    """The group of outputs whose error stands for the twin: markers where there are any, else skin, else the first."""
     groups = list(groups)
-    return "marker" if "marker" in groups else groups[0]
+    return next((g for g in ("marker", "skin") if g in groups), groups[0])
 
 
 def squares(bench: Bench, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:

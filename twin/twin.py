@@ -14,6 +14,7 @@ from twin.errors import DataError, SolveError
 from twin.figure import Figure
 from twin.laws import Laws
 from twin.measurements import Recording
+from twin.measurements.channels import MADE
 from twin.quantities import Values
 from twin.robots import Robot, family, load
 
@@ -76,7 +77,7 @@ class Twin:
 
 
 def _by_channel(bench: Bench, y: np.ndarray) -> dict[str, np.ndarray]:
-    return {o.channel.name: column for o, column in zip(bench.outputs, y.T, strict=True)}
+    return {o.channel.name: column for o, column in zip(bench.outputs, y.T, strict=True) if o.channel.kind not in MADE}
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def _trial(
     heating = twin.heating(inputs.temperature) if Drive.CURRENT in inputs.drives else None
     problem = Problem(
         inputs.time, driven.command, laws.surround(inputs.loads), laws.route, inputs.drives, laws.creep, delayed,
-        laws.stiffness(inputs.temperature, inputs.clock), heating, near, way.keep, way.once, way.tolerance,
+        laws.stiffness(inputs.temperature, inputs.clock), heating, near, way.keep, way.once, way.tolerance, inputs.seen,
     )  # fmt: skip
     path = solver.solve(problem)
     if not path.status.all():

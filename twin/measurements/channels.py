@@ -36,6 +36,7 @@ KINDS: dict[str, tuple[str, str]] = {
     "joint_angle": ("joint_#_angle", "rad"),
     "joint_torque": ("joint_#_torque", "N*m"),
 }
+MADE: dict[str, tuple[str, str]] = {"skin": ("skin_#", "m")}  # of point clouds (`patches.py`); no file has them
 ALLOWED_NAMES = ", ".join(
     pattern.replace("#", "K" if "@" in pattern else "I").replace("@", "x|y|z") for pattern, _ in KINDS.values()
 ) + ", each also as finger_N_..."  # fmt: skip
@@ -44,7 +45,7 @@ _GRAMMAR = {
     kind: re.compile(
         f"(?:finger_(?P<finger>{_INDEX})_)?" + pattern.replace("#", f"(?P<index>{_INDEX})").replace("@", "(?P<axis>[xyz])")
     )
-    for kind, (pattern, _) in KINDS.items()
+    for kind, (pattern, _) in (KINDS | MADE).items()
 }
 
 
@@ -90,7 +91,7 @@ class Channel:
 
     @property
     def kind(self) -> str:
-        """What is measured: a key of `KINDS`."""
+        """What is measured: a key of `KINDS`, or of `MADE`."""
         return meaning(self.name).kind
 
     @property
@@ -111,7 +112,7 @@ class Channel:
     @property
     def si_unit(self) -> str:
         """The unit of the values inside the program."""
-        return KINDS[self.kind][1]
+        return (KINDS | MADE)[self.kind][1]
 
     @property
     def scale(self) -> Scale:

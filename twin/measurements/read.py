@@ -15,7 +15,7 @@ from pydantic import Field
 
 from twin.errors import DataError, listed, shown
 from twin.forms import Form, Text, fill
-from twin.measurements.channels import Channel, Role
+from twin.measurements.channels import MADE, Channel, Role
 from twin.measurements.clouds import read_clouds
 from twin.measurements.conditions import LARGEST, read_conditions
 from twin.measurements.files import LARGEST_SET, LARGEST_TOML, check_name, inside, is_file, located, parse_toml, read_text
@@ -161,6 +161,8 @@ def _channel(table: object) -> Channel:
     if found is None:
         raise DataError("; ".join(problems))
     channel = Channel(found.name, found.role, found.unit)
+    if channel.kind in MADE:
+        raise DataError(f"{found.name} is made from point clouds, not read; give the trial's clouds as `cloud`")
     if found.noise is None:
         return channel
     with located(f"noise of {found.name}"):

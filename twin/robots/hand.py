@@ -41,7 +41,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HandB
     return HandBody(
         spec=spec,
         n_tendon=shape.tendons,
-        parts=first.parts,
+        parts=first.parts - {"skin"},  # a cloud shows all fingers at once
         drives=tuple(tuple(_port(k, port, n) for port in ports) for k, finger in enumerate(fingers) for ports in finger.drives),
         stepped=first.stepped,
         senses={

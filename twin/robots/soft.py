@@ -35,7 +35,19 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
         spec=_picture(cone, paths, cord_paths, seen),
         n_tendon=nt,
         parts=frozenset(
-            {"weight", "elasticity", "markers", "load cells", "strain sensors", "planes", "length", "holes", "surface", "viscosity"}
+            {
+                "weight",
+                "elasticity",
+                "markers",
+                "load cells",
+                "strain sensors",
+                "planes",
+                "length",
+                "holes",
+                "surface",
+                "viscosity",
+                "skin",
+            }
         ),
         drives=tuple(ports[:2] for ports in tendon_ports(nt)),
         stepped=frozenset({Drive.TENSION, Drive.DISPLACEMENT}),

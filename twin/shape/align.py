@@ -23,6 +23,7 @@ from twin.bench import prepare
 from twin.errors import DataError
 from twin.factory import named_points
 from twin.measurements import Clouds, Recording
+from twin.measurements.patches import side
 from twin.quantities import Fitted
 from twin.sensors import strain
 from twin.shape.band import Bands, Behind, widened_by
@@ -31,8 +32,8 @@ from twin.shape.estimator import Felt, estimators
 from twin.shape.modal import Network
 from twin.shape.sensing import Sensed, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
-from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody, SoftStatics
+from twin.soft.skin import Skin, distances, facing
 from twin.soft.statics import single_thread, turned
 from twin.twin import Twin, simulate
 
@@ -58,10 +59,12 @@ class Aligned:
 
 @dataclass(frozen=True)
 class Shown:
-    """A trial with clouds: what was sensed and, for a trial without a push, the shapes (n, n_free, 3) m at its samples."""
+    """A trial with clouds: what was sensed, the direction (3,) to the camera, and, for a trial without a push, the shapes
+    (n, n_free, 3) m at its samples."""
 
     sensed: Sensed
     clouds: Clouds
+    side: np.ndarray
     nodes: np.ndarray | None
 
     def frames(self) -> list[tuple[int, np.ndarray]]:
@@ -91,10 +94,12 @@ def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) ->
     statics = SoftStatics(body)
     for sweep in range(2):
         progress(f"shapes under the hand, sweep {sweep + 1}")
-        fitted |= fit_sensors(_known(shown, CloudFit(skin, net, turned(angle)), statics, net, twin), twin)
+        fitted |= fit_sensors(_known(shown, CloudFit(skin, net, turned(angle), shown[0].side), statics, net, twin), twin)
         twin = replace(twin, values={**twin.values, **{name: f.value for name, f in fitted.items()}})
     progress("bands under the hand")
-    bands = _bands([s for s in shown if s.nodes is None and s.frames()], CloudFit(skin, net, turned(angle)), net, twin)
+    bands = _bands(
+        [s for s in shown if s.nodes is None and s.frames()], CloudFit(skin, net, turned(angle), shown[0].side), net, twin
+    )
     stds = {p.name: p.std for p in twin.robot.nuisance}
     unfixed = tuple(n for n in stds if n not in fitted or (fitted[n].std or 0.0) > 0.5 * (stds[n] or np.inf))
     frames = sum(len(s.frames()) for s in shown)
@@ -117,7 +122,8 @@ def _shown(recording: Recording, twin: Twin) -> tuple[list[Shown], tuple[str, ..
         for i, trace in zip(bench.inputs, simulate(twin, bench), strict=True) if trace.path is not None
     }  # fmt: skip
     clouds = {t.name: t.clouds for t in chosen.trials}
-    return [Shown(s, c, nodes.get(s.name)) for s in sensed if (c := clouds[s.name]) is not None], notices
+    seen = side([c for c in clouds.values() if c is not None])
+    return [Shown(s, c, seen, nodes.get(s.name)) for s in sensed if (c := clouds[s.name]) is not None], notices
 
 
 def _residuals(skin: Skin, shown: Sequence[Shown], angle: float) -> np.ndarray:
@@ -126,7 +132,7 @@ def _residuals(skin: Skin, shown: Sequence[Shown], angle: float) -> np.ndarray:
     for trial in shown:
         for i, cloud in trial.frames() if trial.nodes is not None else []:
             x, normals = skin.at(trial.nodes[i])  # type: ignore[index]
-            out.append(distances(cloud @ turn, x, normals, facing(normals, turn))[0])
+            out.append(distances(cloud @ turn, x, normals, facing(normals, turn, trial.side))[0])
     return np.concatenate(out)
 
 

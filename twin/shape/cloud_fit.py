@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from twin.shape.modal import Network
-from twin.shape.skin import RIM, Skin, distances, facing
+from twin.soft.skin import RIM, Skin, distances, facing
 
 CLOUD = 4e-4  # m, noise of a cloud's point
 BEYOND = 3.0  # standard deviations within which a point counts fully
@@ -27,10 +27,10 @@ NEAR = (15e-3, 2e-3)  # m below the rim where the density of points is counted
 
 
 class CloudFit:
-    """Fits frame by frame; the finger's own frame is turned by `turn` (3, 3) against that of the clouds."""
+    """Fits frame by frame; the finger's own frame is turned by `turn` (3, 3) against that of the clouds, seen from `side` (3,)."""
 
-    def __init__(self, skin: Skin, net: Network, turn: np.ndarray) -> None:
-        self.skin, self.modes, self.turn = skin, net.modes, turn
+    def __init__(self, skin: Skin, net: Network, turn: np.ndarray, side: np.ndarray) -> None:
+        self.skin, self.modes, self.turn, self.side = skin, net.modes, turn, side
         self.habit = net.habit
         basis = self.modes.basis.reshape(len(self.modes.basis), -1, 3)
         self.basis = np.einsum("mn,knc->mck", skin.weights, basis)
@@ -40,7 +40,7 @@ class CloudFit:
         own, hessian = cloud @ self.turn, self.habit.inverse
         for _ in range(ROUNDS):
             x, normals = self.skin.at(self.modes.nodes(z[None])[0])
-            visible = facing(normals, self.turn)
+            visible = facing(normals, self.turn, self.side)
             d, nearest = distances(own, x, normals, visible)
             J = np.einsum("pck,pc->pk", self.basis[nearest], normals[nearest])
             weight = 1.0 / (CLOUD**2 * np.sqrt(1.0 + (d / (BEYOND * CLOUD)) ** 2))

@@ -21,9 +21,9 @@ from twin.factory.draw import LENGTH as CHAIN
 from twin.factory.solve import hang, weight_of
 from twin.robots import Robot
 from twin.shape.features import features
-from twin.shape.skin import Skin
 from twin.shape.weights import Layers
 from twin.soft import SoftBody, SoftStatics
+from twin.soft.skin import Skin
 from twin.soft.solid import Solid
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from twin.shape.band import STRANGER, Bands, widened
 from twin.shape.drift import steadied
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.shape.sensing import Sensed, sense
-from twin.shape.skin import Skin
+from twin.soft.skin import Skin
 from twin.soft.statics import single_thread, turned
 
 PLAIN = Bands()

@@ -220,7 +220,7 @@ def _path(
     statics, shapes = started.statics, u.reshape(len(u), -1, 3)
     return SoftPath(
         tension=tension, path=length - started.trial.hanging + statics.straight_path, markers=statics.markers(shapes), ended=ended,
-        status=status, q=u, others=statics.sensed(shapes),
+        status=status, q=u, others=statics.sensed(shapes, started.problem),
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -17,6 +17,7 @@ from twin.sensors import resistance
 from twin.soft.body import SoftBody
 from twin.soft.newton import Found, Kept, Way, along
 from twin.soft.room import parts_of, room_for, undeformed
+from twin.soft.skin import Skin, stand
 
 SMALLEST = 1e-3  # of a step between two samples
 REMEMBERED = 64  # trials, of some 300 kB
@@ -27,7 +28,8 @@ CLOSE = 2e-8  # m: a step after which a shape counts as found; with it goes some
 class SoftPath(Path):
     """`q` (n, nq) are the displacements of the free nodes, m; `LU` (n, nq, nq) the inverses of their tangents, m/N, in single
     precision. `of` is a hash of what was solved: who asks the same again is answered from here. `others`: "strain" (n, s) of the
-    cords, "sensor" (n, s) ohm and "sensor_rest", at no strain."""
+    cords, "sensor" (n, s) ohm and "sensor_rest", at no strain; "skin" (n, k) m, where patches seen by a camera
+    should be, as in `twin.measurements.patches`."""
 
     of: bytes = b""
 
@@ -49,6 +51,10 @@ class SoftStatics:
         self._seen, self._cords = grid.weights(body.seen), grid.weights(body.cord_paths.reshape(-1, 3))
         self._cord_rest = np.linalg.norm(np.diff(body.cord_paths, axis=1), axis=2).sum(axis=1)
 
+    @cached_property
+    def skin(self) -> Skin:
+        return Skin.of(self.body)
+
     @property
     def n_slow(self) -> int:
         return self.parts.cells.weight.size * 6
@@ -66,16 +72,16 @@ class SoftStatics:
             asked = trial.asked()
             if isinstance(near, SoftPath) and near.of == asked != b"":
                 u = near.q.reshape(len(near.q), -1, 3)  # what differs is only how it is seen and sensed
-                return replace(near, markers=self.markers(u), others=self.sensed(u))
+                return replace(near, markers=self.markers(u), others=self.sensed(u, problem))
             cold = asked != b"" and near is None and not problem.keep
             if cold and (found := _SOLVED.get((asked, problem.tolerance))) is not None:
                 u = found.q.reshape(len(found.q), -1, 3)
-                return replace(found, markers=self.markers(u), others=self.sensed(u))
+                return replace(found, markers=self.markers(u), others=self.sensed(u, problem))
             trial.run()
         u = trial.found.u.reshape(len(trial.found.u), -1, 3)
         path = SoftPath(
             tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self.markers(u),
-            status=trial.status, q=trial.found.u, others=self.sensed(u), LU=trial.inverses(),
+            status=trial.status, q=trial.found.u, others=self.sensed(u, problem), LU=trial.inverses(),
             of=asked if trial.status.all() else b"",
         )  # fmt: skip
         if cold and path.of:
@@ -90,11 +96,15 @@ class SoftStatics:
         own = np.concatenate([self.body.seen + self._seen @ u, tip[:, None]], axis=1)
         return own @ turned(self.body.turn).T
 
-    def sensed(self, u: np.ndarray) -> dict[str, np.ndarray]:
-        """What the cords feel of nodes' displacements u (n, n_free, 3) m, by group as in `SoftPath.others`."""
+    def sensed(self, u: np.ndarray, problem: Problem | None = None) -> dict[str, np.ndarray]:
+        """What the cords feel of nodes' displacements u (n, n_free, 3) m, and where a problem's clouds should be, by group as in
+        `SoftPath.others`."""
         strain = self.strain(self.cords(u))
         rest = np.broadcast_to(self.body.cords.rest, strain.shape)
-        return {"strain": strain, "sensor": resistance(strain, self.body.cords), "sensor_rest": rest}
+        felt = {"strain": strain, "sensor": resistance(strain, self.body.cords), "sensor_rest": rest}
+        if problem is None or problem.seen is None:
+            return felt
+        return felt | {"skin": stand(self.skin, problem.seen, problem.time, u, turned(self.body.turn))}
 
     def cords(self, u: np.ndarray) -> np.ndarray:
         """Paths (n, s, p, 3) m of the cords in the finger's own frame at nodes' displacements u (n, n_free, 3) m."""

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from twin.soft import Cone, SoftBody
+from twin.measurements.patches import PATCHES, Patches
+from twin.soft.body import SoftBody
+from twin.soft.lattice import Cone
 
-LOOKS = np.array([-np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # the camera's direction in the base frame
 RINGS, AROUND, FACE = 41, 48, 5
 RIM = slice((RINGS - 1) * AROUND, RINGS * AROUND)  # the last ring of the mantle
 GRAZING = -0.05  # cosine from which a point may be seen: a little beyond the edge, where noise puts points
@@ -64,9 +65,10 @@ def _rings(radius: np.ndarray, z: np.ndarray) -> np.ndarray:
     )
 
 
-def facing(normals: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(m,) whether skin with these normals in the own frame, turned by `turn` (3, 3), may be seen."""
-    return -(normals @ turn.T @ LOOKS) > GRAZING
+def facing(normals: np.ndarray, turn: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """(m,) whether skin with these normals in the own frame, turned by `turn` (3, 3), may be seen from `side` (3,) of the base
+    frame; all of it where that is zero."""
+    return normals @ (side @ turn) > GRAZING
 
 
 def distances(cloud: np.ndarray, x: np.ndarray, normals: np.ndarray, visible: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -74,3 +76,20 @@ def distances(cloud: np.ndarray, x: np.ndarray, normals: np.ndarray, visible: np
     seen = np.flatnonzero(visible)
     nearest = seen[KDTree(x[seen]).query(cloud)[1]]
     return ((cloud - x[nearest]) * normals[nearest]).sum(axis=1), nearest
+
+
+def stand(skin: Skin, seen: Patches, time: np.ndarray, u: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Where the patches of clouds should stand, (n, PATCHES) m on samples at time (n,) s with nodes' displacements u (n, n_free, 3)
+    m: where they do, less the median distance of their points from the visible skin. Between two samples the shape goes straight,
+    and between two frames what is shown."""
+    frames, should = np.flatnonzero((seen.time >= time[0]) & (seen.time <= time[-1])), np.zeros((len(seen.time), PATCHES))
+    for f in frames:
+        i = min(int(np.searchsorted(time, seen.time[f], side="right")) - 1, len(time) - 2)
+        share = (seen.time[f] - time[i]) / (time[i + 1] - time[i])
+        x, normals = skin.at((1.0 - share) * u[i] + share * u[i + 1])
+        d = distances(seen.points[f] @ turn, x, normals, facing(normals, turn, seen.side))[0]
+        for j in np.flatnonzero(np.isfinite(seen.place[f])):
+            should[f, j] = seen.place[f, j] - np.median(d[seen.of[f] == j])
+    if not len(frames):
+        return np.zeros((len(time), PATCHES))
+    return np.stack([np.interp(time, seen.time[frames], column) for column in should[frames].T], axis=1)
