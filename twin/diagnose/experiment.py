@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.bench import Bench, Inputs
+from twin.bench import Bench, Inputs, Output
 from twin.calibrate import Evaluation, Fit, Objective
 from twin.diagnose.thresholds import CLEAR, HEAVIEST, HELD, LEAST_LOAD, MOST_RUNS
 from twin.effects import Drive
 from twin.errors import SolveError
 from twin.information import solve
+from twin.measurements import Channel
 from twin.residual import Noise, Whitener
 
 
@@ -94,6 +95,7 @@ def _shown(x: float) -> str:
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
     """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
     rivals = tuple(e.id for e in a.model.twin.effects), tuple(e.id for e in b.model.twin.effects)
+    bench, noise = _foreseen(bench, noise)
     apart = []
     for words, inputs in menu(bench):
         n = len(inputs.time)
@@ -118,6 +120,19 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         if best is None or best.separation < T:
             best = Experiment(words, inputs, T, max(1, int(np.ceil(CLEAR / max(T, 1e-9)))), rivals)
     return best if best is not None and best.repeats <= MOST_RUNS else None
+
+
+def _foreseen(bench: Bench, noise: Noise) -> tuple[Bench, Noise]:
+    """With the tip in place of patches of skin: which points of it a camera will see is not known, but that it tells the tip is."""
+    skin = [j for j, o in enumerate(bench.outputs) if o.group == "skin"]
+    if not skin:
+        return bench, noise
+    senses, sigma = bench.robot.build().senses, float(np.max(noise.sigma[skin]))
+    tip = [Output(Channel(f"tip_{a}", "output", "mm", sigma), "marker", senses[f"tip_{a}"].index, k) for k, a in enumerate("xyz")]
+    keep = [j for j in range(len(bench.outputs)) if j not in skin]
+    outputs = (*(bench.outputs[j] for j in keep), *tip)
+    whole = replace(noise, sigma=np.append(noise.sigma[keep], 3 * [sigma]), rho=np.append(noise.rho[keep], np.zeros(3)))
+    return replace(bench, outputs=outputs), whole
 
 
 def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> float:
