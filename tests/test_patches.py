@@ -1,0 +1,194 @@
+"""Clouds as something to predict: patches cut by the data alone, the camera's side and the points' scatter read off them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from twin import read
+from twin.bench import prepare
+from twin.calibrate import fit
+from twin.diagnose.diagnosis import Settings
+from twin.diagnose.objective import objective_of
+from twin.errors import DataError
+from twin.evaluate import rms
+from twin.measurements import Clouds, Recording, Trial, write
+from twin.measurements.patches import BANDS, PATCHES, cut, scatter, side
+from twin.robots import load
+from twin.soft import SoftBody
+from twin.soft.skin import GRAZING, Skin, stand
+from twin.soft.statics import turned
+from twin.twin import Twin
+
+DAY = Path(__file__).parent / "data/finger_shape"  # of the bench's finite elements; its truth stands beside it
+PHI = np.radians(2.675434478296949)
+AZIMUTH = 0.3  # rad, of the camera
+RADIUS, LENGTH = 7e-3, 0.1
+
+
+def half(rng: np.random.Generator, n: int, azimuth: float = AZIMUTH, spread: float = np.pi / 2) -> np.ndarray:
+    """(n, 3) m of a cylinder, within `spread` of the camera's azimuth."""
+    a = azimuth + rng.uniform(-spread, spread, n)
+    return np.column_stack([RADIUS * np.cos(a), RADIUS * np.sin(a), rng.uniform(0.0, LENGTH, n)])
+
+
+def frames(*points: np.ndarray) -> Clouds:
+    return Clouds(np.concatenate(points), np.cumsum([0, *map(len, points)]), np.arange(float(len(points))))
+
+
+def test_the_camera_is_on_the_side_of_the_points() -> None:
+    found = side([frames(half(np.random.default_rng(0), 4000))])
+    # the mean azimuth of 400 points at the base is known to 0.9 rad / sqrt(400)
+    assert np.arctan2(found[1], found[0]) == pytest.approx(AZIMUTH, abs=0.15)
+    assert np.linalg.norm(found) == pytest.approx(1.0)
+
+
+def test_points_all_around_are_of_no_side() -> None:
+    assert not side([frames(half(np.random.default_rng(0), 4000, spread=np.pi))]).any()
+    assert not side([]).any()
+
+
+@pytest.mark.parametrize("noise", [2e-4, 6e-4])
+def test_the_scatter_of_points_about_a_curved_skin_is_found(noise: float) -> None:
+    """Along the normal, some 900 points 2 mm apart on a radius of 7: 10 % covers what a paraboloid leaves of a cylinder and the
+    median's bias for 10 degrees of freedom (the chi-square's median is 0.93 of its mean)."""
+    rng = np.random.default_rng(1)
+    points = half(rng, 900)
+    outwards = points * [1, 1, 0] / RADIUS
+    assert scatter([frames(points + noise * rng.standard_normal((900, 1)) * outwards)]) == pytest.approx(noise, rel=0.1)
+
+
+def test_patches_are_bands_in_halves() -> None:
+    """Of a cylinder seen straight on: bands of a sixth of its length, each half's median azimuth 45 degrees off the camera's, so
+    that along its direction a patch stands at about R cos(0)."""
+    points = half(np.random.default_rng(2), 6000)
+    camera = np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0.0])
+    seen = cut(frames(points), camera)
+    of = seen.of[0]
+    assert np.unique(of).tolist() == list(range(PATCHES))
+    for band in range(BANDS):
+        there = points[of // 2 == band]
+        # ends of a sixth to the spacing of points, and the radius' share in the distance from the origin at the base
+        assert there[:, 2].min() == pytest.approx(band * LENGTH / BANDS, abs=2e-3)
+    left = np.angle(np.exp(1j * (np.arctan2(points[:, 1], points[:, 0]) - AZIMUTH)))
+    assert ((left > 0.02) == (of % 2 == 1))[np.abs(left) > 0.02].all()
+    # R cos of what is uniform within 45 degrees of the patch's direction: median R cos(22.5 deg)
+    np.testing.assert_allclose(seen.place[0], RADIUS * np.cos(np.pi / 8), rtol=0.02)
+
+
+def test_too_few_points_say_nothing() -> None:
+    seen = cut(frames(half(np.random.default_rng(3), 30)), np.array([1.0, 0.0, 0.0]))
+    assert np.isnan(seen.place).all()
+    assert not len(cut(None, np.array([1.0, 0.0, 0.0])).time)
+
+
+def test_a_frame_stands_on_the_row_next_to_it_and_outside_the_trial_on_none() -> None:
+    points = half(np.random.default_rng(4), 2000)
+    seen = cut(frames(points, points, points), np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0.0]))  # at 0, 1 and 2 s
+    at = seen.at(np.array([0.1, 0.6, 1.2, 1.6]))
+    assert np.isfinite(at).all(axis=1).tolist() == [False, False, True, False]
+
+
+@pytest.fixture(scope="module")
+def finger() -> SoftBody:
+    body = load("finger").build()
+    assert isinstance(body, SoftBody)
+    return body
+
+
+def skin_seen(body: SoftBody, camera: np.ndarray, moved: np.ndarray, n: int = 3000) -> np.ndarray:
+    """(n', 3) m of the cone's own surface (not the twin's mesh of it) that faces the camera, moved by (3,) m."""
+    rng, cone = np.random.default_rng(5), body.cone
+    a, z = rng.uniform(0.0, 2.0 * np.pi, n), rng.uniform(0.0, cone.length, n)
+    outwards = np.column_stack([np.cos(a), np.sin(a), np.zeros(n)])
+    points = cone.radius(z)[:, None] * outwards + np.column_stack([np.zeros((n, 2)), z])
+    return points[outwards @ camera > max(GRAZING, 0.0)] + moved
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-3, -1e-3])
+def test_a_skin_predicted_beside_its_points_is_off_by_how_far_it_is(finger: SoftBody, shift: float) -> None:
+    """Points moved sideways from the camera: each half is off by `shift` sin(azimuth off the camera's), which has a median of
+    sin 45 deg over a half; one half outwards, the other inwards."""
+    camera, across = np.array([0.8, 0.6, 0.0]), np.array([-0.6, 0.8, 0.0])
+    points = skin_seen(finger, camera, shift * across)
+    seen, time = cut(frames(points, points), camera), np.arange(2.0)
+    should = stand(Skin.of(finger), seen, time, np.zeros((2, finger.lattice.n_free, 3)), np.eye(3))
+    off = (seen.place - should)[0].reshape(BANDS, 2)
+    # 0.06 mm: the mesh of the skin is 2 % coarse; 15 %: nearest places slide by the shift itself along a radius of 9 to 15 mm
+    for half_, sign in ((0, -1.0), (1, 1.0)):
+        np.testing.assert_allclose(off[:, half_], sign * shift * np.sin(np.pi / 4), rtol=0.15, atol=6e-5)
+
+
+def test_a_turned_finger_is_looked_at_from_where_the_camera_is(finger: SoftBody) -> None:
+    """A cone looks the same however it is mounted: the same points stand as well on a finger turned by 40 degrees."""
+    camera = np.array([1.0, 0.0, 0.0])
+    seen, time = cut(frames(skin_seen(finger, camera, np.zeros(3))), camera), np.arange(2.0)
+    should = stand(Skin.of(finger), seen, time, np.zeros((2, finger.lattice.n_free, 3)), turned(0.7))
+    np.testing.assert_allclose(should[0], seen.place[0], atol=6e-5)
+
+
+@pytest.fixture(scope="module")
+def day() -> Recording:
+    whole = read(DAY)
+    return replace(whole, trials=tuple(t for t in whole.trials if t.clouds is not None and not t.other))
+
+
+def angle(data: Recording) -> tuple[float, float, float]:
+    """The mounting angle (rad) fitted to a day without markers, the error of its skin before and after (m)."""
+    robot = load("finger")
+    bench = prepare(data, robot)
+    every = list(range(len(bench.inputs)))
+    first, objective, _ = objective_of(bench, Twin.of(robot), every, Settings(jobs=1))
+    found = fit(objective, first, refresh=True)
+    nominal = [bench.measured[k] - y for k, y in zip(every, objective.predict(Twin.of(robot))[1], strict=True)]
+    before, after = rms(bench, nominal, "skin"), rms(bench, found.evaluation.raw, "skin")
+    return found.model.twin.values["mounting.angle"], before, after
+
+
+def test_clouds_alone_tell_how_a_finger_is_mounted(day: Recording) -> None:
+    """By the finite elements' clouds, turned by 4 degrees more, no marker beside them: to 0.5 degrees (patches of 0.2 mm on a tip
+    that travels 30 mm). As described the finger is off by 6.7 degrees."""
+    more = np.radians(4.0)
+    trials = []
+    for t in day.trials:
+        assert t.clouds is not None
+        clouds = Clouds(t.clouds.points @ turned(more).T, t.clouds.offsets, t.clouds.time)
+        some = slice(0, len(t.time) // 2)
+        trials.append(replace(t, time=t.time[some], values={n: v[some] for n, v in t.values.items()}, clouds=clouds))
+    found, before, after = angle(replace(day, trials=tuple(trials)))
+    assert found == pytest.approx(PHI + more, abs=np.radians(0.5))
+    assert after < 1.5e-4 < 2e-4 < before
+
+
+def test_beside_markers_clouds_are_not_fitted(day: Recording) -> None:
+    robot = load("finger")
+    assert any(o.group == "skin" for o in prepare(day, robot).outputs)
+    trial = day.trials[0]
+    channels = (*day.channels, *(type(day.channels[0])(f"tip_{a}", "output", "mm", 2e-4) for a in "xyz"))
+    seen = {**trial.values, **{f"tip_{a}": np.zeros(len(trial.time)) for a in "xyz"}}
+    marked = replace(day, channels=channels, trials=(replace(trial, values=seen),))
+    assert not any(o.group == "skin" for o in prepare(marked, robot).outputs)
+
+
+def test_clouds_from_all_around_are_said_to_be_left_out(day: Recording) -> None:
+    rng = np.random.default_rng(6)
+    around = [half(rng, 500, spread=np.pi) for _ in day.trials[0].clouds.time]  # type: ignore[union-attr]
+    bench = prepare(replace(day, trials=(replace(day.trials[0], clouds=replaced(day.trials[0], around)),)), load("finger"))
+    assert not any(o.group == "skin" for o in bench.outputs)
+    assert any("do not show one side" in notice for notice in bench.notices)
+
+
+def replaced(trial: Trial, points: list[np.ndarray]) -> Clouds:
+    assert trial.clouds is not None
+    return Clouds(np.concatenate(points), np.cumsum([0, *map(len, points)]), trial.clouds.time)
+
+
+def test_no_file_has_patches_as_a_channel(day: Recording, tmp_path: Path) -> None:
+    write(day, tmp_path / "set")
+    toml = tmp_path / "set/measurements.toml"
+    toml.write_text(toml.read_text().replace('"sensor_1_resistance"', '"skin_1"').replace('"ohm"', '"mm"', 1))
+    with pytest.raises(DataError, match="skin_1 is made from point clouds"):
+        read(tmp_path / "set")
