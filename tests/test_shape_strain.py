@@ -114,6 +114,34 @@ def test_estimators_keep_the_contract(name: str, aligned: Aligned) -> None:
 
 
 @LAWS
+def test_a_row_that_follows_none_starts_anew(name: str, aligned: Aligned) -> None:
+    """Whatever stands above it; and a finger that has stood still is estimated as one that is seen for the first time. To 5 um: the
+    static solve starts from the row above."""
+    law = estimator(name)(aligned.twin)
+    rest, bent = np.full(4, 0.003), np.array([0.03, -0.02, -0.03, 0.02])
+    long = np.full((4, 4), -15e-3)
+    rows = Felt(np.stack([rest, rest, bent, bent]), long, follows=np.array([False, True, False, True]))
+    moved = law.estimate(rows).moved
+    alone = law.estimate(Felt(bent[None], long[:1])).moved[0]
+    np.testing.assert_allclose(moved[2], alone, atol=5e-6)
+    np.testing.assert_allclose(moved[3], alone, atol=5e-6)
+
+
+def test_folding_remembers_three_rows(aligned: Aligned) -> None:
+    """What was felt up to three rows before counts, what was before that does not."""
+    law = estimator("folding")(aligned.twin)
+    rest, bent = np.full(4, 0.003), np.array([0.03, -0.02, -0.03, 0.02])
+
+    def after(*before: np.ndarray) -> np.ndarray:
+        rows = np.stack([*before, bent])
+        return law.estimate(Felt(rows, np.full((len(rows), 4), -15e-3), follows=np.arange(len(rows)) > 0)).moved[-1]
+
+    still = after(bent, bent, bent)
+    np.testing.assert_allclose(after(rest, bent, bent, bent), still, atol=1e-12)
+    assert all(np.abs(after(*x) - still).max() > 1e-5 for x in ([rest, bent, bent], [bent, rest, bent], [bent, bent, rest]))
+
+
+@LAWS
 def test_a_hanging_finger_is_straight(name: str, aligned: Aligned) -> None:
     """At the strain that its weight makes; the networks may be off by their own error at small shapes, 0.2 to 0.3 mm. One trained
     without correspondence is left out: its points may slide along the skin."""

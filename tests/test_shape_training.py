@@ -15,6 +15,8 @@ from twin.errors import DataError, UnknownNameError
 from twin.factory.draw import LENGTH
 from twin.robots import load
 from twin.shape.estimator import Z90, Felt, estimators
+from twin.shape.features import STRAIN, recalled
+from twin.shape.folding import BACK, LAG, FoldingLesson
 from twin.shape.learned import Learned
 from twin.shape.lesson import Lesson, disturbed
 from twin.shape.lesson import load as samples
@@ -89,6 +91,43 @@ def test_the_card_says_what_was_done_and_the_band_holds_held_out_fingers(name: s
     true = np.einsum("pn,bnc->bpc", data.weights, data.nodes[held].reshape(len(held), -1, 3))
     inside = np.linalg.norm(found.moved - true, axis=2) < Z90 * found.std
     assert inside.mean() > 0.85  # 90 % by construction but for another draw of the noise
+
+
+def test_rows_before_are_those_of_the_chain() -> None:
+    """Two runs of rows; the first row of a run stands for what was before it."""
+    x = np.arange(6.0)[:, None]
+    follows = np.array([False, True, True, False, True, True])
+    np.testing.assert_array_equal(recalled(x, follows, 2)[..., 0], [[0, 0, 1, 3, 3, 4], [0, 0, 0, 3, 3, 3]])
+    np.testing.assert_array_equal(recalled(x, None, 2)[..., 0], [range(6), range(6)])
+
+
+def test_a_history_is_felt_along_the_chain(shapes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With no errors of sensors and rows half a sample apart, before are half-way points and the sample before; a lagging sensor
+    differs from them by the recursion's own share."""
+    data = samples(shapes, load("finger"))
+    lesson = FoldingLesson(data)
+    first = np.flatnonzero(data.before == np.arange(len(data.before)))
+    assert (first % LENGTH == 0).all()
+    assert len(first) == CHAINS
+    way = lesson._way(np.array([5, 1, 0]), np.array([0.5, 1.0, 0.7]))
+    s = data.strain
+    np.testing.assert_allclose(way[:, 0], [s[5], (s[5] + s[4]) / 2, s[4], (s[4] + s[3]) / 2], atol=1e-12)
+    np.testing.assert_allclose(way[:, 1], [s[1], s[0], s[0], s[0]], atol=1e-12)
+    np.testing.assert_allclose(way[:, 2], np.tile(s[0], (4, 1)), atol=1e-12)
+    for name in ("GAIN_NOISE", "OFFSET_NOISE"):
+        monkeypatch.setattr(f"twin.shape.lesson.{name}", 0.0)
+    monkeypatch.setattr("twin.shape.folding.STRAIN_NOISE", 0.0)
+    pick = np.arange(LENGTH - 4, LENGTH).repeat(50)
+    monkeypatch.setattr("twin.shape.folding.FRESH", 1.0)
+    shown = lesson._felt(np.random.default_rng(0), pick, data.pushed[pick], 0.0)
+    np.testing.assert_allclose(shown[:, :4] * STRAIN, s[pick], atol=1e-8)  # single precision
+    assert not shown[:, -4 * BACK :].any()  # nothing before: no row differs
+    monkeypatch.setattr("twin.shape.folding.FRESH", 0.0)
+    shown = lesson._felt(np.random.default_rng(0), pick, data.pushed[pick], 0.0)
+    short = np.abs(shown[:, :4] * STRAIN - s[pick])
+    furthest = np.abs(s[pick] - lesson._way(pick, np.ones(len(pick)))).max(axis=0)  # a lagging strain lies among those passed
+    assert (short <= LAG * furthest + 1e-8).all()
+    assert np.quantile(short / furthest, 0.9) > 0.05 * LAG  # the way of a step, not of all three, is most of it
 
 
 class Overlearned(Lesson):

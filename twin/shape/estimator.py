@@ -27,11 +27,13 @@ OWN, SHARE = 5e-5, 0.013  # m, and of its way: the twin's error at a point, agai
 @dataclass(frozen=True)
 class Felt:
     """What is felt: strain (n, s) of the cords, NaN where a sensor is missing; displacement (n, t) m of the tendons, of the hanging
-    finger; `pushed`: something may be pressing."""
+    finger; `pushed`: something may be pressing; `follows` (n,): whether a row comes right after the one above it, for estimators
+    that remember (None: no row does)."""
 
     strain: np.ndarray
     displacement: np.ndarray
     pushed: bool = True
+    follows: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.strain)
@@ -55,7 +57,8 @@ def own_error(moved: np.ndarray) -> np.ndarray:
 
 
 class Estimator(ABC):
-    """Base of all estimators. One is made for a twin (a robot with its calibrated numbers) and remembers nothing between calls."""
+    """Base of all estimators. One is made for a twin (a robot with its calibrated numbers) and remembers nothing between calls:
+    what is to be remembered stands in the rows above (`Felt.follows`), and a row that follows none starts anew."""
 
     about: ClassVar[str]
 

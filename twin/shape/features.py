@@ -16,6 +16,17 @@ def features(strain: np.ndarray, displacement: np.ndarray, pushed: np.ndarray | 
     return np.concatenate(parts, axis=1, dtype=np.float64)
 
 
+def recalled(strain: np.ndarray, follows: np.ndarray | None, back: int) -> np.ndarray:
+    """(back, n, s): the strains of the 1 to `back` rows before each of (n, s); where nothing is before, those of the first."""
+    row = np.arange(len(strain))
+    started = np.ones(len(strain), bool) if follows is None else ~np.asarray(follows, bool)
+    found = []
+    for _ in range(back):
+        row = np.where(started[row] | (row == 0), row, row - 1)
+        found.append(strain[row])
+    return np.stack(found)
+
+
 def lengths(displacement: np.ndarray) -> np.ndarray:
     """(n, t) of displacements (n, t) m."""
     return np.maximum(displacement, SLACK) / LENGTH

@@ -40,7 +40,7 @@ DOUBT = 0.3  # of the free motions are shown as if something might press
 class Data:
     """Converged samples: strain (n, s), displacement (n, t) m, free nodes' displacements (n, 3 n_free) m, whether a hand is on the
     finger (n,), which are held out (n,); and of the finger its points, their weights (P, n_free), its skin, and the strains (s,) of
-    its hanging rest. tension (n, t) N of the tendons."""
+    its hanging rest. tension (n, t) N of the tendons. `before` (n,): the sample before in its chain, of the first itself."""
 
     strain: np.ndarray
     displacement: np.ndarray
@@ -52,6 +52,7 @@ class Data:
     weights: np.ndarray
     skin: Skin
     hanging: np.ndarray
+    before: np.ndarray
 
     @property
     def pushed(self) -> np.ndarray:
@@ -74,7 +75,10 @@ def load(folder: Path, robot: Robot) -> Data:
         raise DataError(f"{folder}: fewer than {HELD_OUT} fingers of {CHAIN} samples; none can be held out, ask for more samples")
     nodes, kind = d["nodes"][good].astype(np.float32), d["kind"][good].astype(str)
     felt = d["strain"][good], d["command"][good], d["tension"][good]
-    return Data(*felt, nodes, kind, held, points, weights, Skin.of(body), _hanging(robot, body))
+    sample, here = d["sample"][good], np.arange(len(held))
+    goes_on = (np.diff(sample, prepend=-2) == 1) & (sample % CHAIN > 0)  # one that did not converge breaks its chain
+    before = np.where(goes_on, here - 1, here)
+    return Data(*felt, nodes, kind, held, points, weights, Skin.of(body), _hanging(robot, body), before)
 
 
 def _hanging(robot: Robot, body: SoftBody) -> np.ndarray:
@@ -87,12 +91,26 @@ def _hanging(robot: Robot, body: SoftBody) -> np.ndarray:
 
 def disturbed(rng: np.random.Generator, data: Data, pick: np.ndarray, dead: float = DEAD) -> tuple[np.ndarray, np.ndarray]:
     """Strains (b, s) and displacements (b, t) m of samples as they would be felt, some sensors missing."""
-    strain, s = data.strain[pick], data.strain.shape[1]
-    strain = strain * (1.0 + GAIN_NOISE * rng.normal(size=strain.shape)) + OFFSET_NOISE * rng.normal(size=strain.shape)
+    strain = misread(rng, data.strain[pick])
     strain = strain + STRAIN_NOISE * rng.normal(size=strain.shape)
-    lost = rng.uniform(size=len(pick)) < dead
-    strain[lost, rng.integers(0, s, int(lost.sum()))] = np.nan
-    return strain, data.displacement[pick] + LENGTH_NOISE * rng.normal(size=data.displacement[pick].shape)
+    return with_dead(rng, strain, dead), displaced(rng, data, pick)
+
+
+def misread(rng: np.random.Generator, strain: np.ndarray) -> np.ndarray:
+    """Strains (b, s) by sensors whose gain and zero are not quite known."""
+    return strain * (1.0 + GAIN_NOISE * rng.normal(size=strain.shape)) + OFFSET_NOISE * rng.normal(size=strain.shape)
+
+
+def with_dead(rng: np.random.Generator, strain: np.ndarray, share: float) -> np.ndarray:
+    """Strains (b, s), one of them missing in a share of the rows; changed in place."""
+    lost = rng.uniform(size=len(strain)) < share
+    strain[lost, rng.integers(0, strain.shape[1], int(lost.sum()))] = np.nan
+    return strain
+
+
+def displaced(rng: np.random.Generator, data: Data, pick: np.ndarray) -> np.ndarray:
+    """Displacements (b, t) m of samples as motors read them."""
+    return data.displacement[pick] + LENGTH_NOISE * rng.normal(size=data.displacement[pick].shape)
 
 
 def shown(rng: np.random.Generator, data: Data, pick: np.ndarray) -> np.ndarray:
@@ -110,6 +128,15 @@ class Lesson(ABC):
     def __init__(self, data: Data) -> None:
         self.data = data
         self.inputs = 2 * data.strain.shape[1] + data.displacement.shape[1] + 1
+
+    def shown(self, rng: np.random.Generator, pick: np.ndarray) -> np.ndarray:
+        """Features (b, f) of samples to learn from, in single precision."""
+        return shown(rng, self.data, pick)
+
+    def asked(self, rng: np.random.Generator, held: np.ndarray) -> np.ndarray:
+        """Features (b, f) of held-out samples, each disturbed once and for all."""
+        felt = disturbed(rng, self.data, held, dead=0.0)
+        return features(*felt, self.data.pushed[held]).astype(np.float32)
 
     @abstractmethod
     def network(self) -> torch.nn.Module:

@@ -50,7 +50,7 @@ def judged(shapes: Shapes, contact: str | None, law: Estimator, bands: Bands) ->
 
 
 def felt(trial: Sensed, estimator: Estimator) -> Felt:
-    return Felt(trial.strain(estimator.body.cords), trial.displacement, trial.pushed)
+    return Felt(trial.strain(estimator.body.cords), trial.displacement, trial.pushed, np.arange(len(trial.time)) > 0)
 
 
 class SkinOf:

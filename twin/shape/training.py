@@ -22,10 +22,9 @@ from threadpoolctl import threadpool_limits
 from twin.errors import DataError, TwinError
 from twin.robots import Robot
 from twin.shape.estimator import estimator, estimators
-from twin.shape.features import features
 from twin.shape.judge import card_of, judged
 from twin.shape.learned import Learned
-from twin.shape.lesson import Lesson, disturbed, load, shown
+from twin.shape.lesson import Lesson, load
 from twin.shape.weights import write_weights
 
 if TYPE_CHECKING:
@@ -123,7 +122,7 @@ def train(lesson: Lesson, checkpoint: Checkpoint, progress: Callable[[str], None
     optimizer = torch.optim.AdamW(net.parameters(), lr=lesson.rate, weight_decay=1e-5)
     chosen, held = np.flatnonzero(~data.held), np.flatnonzero(data.held)
     held = held[:: -(-len(held) // JUDGED)]
-    seen = torch.from_numpy(_held_out(lesson, held, way.seed))
+    seen = torch.from_numpy(lesson.asked(np.random.default_rng([way.seed, 2**31]), held))
     state: dict[str, Any] = {"epoch": 0, "best": math.inf, "at": 0, "weights": None}
     if (found := checkpoint.read()) is not None:
         state = {name: found[name] for name in state}
@@ -157,16 +156,10 @@ def _epoch(
     for b in range(steps):
         pick = order[b * size : (b + 1) * size]
         optimizer.param_groups[0]["lr"] = lesson.rate * 0.5 * (1.0 + math.cos(math.pi * (begun + share * b / steps)))
-        loss = lesson.loss(net, torch.from_numpy(shown(rng, lesson.data, pick)), pick, rng)
+        loss = lesson.loss(net, torch.from_numpy(lesson.shown(rng, pick)), pick, rng)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-
-
-def _held_out(lesson: Lesson, held: np.ndarray, seed: int) -> np.ndarray:
-    """Features of held-out samples, each disturbed once and for all."""
-    felt = disturbed(np.random.default_rng([seed, 2**31]), lesson.data, held, dead=0.0)
-    return features(*felt, lesson.data.pushed[held]).astype(np.float32)
 
 
 def digest(folder: Path) -> str:
