@@ -13,7 +13,7 @@ from twin.report.sections.section import Section, Story
 from twin.report.sentence import labels
 from twin.report.stages import before_and_after, markers, residuals
 
-ROW = 170
+ROW, LONG = 170, 16  # pixels; letters
 
 
 def section(story: Story) -> Section:
@@ -58,12 +58,18 @@ def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
     out = figure(list(grid.data), height, **{a: grid.layout[a] for a in grid.layout if a.startswith(("xaxis", "yaxis"))})
     for row, j in enumerate(columns, 1):
         out.update_yaxes(
-            title_text=f"{d.bench.outputs[j].channel.name} ({unit})", selector={"anchor": "x" if row == 1 else f"x{row}"}
+            title_text=f"{_in_lines(d.bench.outputs[j].channel.name)} ({unit})", selector={"anchor": "x" if row == 1 else f"x{row}"}
         )
     out.update_yaxes(title_text=f"error ({unit})", rangemode="tozero", selector={"anchor": f"x{n_row}"})
     out.update_xaxes(title_text="time (s)", selector={"anchor": f"y{n_row}"})
-    out.update_layout(hovermode="x", margin_l=72)
+    out.update_layout(hovermode="x", margin_l=84)
     return Plot(f"Time series of {plain(labels(d, (k,))[0])}", height, out)
+
+
+def _in_lines(name: str) -> str:
+    """A long name in two lines: one is as long as a panel is high."""
+    first, _, last = name.rpartition("_")
+    return f"{first}<br>{last}" if len(name) > LONG else name
 
 
 def _line(x: np.ndarray, y: np.ndarray, name: str, color: str, legend: bool) -> go.Scatter:
