@@ -11,6 +11,7 @@ import pytest
 from tests.test_design import bench
 from tools.bench.design import bench_day
 from twin.diagnose import Settings, pipeline
+from twin.diagnose.budget import Budget
 from twin.diagnose.pipeline import conclude
 from twin.diagnose.split import blind
 
@@ -26,7 +27,9 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         monkeypatch.setattr(pipeline, name, run)
 
     screening: Any = SimpleNamespace(patterns="patterns", bars="bars")
-    stage("calibrate", ("study", "base", ["a note"]))
+    study = SimpleNamespace(budget=Budget(0.0))
+    assert not study.budget.allows("friction")
+    stage("calibrate", (study, "base", ["a note"]))
     stage("screen", screening)
     stage("search", "found")
     stage("choose", "chosen")
@@ -36,13 +39,15 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
     made = conclude("bench", "twin", [2], "nominal", settings, "progress")  # type: ignore[arg-type]
     assert got == {
         "calibrate": ("bench", "twin", [2], "nominal", settings, "progress"),
-        "screen": ("study", "base", 7),
-        "search": ("study", "base", "patterns", "bars"),
-        "choose": ("study", "found", "bars"),
-        "gate": ("study", "chosen", screening),
-        "judge": ("study", "chosen", "gated", "bars"),
+        "screen": (study, "base", 7),
+        "search": (study, "base", "patterns", "bars"),
+        "choose": (study, "found", "bars"),
+        "gate": (study, "chosen", screening),
+        "judge": (study, "chosen", "gated", "bars"),
     }
-    assert (made.study, made.found, made.gated, made.judged, made.notices) == ("study", "chosen", "gated", "judged", ("a note",))
+    assert (made.study, made.found, made.gated, made.judged) == (study, "chosen", "gated", "judged")
+    assert made.notices[0] == "a note"
+    assert "not tried: friction" in made.notices[1]
 
 
 def test_what_was_measured_on_sealed_trials_is_not_there() -> None:

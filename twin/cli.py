@@ -46,6 +46,9 @@ class Diagnose:
     ] = None
     jobs: Annotated[int, arg(help="worker threads")] = cores()
     seed: Annotated[int, arg(help="draws the sealed trials and the no-effect sets")] = 0
+    budget: Annotated[
+        str | None, arg(help='time to try effects in, such as "60s": the best answer until then, and what was not tried')
+    ] = None
 
     def run(self) -> None:
         from twin import report
@@ -54,7 +57,7 @@ class Diagnose:
         recording, twin = _load(self.set, self.twin)
         if self.out.exists() and not self.out.is_dir():
             raise DataError(f"{self.out} is a file; give a folder for the report with --out")
-        settings = Settings(seed=self.seed, jobs=self.jobs)
+        settings = Settings(self.seed, self.jobs, _seconds(self.budget))
         with working(f"diagnosing {recording.title}") as progress:
             diagnosis = diagnose(recording, twin, settings, progress, lambda s: out.print(report.suspected(s)) if s else None)
             progress("writing the report")
@@ -296,6 +299,18 @@ class Effects:
             names = [*(p.name for p in law.parameters), *(f"{p.name}_i" for p in law.per_tendon)]
             table.add_row(name, first.partition(": ")[2].rstrip("."), ", ".join(names), law.moves_with)
         out.print(table)
+
+
+def _seconds(budget: str | None) -> float | None:
+    """Of "60s". Raises DataError for what is no time above zero."""
+    from twin.measurements.quantity_strings import quantity
+
+    if budget is None:
+        return None
+    found = quantity(budget, "s")
+    if not found > 0.0:
+        raise DataError(f"--budget {budget}: no time to try anything in; give more than zero, such as 60s")
+    return found
 
 
 def _load(folder: Path | None, twin: str | None) -> tuple[Any, Any]:

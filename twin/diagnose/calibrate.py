@@ -8,6 +8,7 @@ import numpy as np
 
 from twin.bench import Bench
 from twin.calibrate import fit
+from twin.diagnose.budget import Budget
 from twin.diagnose.diagnosis import Settings
 from twin.diagnose.evidence import Evidence
 from twin.diagnose.objective import objective_of
@@ -25,10 +26,11 @@ def calibrate(
 
     `nominal` (n_k, n_output) is the uncalibrated prediction. From here on what was measured on sealed trials is not there.
     """
+    budget = Budget(settings.budget)
     fitted = [k for k in range(len(bench.inputs)) if k not in sealed]
     bench, alone = without_spikes(blind(bench, sealed), nominal)
     progress("noise")
     start, objective, notes = objective_of(bench, twin, fitted, settings)
-    study = Study(objective, Evidence(bench, fitted), progress)
+    study = Study(objective, Evidence(bench, fitted), progress, budget)
     progress("calibration")
     return study, weigh(study, fit(objective, start, refresh=True)), [*alone, *notes]

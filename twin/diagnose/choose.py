@@ -20,7 +20,11 @@ def choose(study: Study, found: Search, bars: Thresholds) -> Search:
     if halved(study, found.base, best):
         return Search(found.base, best, found.all)
     core = most_predictive(study, found)
-    return beside(study, core, found, bars) if core else Search(found.base, best, found.all)
+    if core is None:
+        return Search(found.base, best, found.all)
+    if not study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
+        return Search(found.base, core, found.all)
+    return beside(study, core, found, bars)
 
 
 def predicting(study: Study, found: Search, accept: float) -> Weighed:

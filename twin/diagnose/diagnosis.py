@@ -19,10 +19,12 @@ from twin.twin import Twin
 
 @dataclass(frozen=True)
 class Settings:
-    """How a diagnosis is run: seed of the split and of the no-effect sets, worker threads."""
+    """How a diagnosis is run: seed of the split and of the no-effect sets, worker threads, and for how long (s) sets of effects are
+    tried; with an end to that the answer depends on the machine."""
 
     seed: int = 0
     jobs: int = 2
+    budget: float | None = None
 
 
 @dataclass(frozen=True)

@@ -63,14 +63,14 @@ def diagnose(
     if n >= FEW:
         found = conclude(bench, twin, looked.sealed, nominal, settings, progress)
         return _reported(looked, twin, found, [(found, looked.sealed)], settings)
-    parts = []
+    parts, share = [], replace(settings, budget=settings.budget and settings.budget / (n + 1))
     for k in range(n):
 
         def told(words: str, k: int = k) -> None:
             progress(f"{n} trials, each sealed in turn and the others diagnosed, {k + 1} of {n}: {words}")
 
-        parts.append((conclude(bench, twin, [k], nominal, settings, told), [k]))
-    found = conclude(bench, twin, [], nominal, settings, lambda words: progress(f"all {n} trials: {words}"))
+        parts.append((conclude(bench, twin, [k], nominal, share, told), [k]))
+    found = conclude(bench, twin, [], nominal, share, lambda words: progress(f"all {n} trials: {words}"))
     return _reported(looked, twin, found, parts, settings)
 
 
@@ -82,7 +82,7 @@ def conclude(
     screening = screen(study, base, settings.seed)
     found = choose(study, search(study, base, screening.patterns, screening.bars), screening.bars)
     gated = gate(study, found, screening)
-    return Conclusion(study, screening, found, gated, judge(study, found, gated, screening.bars), tuple(notes))
+    return Conclusion(study, screening, found, gated, judge(study, found, gated, screening.bars), (*notes, *study.budget.words()))
 
 
 def _reported(

@@ -55,7 +55,10 @@ def _extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bar
     for candidate in rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks):
         if candidate.gain < max(bars.accept, PROMISE * _material(study, base, member, bars.visible)):
             continue
-        study.progress(f"{' + '.join((*member.effects, candidate.effect))}")
+        name = " + ".join((*member.effects, candidate.effect))
+        if not study.budget.allows(name):
+            continue
+        study.progress(name)
         beat = HOPELESS * min((w.fit.cost for w in fresh.values()), default=np.inf)
         found = extended(study, member, candidate.effect, candidate.start, beat)
         if found is not None and (found.effects not in fresh or better(found, fresh[found.effects])):

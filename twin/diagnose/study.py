@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from twin.bench import Bench
 from twin.calibrate import Fit, Objective
+from twin.diagnose.budget import Budget
 from twin.diagnose.evidence import Evidence
 
 Progress = Callable[[str], None]
@@ -28,6 +29,7 @@ class Study:
     objective: Objective
     evidence: Evidence
     progress: Progress = silent
+    budget: Budget = field(default_factory=Budget)
 
     def fall(self, before: Fit, after: Fit) -> np.ndarray:
         """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""

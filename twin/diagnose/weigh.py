@@ -54,6 +54,8 @@ def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float
         free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
         if not richer or set(richer) <= set(free) or not catalogue()[effect].richer_needs <= parts:
             continue
+        if not study.budget.allows(f"the fuller law of {effect}"):
+            continue
         study.progress(f"fuller law of {effect}")
         table = {p.name: p for p in catalogue()[effect].declared(n_tendon)}
         law = next(e for e in found.fit.model.twin.effects if e.id == effect)
