@@ -29,7 +29,7 @@ from twin.shape.band import Bands, Behind, widened_by
 from twin.shape.cloud_fit import BEYOND, CLOUD, CloudFit
 from twin.shape.estimator import Felt, estimators
 from twin.shape.modal import Network
-from twin.shape.sensing import Sensed, sense
+from twin.shape.sensing import Sensed, feeling, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
 from twin.shape.skin import Skin, distances, facing
 from twin.soft import SoftBody, SoftStatics
@@ -80,8 +80,7 @@ def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = la
 def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) -> Aligned:
     begun = time.perf_counter()
     shown, notices = _shown(recording, twin)
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = feeling(twin)
     skin = Skin.of(body)
     progress("turning the finger onto its clouds")
     before = _misfit(skin, shown, body.turn)
@@ -150,8 +149,7 @@ def _angle(skin: Skin, shown: Sequence[Shown], twin: Twin) -> tuple[float, float
 
 def _known(shown: Sequence[Shown], fit: CloudFit, statics: SoftStatics, net: Network, twin: Twin) -> Known:
     """Strains that the shapes have, and resistances measured there."""
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = feeling(twin)
     parts = []
     for trial in shown:
         if trial.nodes is not None:
@@ -195,8 +193,7 @@ def _strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.
 
 def _behind(trial: Shown, fit: CloudFit, net: Network, twin: Twin) -> Behind:
     """The named points behind a pushed trial's clouds."""
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = feeling(twin)
     felt, found, at = _fitted(trial, fit, net, body)
     weights = body.lattice.weights(named_points(twin.robot).rest)
     moved = np.einsum("pn,fnc->fpc", weights, net.modes.nodes(np.stack([z for z, _ in found])))
