@@ -119,6 +119,17 @@ def test_a_lag_of_a_step_and_of_a_ramp() -> None:
     assert late == pytest.approx(60.0 - 3.0, rel=1e-9)
 
 
+def test_a_late_share_of_strain_comes_exponentially_whenever_rows_were_taken() -> None:
+    """A sudden strain e: read is e (1 - share exp(-t / tau)), t since the row before it, at rows of no even spacing."""
+    t, e = np.array([0.0, 0.1, 0.7, 1.9, 2.0, 7.0]), 0.05 * np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    one = np.full((6, 1), 1e3)
+    others = {"sensor": 1e3 * (1.0 + e[:, None]) ** 2, "sensor_rest": one}
+    zero = np.zeros((6, 1))
+    seen = Signals(t, t, zero, zero, np.zeros((6, 0, 3)), t, others=others)
+    read = named("sensor_hysteresis")({"share": 0.2, "time": 1.5}, 1).sense(seen).others["sensor"][:, 0]
+    np.testing.assert_allclose(np.sqrt(read / 1e3) - 1.0, e * (1.0 - 0.2 * np.exp(-t / 1.5)), atol=1e-14)
+
+
 def test_laws_meet_in_the_order_of_the_signal() -> None:
     """A cell with a gain, then a bias: readings are gain T + bias, and undone the other way round."""
     both = Laws((law("load_cell_gain", gain_1=2.0), law("load_cell_bias", bias_1=0.5)))

@@ -10,7 +10,7 @@ import pytest
 
 from twin.diagnose import search as stage
 from twin.diagnose.null import Thresholds
-from twin.diagnose.search import search
+from twin.diagnose.search import _material, search
 
 STUDY: Any = SimpleNamespace(
     objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1)
@@ -72,6 +72,31 @@ def test_an_imitation_that_led_is_dropped_when_the_causes_are_there(monkeypatch:
     worth = {"routing": 600.0, "decoy_a": 350.0, "decoy_b": 340.0, "friction": 300.0, "creep": 280.0}
     found = World(monkeypatch, worth, {"creep+friction": 500.0, "creep+friction+routing": -95.0}).found()
     assert found.best.effects == ("creep", "friction")
+
+
+def test_of_two_the_one_that_the_other_does_without_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Creep promises nothing until routing is there, and is worth as much without it: its set alone is met by dropping."""
+    world = World(monkeypatch, {"routing": 600.0, "creep": 690.0}, {"creep+routing": -595.0})
+
+    def rank(*asked: Any) -> list[Any]:
+        return [c for c in world.rank(*asked) if c.effect == "routing" or "routing" in asked[2].effects]
+
+    monkeypatch.setattr(stage, "rank", rank)
+    assert world.found().best.effects == ("creep",)
+
+
+def test_where_no_further_effect_pays_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, {"friction": 500.0, "creep": 11.0, "tilt": 10.0})
+    assert world.found().best.effects == ("friction",)
+    assert max(len(effects) for effects in world.refitted) == 2
+
+
+def test_a_candidate_must_promise_what_would_be_material() -> None:
+    """|z|^2 of bar^2 n, or of 15 % (an amplitude) of what the set explains in the group in which it explains least."""
+    fit = SimpleNamespace(fit=None)
+    for fall, least in (([4e5, 9e5], 0.15**2 * 4e5), ([1e4, 9e5], 0.5**2 * 1e4), ([-5.0, 9e5], 0.5**2 * 1e4)):
+        study: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), fall=lambda a, b, fall=fall: np.array(fall))
+        assert _material(study, fit, fit, 0.5) == pytest.approx(least)  # type: ignore[arg-type]
 
 
 def test_every_set_weighed_is_listed_best_first(monkeypatch: pytest.MonkeyPatch) -> None:

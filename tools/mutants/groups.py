@@ -38,7 +38,7 @@ GROUPS = {
     ),
     "calibrate": Group(
         ("twin/calibrate.py",),
-        ("tests/test_calibrate.py", "-k", "intervals or linear or widen or neighbour_serve or thousandth or hardly"),
+        ("tests/test_calibrate.py", "-k", "intervals or linear or widen or neighbour_serve or thousandth or hardly or elsewhere or too_far_off"),
     ),
     "residual": Group(("twin/residual.py",), ("tests/test_residual.py",)),
     "laws": Group(("twin/laws.py",), ("tests/test_laws.py", "tests/test_dynamics.py", "-k", "laws or alike")),

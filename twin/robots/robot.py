@@ -73,15 +73,15 @@ class Robot:
 
     def chain(self, body: Body) -> HingeChain:
         """A body of this robot's family as the chain of hinges that it is. Raises DataError where it is none."""
-        return self._able(family(self.family).chain, "has no backbone: give one that tendons bend")(body)
+        return self._able(family(self.family).chain, "has no backbone: give a twin of one pulled by tendons")(body)
 
     def silicone(self, body: Body) -> SoftBody:
         """A body of this robot's family as the one piece of silicone that it is. Raises DataError where it is none."""
-        return self._able(family(self.family).silicone, "is no soft body: give a single finger of silicone")(body)
+        return self._able(family(self.family).silicone, "is no soft body: give a twin of a single silicone finger")(body)
 
     def hand(self, body: Body) -> HandBody:
         """A body of this robot's family as the fingers on a palm that it is. Raises DataError where it is none."""
-        return self._able(family(self.family).hand, "is no hand: give fingers of silicone on a palm")(body)
+        return self._able(family(self.family).hand, "is no hand: give a twin of silicone fingers on a palm")(body)
 
     def _able(self, view: Callable[[Any], T] | None, lacking: str) -> Callable[[Any], T]:
         if view is None:
