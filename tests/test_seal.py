@@ -49,9 +49,11 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
     monkeypatch.setattr(seal, "report", lambda effects, true: true)
     off = np.array([1e-3 if o.axis == 0 else 0.0 for o in day.outputs])
     monkeypatch.setattr(seal, "readings", lambda bench, k: bench.measured[k] - off)
-    monkeypatch.setattr(seal, "sensitivity", lambda bench, trials, twin, predicted: [np.zeros((*y.shape, 3)) for y in predicted])
+    monkeypatch.setattr(
+        seal, "sensitivity", lambda bench, trials, twin, predicted: [np.full((*y.shape, 3), trials[0]) for y in predicted]
+    )
     base, final = (SimpleNamespace(name=n, effects=()) for n in ("base", "after"))
-    noise = SimpleNamespace(floor=lambda bench, G: {"marker": 4e-4})
+    noise = SimpleNamespace(floor=lambda bench, G: {"marker": 4e-4 * float(G[0].max())})
     study = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(noise=noise)))
     conclusion: Any = SimpleNamespace(base=base, final=final, study=study)
     return Opened.of(day, [y - 2.0 * off for y in day.measured], [(conclusion, [1, 3])])
