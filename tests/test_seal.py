@@ -49,9 +49,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
     monkeypatch.setattr(seal, "report", lambda effects, true: true)
     off = np.array([1e-3 if o.axis == 0 else 0.0 for o in day.outputs])
     monkeypatch.setattr(seal, "readings", lambda bench, k: bench.measured[k] - off)
-    monkeypatch.setattr(
-        seal, "sensitivity", lambda bench, trials, twin, predicted: [np.full((*y.shape, 3), trials[0]) for y in predicted]
-    )
+    monkeypatch.setattr(seal, "sensitivity", lambda bench, trials, twin, predicted: [np.array([trials[0]])])
     base, final = (SimpleNamespace(name=n, effects=()) for n in ("base", "after"))
     noise = SimpleNamespace(floor=lambda bench, G: {"marker": 4e-4 * float(G[0].max())})
     study = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(noise=noise)))
