@@ -52,9 +52,9 @@ def test_a_step_of_pi_is_its_equation() -> None:
 
 
 def test_a_step_of_the_network_is_its_equation() -> None:
-    """One input, centres at -1, 0, 1, width 1. W' H after one step from nothing is dt rate e, then fades by dt leak."""
-    network, X = RBF(1, 1, rate=2.0, limit=10.0, leak=0.1, each=3), np.array([[0.5]])
-    H = np.exp(-0.5 * (0.5 - np.array([-1.0, 0.0, 1.0])) ** 2)
+    """One input, centres half apart, width a half. W' H after one step from nothing is dt rate e, then fades by dt leak."""
+    network, X = RBF(1, 1, rate=2.0, limit=10.0, leak=0.1, each=5), np.array([[0.5]])
+    H = np.exp(-0.5 * ((0.5 - np.array([-1.0, -0.5, 0.0, 0.5, 1.0])) / 0.5) ** 2)
     np.testing.assert_allclose(network.neurons(X)[0], H)
     np.testing.assert_allclose(network.neurons(np.array([[9.0]])), network.neurons(np.array([[1.2]])))
     assert network.step(X, np.array([3.0]), 0.05)[0] == pytest.approx(0.3)
@@ -131,6 +131,20 @@ def test_no_spring_exceeds_its_ceiling_in_a_thousand_cycles(factor: float, therm
     assert hottest <= guard.ceiling + 1e-6
     assert hottest > guard.ceiling - 50.0  # it is not kept by never heating
     assert highest == guard.supply
+
+
+def test_a_tension_bounds_the_temperature_a_spring_can_have() -> None:
+    """At most 8 K above where heating pulls so hard, at least 8 K below where cooling lets go; a model between is believed."""
+    low, up = (float(x[0]) for x in loop_temperatures(SPRING, np.array([2.6]), HELD, ROOM))
+    for model, found in ((ROOM, up - 8.0), (0.5 * (low + up), 0.5 * (low + up)), (425.0, low + 8.0)):
+        guard = Guard(SPRING, ROOM)
+        guard.temperature[:] = guard.warmest[:] = model
+        guard.observe(np.array([2.6]), HELD)
+        assert guard.temperature[0] == pytest.approx(found)
+        assert guard.warmest[0] == pytest.approx(min(model, low + 8.0))
+        guard.temperature[:] = guard.warmest[:] = 430.0
+        guard.observe(0.99 * SPRING.austenite_stiffness * HELD, HELD)  # as hard as heat can make it: it may be any hotter
+        assert guard.warmest[0] == guard.temperature[0] == 430.0
 
 
 @pytest.mark.parametrize("warm", [330.0, 418.0, 425.0])

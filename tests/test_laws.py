@@ -201,6 +201,20 @@ def test_laws_that_change_the_body_all_change_it() -> None:
             assert body.spec.site(name).pos[2] == z
 
 
+def test_holes_are_moved_about_the_axis_or_away_from_it_or_both() -> None:
+    def holes(*effects: Effect) -> np.ndarray:
+        """Radius and azimuth (3, n, 2) of every tendon's."""
+        body = ROBOT.build()
+        for effect in effects:
+            effect.edit(body)
+        xy = np.array([[body.spec.site(name).pos[:2] for name in sites] for sites in body.tendons])
+        return np.stack([np.hypot(*np.moveaxis(xy, -1, 0)), np.unwrap(np.arctan2(xy[..., 1], xy[..., 0]))], axis=-1)
+
+    moved = holes(law("tendon_routing", radius_1=1e-3, angle_2=0.3, radius_3=-5e-4, angle_3=-0.2)) - holes()
+    expected = np.array([[1e-3, 0.0], [0.0, 0.3], [-5e-4, -0.2]])
+    np.testing.assert_allclose(moved, np.broadcast_to(expected[:, None], moved.shape), atol=1e-12)
+
+
 def test_an_asymmetric_body_is_stiff_about_one_axis_and_soft_about_the_other() -> None:
     """The bending stiffness of each joint set as a tensor: EI (1 + e (cos 2a, sin 2a; sin 2a, -cos 2a)), whatever the axes."""
     plain: Any = ROBOT.build()

@@ -64,7 +64,18 @@ GROUPS = {
     "loops": _stage("loops", "tests/test_loops.py", "-k", "not day"),
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
-    "shape": Group(("twin/shape/*.py",), ("tests/test_shape.py", "-k", "error_bar or nothing")),
+    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", "error_bar or nothing")),
+    "align": Group(
+        ("twin/shape/align*.py", "twin/shape/cloud_fit.py", "twin/shape/sensor_fit.py"),
+        ("tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "alignment or aligned or clouds"),
+    ),
+    "training": Group(
+        ("twin/shape/training.py", "twin/shape/lesson.py", "twin/shape/weights.py"),
+        ("tests/test_shape_training.py", "-k", "not killed"),
+    ),
+    "shape": Group(
+        ("twin/shape/*.py",), ("tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "not align and not physics-")
+    ),
     "tip": Group(("twin/control/tip.py",), ("tests/test_control.py", "-k", "surface or tracked or knows_of")),
     "control": Group(("twin/control/*.py",), ("tests/test_control.py", "tests/test_shape_control.py", "-k", CONTROL)),
     "tasks": Group(("twin/tasks/*.py",), ("tests/test_tasks.py", "-k", "judged or nothing or lists")),
