@@ -317,6 +317,9 @@ def test_springs_and_drives_are_sought_where_they_are() -> None:
     limits = [s.values["limit"] for s in named("actuator_saturation").starts([still], 3)]
     assert limits
     assert max(limits) < still.tension.max()
+    harder = still.with_(tension=3.0 * still.tension)
+    both = named("actuator_saturation").starts([still, harder], 3)
+    assert [s.values["limit"] for s in both] == pytest.approx([3.0 * x for x in limits])
     reached = still.markers[..., :2]
     for start in named("contact").starts([still], 3):
         towards = np.array([np.cos(start.values["azimuth"]), np.sin(start.values["azimuth"])])
