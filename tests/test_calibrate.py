@@ -354,9 +354,11 @@ def test_a_fit_from_elsewhere_ends_at_the_posterior_and_within_the_ranges() -> N
         )
         right = np.append(y, rows @ np.clip(belief, -bound, bound))
         best = lsq_linear(whole, right, bounds=(-bound, bound), method="bvls").x
-        start = Model(Twin.of(ROBOT), free).at(np.full(4, 0.9 * min(bound, 4.0)))
-        found = fit(Linear(A, y), start)
-        np.testing.assert_allclose(found.model.vector(), best, atol=2e-3)
+        unbelieving = np.clip(np.linalg.lstsq(A, y, rcond=None)[0], -bound, bound)  # from there on z grows
+        for x in (np.full(4, 0.9 * min(bound, 4.0)), unbelieving):
+            found = fit(Linear(A, y), Model(Twin.of(ROBOT), free).at(x))
+            np.testing.assert_allclose(found.model.vector(), best, atol=2e-3)
+            assert found.cost == pytest.approx(np.sum((whole @ best - right) ** 2), rel=1e-5)
         assert (np.abs(best) > 0.99 * bound).any() == (bound < 100.0)
 
 

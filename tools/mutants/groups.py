@@ -61,6 +61,8 @@ GROUPS = {
     "spikes": _stage("spikes", "tests/test_spikes.py", "-k", "not bench and not delay"),
     "left_out": _stage("left_out"),
     "design": _stage("design"),
+    "evidence": _stage("evidence"),
+    "information": Group(("twin/information.py",), ("tests/test_information.py",)),
     "loops": _stage("loops", "tests/test_loops.py", "-k", "not day"),
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
