@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from twin.robots import load
+from twin.shape import judge
 from twin.shape.band import STRANGER, Bands, widened
 from twin.shape.constant_curvature import ERROR, LEAST, OUTSIDE, ConstantCurvature
 from twin.shape.estimator import OWN, SHARE, Felt, Shapes
@@ -139,3 +140,23 @@ def test_spreads_are_widened_to_hold_nine_of_ten_at_each_level() -> None:
     few = _widened(ratio[:200], level[:200])[1]
     assert np.ptp(few, axis=0).max() == 0.0, "too few: all levels are taken for one"
     assert _widened(0.0 * ratio, level)[1].min() == 0.05
+
+
+@pytest.mark.parametrize(("rest", "least"), [(5e-4, 5e-4), (2e-5, 1e-4)])
+def test_an_error_is_a_share_of_the_way_and_a_rest(rest: float, least: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Squared errors of 0.1^2 of a point's way squared and rest^2, found by least squares; the rest is 0.1 mm at least."""
+    rng = np.random.default_rng(2)
+    size = rng.uniform(0.0, 0.02, size=(100, 3))
+    tried = SimpleNamespace(size=size, away=np.hypot(0.1 * size, rest), std=np.full(size.shape, 1e-3), level=rng.uniform(size=100))
+    monkeypatch.setattr(judge, "_tried", lambda *_: tried)
+    monkeypatch.setattr(judge, "_levels", lambda *_: {})
+    data: Any = SimpleNamespace(
+        held=np.ones(100, bool), pushed=np.arange(100) < 50, kind=np.where(np.arange(100) < 50, "hand", "free"),
+        weights=np.zeros((3, 5)), strain=rng.normal(size=(100, 4)),
+    )  # fmt: skip
+    law: Any = SimpleNamespace(form=lambda: "made")
+    arrays, errors = judge.judged(law, {}, data, FINGER)
+    np.testing.assert_allclose(arrays["error"], [0.1, least], rtol=1e-6)
+    assert errors["held_out_mm"] == pytest.approx(1e3 * tried.away.mean())
+    assert errors["by_kind_mm"]["hand"] == pytest.approx(1e3 * tried.away[:50].mean())
+    assert errors["in_band_by_kind"]["free"] == pytest.approx(0.9, abs=0.03)  # as the band was made from these fifty

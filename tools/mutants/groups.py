@@ -72,8 +72,8 @@ GROUPS = {
         ("tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "alignment or aligned or clouds"),
     ),
     "training": Group(
-        ("twin/shape/training.py", "twin/shape/lesson.py", "twin/shape/weights.py"),
-        ("tests/test_shape_training.py", "-k", "not killed"),
+        tuple(f"twin/shape/{name}.py" for name in ("training", "lesson", "weights", "judge", "folding")),
+        ("tests/test_shape_parts.py", "tests/test_shape_training.py", "-k", "not killed"),
     ),
     "shape": Group(
         ("twin/shape/*.py",),
