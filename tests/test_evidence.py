@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -147,6 +149,7 @@ def test_a_slope_is_that_of_three_samples_mean() -> None:
     inner = slice(2, -2)  # (t-h)^2 + t^2 + (t+h)^2 over 3 is t^2 + 2 h^2 / 3: the same slope
     np.testing.assert_allclose(slope(i, u)[inner], np.outer(2.0 * i.time, [1.0, -2.0])[inner], atol=1e-9)
     np.testing.assert_allclose(slope(i, u)[0], 4.0 * h / 3.0 * np.array([1.0, -2.0]), atol=1e-9)
+    np.testing.assert_array_equal(slope(replace(i, time=i.time[:1]), u[:1]), np.zeros((1, 2)))  # one row alone stands still
 
 
 def test_what_goes_with_the_pose_is_not_beyond_it() -> None:
