@@ -71,6 +71,9 @@ def test_a_delay_shifts_tensions_and_displacements_alike() -> None:
     # The signals are sines of 0.3 rad/s; cubics through samples up to 0.8 s apart miss them by far less than 1 % of the swing.
     np.testing.assert_allclose(delayed.tension, 1.5 + np.sin(0.3 * then[:, None] + np.arange(3)), atol=0.01)
     np.testing.assert_allclose(delayed.displacement, 5e-3 * np.sin(0.3 * then[:, None] + np.arange(3)), atol=5e-5)
+    two, up = np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0]])
+    short = Signals(two, two, up, up, np.zeros((2, 0, 3)), two)
+    np.testing.assert_allclose(law("time_delay", delay=0.25).command(short).tension[1], [0.75, 1.5, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -199,6 +202,20 @@ def test_laws_that_change_the_body_all_change_it() -> None:
             moved = (abs(was) + 1e-3) / abs(was) * np.exp(0.1j) if i == 1 else 1.0
             assert abs(now - was * moved) < 1e-15
             assert body.spec.site(name).pos[2] == z
+
+
+def test_a_drum_that_is_not_round_errs_by_its_turn_and_reports_what_it_believes() -> None:
+    """delivered = u + s sin(2 pi u / turn) + c (1 - cos(2 pi u / turn)); where tensions command, the encoder says the u that
+    delivers what the tendon did."""
+    crooked = law("transmission_error", turn=0.02, sine_1=2e-4, cosine_1=-3e-4, cosine_2=1e-4)
+    u = np.array([[0.0, 0.0, 0.0], [2.5e-3, 5e-3, 5e-3], [7e-3, -1e-2, 3e-3]])
+    time, zero = np.arange(3.0), np.zeros((3, 3))
+    phase = 2.0 * np.pi * u / 0.02
+    delivered = u + np.sin(phase) * [2e-4, 0.0, 0.0] + (1.0 - np.cos(phase)) * [-3e-4, 1e-4, 0.0]
+    held = Signals(time, time, zero, u, np.zeros((3, 0, 3)), time, (Drive.DISPLACEMENT,) * 3)
+    np.testing.assert_allclose(crooked.drive(held).displacement, delivered, atol=1e-15)
+    pulled = held.with_(drives=(Drive.TENSION,) * 3, displacement=delivered)
+    np.testing.assert_allclose(crooked.sense(pulled).displacement, u, atol=1e-7)  # m: an iteration that shrinks by 0.1 each time
 
 
 def test_holes_are_moved_about_the_axis_or_away_from_it_or_both() -> None:
