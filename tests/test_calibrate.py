@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from tests.conftest import Day
 from tools.bench.nuisance import built
@@ -257,6 +258,11 @@ def test_a_model_that_is_too_far_off_is_seen_at_the_first_trials(bench: Day, mon
         ran.clear()
         assert objective.within(most, model) is None
         assert len(ran) == after
+    # Its derivatives are the slopes of whole predictions; tolerances as in test_its_derivatives_are_those_of_its_residual.
+    i, x = next(i for i, f in enumerate(model.free) if f.label == "tendons.radius"), model.vector()
+    e = 0.2 * np.eye(len(x))[i]
+    central = (objective.evaluate(model.at(x + e)).z - objective.evaluate(model.at(x - e)).z) / 0.4
+    np.testing.assert_allclose(objective.jacobian(whole, [i])[:, 0], central, rtol=0, atol=0.12 + 0.01 * np.abs(central).max())
 
 
 # ---- coverage: do intervals hold the truth as often as they say ----------------------------------------------------------------
@@ -332,6 +338,28 @@ def test_a_fit_of_a_linear_bench_is_its_posterior() -> None:
     # Share of each number that the data, not the belief, made: the trace of the hat matrix over the data's rows.
     hat = whole @ np.linalg.pinv(whole)
     assert f.effective_parameters() == pytest.approx(np.trace(hat[:100, :100]), rel=1e-6)
+
+
+def test_a_fit_from_elsewhere_ends_at_the_posterior_and_within_the_ranges() -> None:
+    """As above, with beliefs other than zero, begun far from them; where ranges cut it off, the bounded least-squares problem's."""
+    rng = np.random.default_rng(5)
+    A, y, belief = rng.normal(size=(100, 4)) * LOOKS, 3.0 * rng.normal(size=100), np.array([2.0, -1.0, 0.0, 0.0])
+    rows = np.diag([0.0 if s is None else 1.0 / s for s in BELIEVED])
+    whole, right = np.vstack([A, rows]), np.append(y, rows @ belief)
+    least = np.linalg.lstsq(whole, right, rcond=None)[0]
+    for bound in (100.0, 0.5 * np.abs(least).max()):  # steps
+        free = tuple(
+            replace(f, parameter=replace(f.parameter, value=b * STEP, low=-bound * STEP, high=bound * STEP))
+            for f, b in zip(FREE, np.clip(belief, -bound, bound), strict=True)
+        )
+        right = np.append(y, rows @ np.clip(belief, -bound, bound))
+        best = lsq_linear(whole, right, bounds=(-bound, bound), method="bvls").x
+        unbelieving = np.clip(np.linalg.lstsq(A, y, rcond=None)[0], -bound, bound)  # from there on z grows
+        for x in (np.full(4, 0.9 * min(bound, 4.0)), unbelieving):
+            found = fit(Linear(A, y), Model(Twin.of(ROBOT), free).at(x))
+            np.testing.assert_allclose(found.model.vector(), best, atol=2e-3)
+            assert found.cost == pytest.approx(np.sum((whole @ best - right) ** 2), rel=1e-5)
+        assert (np.abs(best) > 0.99 * bound).any() == (bound < 100.0)
 
 
 def test_derivatives_of_a_neighbour_serve_as_well() -> None:

@@ -8,10 +8,11 @@ from typing import Any, cast
 import pytest
 
 from twin.diagnose import choose as stage
-from twin.diagnose.choose import beside, choose, halved, most_predictive, predicting
+from twin.diagnose.choose import beside, choose, halved, most_predictive, predicting, solves
 from twin.diagnose.null import Thresholds
 from twin.diagnose.search import Search
 from twin.diagnose.weigh import better
+from twin.errors import SolveError
 
 STUDY = cast(Any, None)
 
@@ -59,6 +60,21 @@ def test_what_halves_the_structure_is_gone_on_with_as_the_evidence_ranks_it() ->
     base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
     found = searched(base, best)
     assert choose(STUDY, found, Thresholds()).best is best
+
+
+def test_where_nothing_predicts_the_evidence_has_the_word() -> None:
+    found = searched(weighed(score=0.0, size=6.0, unseen=4.0), weighed("routing", score=40.0, size=5.5, unseen=3.8))
+    assert choose(STUDY, found, Thresholds()) == found
+
+
+def test_a_twin_solves_a_set_unless_a_trial_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    def simulate(twin: Any, bench: Any, *, trials: list[int]) -> None:
+        if 3 in trials:
+            raise SolveError("lost")
+
+    monkeypatch.setattr(stage, "simulate", simulate)
+    assert solves(cast(Any, SimpleNamespace(bench=None, trials=[1, 2])), cast(Any, None))
+    assert not solves(cast(Any, SimpleNamespace(bench=None, trials=[1, 3])), cast(Any, None))
 
 
 def test_a_set_that_leaves_a_fitted_trial_without_equilibrium_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:

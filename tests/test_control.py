@@ -20,7 +20,7 @@ from twin.effects import named
 from twin.robots import load
 from twin.springs import pull
 from twin.springs.force import piece
-from twin.springs.heat import heated
+from twin.springs.heat import heated, loss
 
 SPRING = load("continuum").springs(1)
 HELD = SPRING.initial_elongation  # m
@@ -37,6 +37,32 @@ def test_an_integral_at_its_limit_does_not_wind_up() -> None:
     for _ in range(1000):
         wound.step(np.array([5.0]), 0.1)
     assert wound.step(np.array([-0.5]), 0.1)[0] > 100.0
+
+
+def test_a_step_of_pi_is_its_equation() -> None:
+    """u = clip(k_p e + v), v grown by k_i e dt but where u, or what follows, is at a limit that e drives it against."""
+    law = PI(3, 2.0, 0.5, -1.0, 3.0)
+    np.testing.assert_allclose(law.step(np.array([0.4, -0.2, 0.0]), 0.1), [0.82, -0.41, 0.0])
+    np.testing.assert_allclose(law.sum, [0.02, -0.01, 0.0])
+    np.testing.assert_allclose(law.step(np.array([10.0, -10.0, 0.6]), 0.1, np.array([False, False, True])), [3.0, -1.0, 1.23])
+    np.testing.assert_allclose(law.sum, [0.02, -0.01, 0.0])
+    law.sum[:] = 5.0, -4.0, 0.0
+    np.testing.assert_allclose(law.step(np.array([-0.1, 0.1, 0.0]), 0.1), [3.0, -1.0, 0.0])  # beyond, but on the way back
+    np.testing.assert_allclose(law.sum, [3.0, -1.0, 0.0])
+
+
+def test_a_step_of_the_network_is_its_equation() -> None:
+    """One input, centres half apart, width a half. W' H after one step from nothing is dt rate e, then fades by dt leak."""
+    network, X = RBF(1, 1, rate=2.0, limit=10.0, leak=0.1, each=5), np.array([[0.5]])
+    H = np.exp(-0.5 * ((0.5 - np.array([-1.0, -0.5, 0.0, 0.5, 1.0])) / 0.5) ** 2)
+    np.testing.assert_allclose(network.neurons(X)[0], H)
+    np.testing.assert_allclose(network.neurons(np.array([[9.0]])), network.neurons(np.array([[1.2]])))
+    assert network.step(X, np.array([3.0]), 0.05)[0] == pytest.approx(0.3)
+    np.testing.assert_allclose(network.weight[0], 0.3 * H / (H @ H))
+    assert network.step(X, np.array([0.0]), 0.05)[0] == pytest.approx(0.3 * (1.0 - 0.05 * 0.1))
+    assert network.step(X, np.array([-1e6]), 0.05)[0] == pytest.approx(-10.0 * H.sum())
+    assert RBF(2, 3, 1.0, 1.0).centre.shape == (64, 3)
+    assert RBF(2, 3, 1.0, 1.0).leak == 0.005
 
 
 def test_pi_closes_on_a_first_order_plant() -> None:
@@ -107,6 +133,39 @@ def test_no_spring_exceeds_its_ceiling_in_a_thousand_cycles(factor: float, therm
     assert highest == guard.supply
 
 
+def test_a_tension_bounds_the_temperature_a_spring_can_have() -> None:
+    """At most 8 K above where heating pulls so hard, at least 8 K below where cooling lets go; a model between is believed."""
+    low, up = (float(x[0]) for x in loop_temperatures(SPRING, np.array([2.6]), HELD, ROOM))
+    for model, found in ((ROOM, up - 8.0), (0.5 * (low + up), 0.5 * (low + up)), (425.0, low + 8.0)):
+        guard = Guard(SPRING, ROOM)
+        guard.temperature[:] = guard.warmest[:] = model
+        guard.observe(np.array([2.6]), HELD)
+        assert guard.temperature[0] == pytest.approx(found)
+        assert guard.warmest[0] == pytest.approx(min(model, low + 8.0))
+        guard.temperature[:] = guard.warmest[:] = 430.0
+        guard.observe(0.99 * SPRING.austenite_stiffness * HELD, HELD)  # as hard as heat can make it: it may be any hotter
+        assert guard.warmest[0] == guard.temperature[0] == 430.0
+
+
+@pytest.mark.parametrize("warm", [330.0, 418.0, 425.0])
+def test_a_guarded_step_ends_at_the_ceiling_by_the_careful_model(warm: float) -> None:
+    """The thermometer's 3 K below it, the loss three quarters of the described one; further away the supply's voltage is free."""
+    guard = Guard(SPRING, ROOM)
+    U = guard.allowed(np.full(1, 99.0), HELD, 0.5, np.full(1, warm))
+    end = float(heated(guard.careful.records, 0, warm, HELD[0], U[0] / SPRING.resistance[0], ROOM, 0.5))
+    assert guard.temperature[0] == warm
+    if warm < 400.0:
+        assert U[0] == guard.supply
+        assert end < guard.ceiling - 3.0
+    elif warm > guard.ceiling:
+        assert U[0] == 0.0
+    else:
+        assert 0.0 < U[0] < guard.supply
+        assert end == pytest.approx(guard.ceiling - 3.0, abs=1e-9)
+    slower = heated(SPRING.records, 0, warm, HELD[0], 0.0, ROOM, 0.2)
+    assert heated(guard.careful.records, 0, warm, HELD[0], 0.0, ROOM, 0.2) > slower  # it is believed to cool less
+
+
 def test_without_the_guard_it_would_be_exceeded() -> None:
     warm = ROOM
     for _ in range(400):
@@ -142,6 +201,24 @@ def test_a_tension_is_reached_and_left_again() -> None:
     assert warm.max() < Guard(SPRING, ROOM).ceiling
 
 
+@pytest.mark.parametrize("error", [0.02, 0.5, -0.02])
+def test_a_step_of_the_tension_loop_is_its_equation(error: float) -> None:
+    """T_goal between the branches by sat(e / band), plus PI and network; the heat that holds it there and takes it there in 0.4 s.
+    The first network step gives dt times its rate times e whatever its neurons, while nothing is stuck."""
+    loop, tension, dt, warm = TensionLoop(Guard(SPRING, ROOM)), 2.4, 0.05, 350.0
+    low, up = (float(x[0]) for x in loop_temperatures(SPRING, np.array([tension + error]), HELD, ROOM))
+    e = error
+    goal = 0.5 * (low + up) + 0.5 * (low - up) * np.clip(e / 0.06, -1.0, 1.0) + min(20.0 * e + 8.0 * e * dt, 25.0) + 25.0 * e * dt
+    power = loss(SPRING.records, 0, goal - ROOM, HELD[0], ROOM) * (goal - ROOM) + SPRING.capacity[0] * (goal - warm) / 0.4
+    U = loop.step(np.array([tension + error]), np.array([tension]), HELD, dt, np.array([warm]))
+    expected = np.sqrt(max(power, 0.0) * SPRING.resistance[0])
+    assert U[0] == pytest.approx(min(expected, loop.guard.supply), rel=1e-9)
+    assert loop.stuck[0] == (expected > loop.guard.supply if error > 0.0 else power < 0.0)
+    loop.step(np.array([tension + error]), np.array([tension + 0.3]), HELD, dt, np.array([warm]))
+    assert loop.seen is not None
+    assert loop.seen[0] == pytest.approx(tension + 0.3 * dt / 0.15)
+
+
 def test_the_network_takes_up_what_the_description_is_wrong_about() -> None:
     """A wandering tension, after 40 s. (PI of a high gain gets as near on a held spring; the tip is where it does not.)"""
     time = np.arange(0.0, 160.0, 0.05)
@@ -167,6 +244,20 @@ def test_paths_are_closed_and_lie_on_the_surface() -> None:
             theta = 2.0 * np.arctan2(np.hypot(x, y), z)
             np.testing.assert_allclose(bent(theta * np.array([x, y]) / max(np.hypot(x, y), 1e-12), LENGTH), [x, y, z], atol=1e-9)
     assert on_surface(0.0, 0.0, LENGTH) == pytest.approx([0.0, 0.0, LENGTH])
+
+
+def test_each_path_goes_where_its_name_says() -> None:
+    """Corners and turning points, by hand; the tip's height is that of its bend."""
+    r, every = RADIUS, paths(LENGTH, RADIUS)
+    a = r / np.sqrt(2.0)
+    for name, u, x, y in (
+        ("circle", 0.25, 0.0, r), ("circle", 0.5, -r, 0.0), ("square", 0.0, a, a), ("square", 0.25, -a, a),
+        ("square", 0.375, -a, 0.0), ("square", 0.75, a, -a), ("square", 0.875, a, 0.0),
+        ("figure of eight", 0.125, a, 0.6 * r), ("figure of eight", 0.25, r, 0.0),
+        ("spiral", 0.5, 0.5 * r, 0.0), ("spiral", 0.625, 0.0, 0.625 * r), ("rose (3-D)", 0.0, r, 0.0),
+        ("rose (3-D)", 1.0 / 6.0, 0.15 * r, 0.15 * np.sqrt(3.0) * r),
+    ):  # fmt: skip
+        np.testing.assert_allclose(every[name](u)[:2], [x, y], atol=1e-12, err_msg=f"{name} at {u}")
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,10 +32,10 @@ LACKS = {
 }
 
 
-def bench(day: Day, *, displacement: bool = False, room: bool = False) -> Bench:
+def bench(day: Day, *, displacement: bool = False, room: bool = False, disks: Sequence[int] = range(1, 9)) -> Bench:
     """The day as a bench that measured nothing: what a design lacks is to be seen before."""
     drive = "displacement" if day.by_length else "tension"
-    outputs = [f"disk_{k}_{a}" for k in ([8] if day.tip_only else range(1, 9)) for a in "xyz"]
+    outputs = [f"disk_{k}_{a}" for k in ([8] if day.tip_only else disks) for a in "xyz"]
     outputs += [f"tendon_{i}_displacement" for i in (1, 2, 3)] if displacement else []
     channels = [Channel(f"tendon_{i}_{drive}", "input", "mm" if day.by_length else "N") for i in (1, 2, 3)]
     channels += [Channel(name, "output", "mm") for name in outputs]
@@ -65,6 +66,12 @@ def test_a_full_design_lacks_nothing() -> None:
     day = bench_day("default", np.random.default_rng(0))
     assert np.ptp(day.room[1]) > 3.0  # K: the room was warm and cold
     assert words(bench(day, displacement=True, room=True)) == []
+
+
+def test_three_markers_are_enough_and_two_are_not() -> None:
+    day = bench_day("default", np.random.default_rng(0))
+    assert words(bench(day, displacement=True, room=True, disks=(2, 5, 8))) == []
+    assert words(bench(day, displacement=True, room=True, disks=(5, 8))) == ["three markers along the body"]
 
 
 def test_a_steady_room_is_as_good_as_none() -> None:

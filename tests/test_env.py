@@ -116,7 +116,7 @@ def test_bad_options_are_told_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError, match=r"interval.*randomise.*did you mean 'payload'"):
         gymnasium.make("twin/ContinuumReach-v0", paylod=(0.0, 0.1))
     for name in ("two_link", "finger"):
-        with pytest.raises(DataError, match="no dynamics"):
+        with pytest.raises(DataError, match="no backbone"):
             gymnasium.make("twin/ContinuumReach-v0", twin=name)
     env = ContinuumReach("continuum", ranges={"tendon_frction.mu": (0.0, 0.3)})
     with pytest.raises(UnknownNameError, match=r"tendon_friction\.mu"):

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path as File
 
 import mujoco
 import numpy as np
 import pytest
 
+import twin
 from twin.body import Body, Path, Problem
 from twin.effects import Drive, Loads, Signals
+from twin.errors import DataError
 from twin.measurements import Channel
-from twin.robots import Robot, available, families, family, load
+from twin.robots import Family, Robot, available, families, family, load
 
 # Every robot that ships: a family without one fails below.
 robots = pytest.mark.parametrize("name", available())
@@ -135,3 +140,82 @@ def test_motion_comes_to_rest_where_statics_stands(name: str) -> None:
     standing = robot.solver(robot.build()).solve(still)
     # m: it starts in equilibrium and nothing changes; 1e-5 m is what friction-free statics and stepping agree to elsewhere
     np.testing.assert_allclose(moving.markers[-1], standing.markers[-1], rtol=0, atol=1e-5)
+
+
+def test_every_family_says_what_its_bodies_can() -> None:
+    """All that `Family` declares, None where a body cannot, and a view gives the body itself."""
+    for name in available():
+        robot, said = load(name), family(load(name).family)
+        assert set(Family.__annotations__) <= set(vars(said))
+        views = [robot.chain, robot.silicone, robot.hand]
+        there = [said.chain, said.silicone, said.hand]
+        for ask, view in zip(views, there, strict=True):
+            body = robot.build()
+            if view is None:
+                with pytest.raises(DataError, match=f"robot '{name}' .*: give"):
+                    ask(body)
+            else:
+                assert ask(body) is body
+
+
+HOME = ("robots", "soft", "equilibrium")  # families, and the mechanics that they are made of
+
+
+def of_families() -> set[str]:
+    """Names of classes that only families know: their bodies, solvers, and what these answer."""
+    robots = [load(name) for name in available()]
+    moving = [r for r in robots if family(r.family).dynamics is not None]
+    solvers = [r.solver(r.build()) for r in robots] + [r.solver(r.build(), dynamic=True) for r in moving]
+    found, new = {type(s) for s in solvers}, [Body, Path]
+    while new:
+        new = [c for kind in new for c in kind.__subclasses__()]
+        found |= set(new)
+    return {c.__name__ for c in found}
+
+
+def told_apart(tree: ast.Module, classes: set[str]) -> Iterator[int]:
+    """Lines that ask which family a body is of: by its class, by the family's name or by the family's own module."""
+    modules = {f"twin.robots.{name}{end}" for name in families() for end in ("", "_schema")}
+    for node in ast.walk(tree):
+        named: set[str] = set()
+        match node:
+            case ast.Call(func=ast.Name(id="isinstance" | "issubclass" | "cast"), args=args):
+                inside = [n for a in args for n in ast.walk(a)]
+                named = {str(getattr(n, "id", getattr(n, "value", ""))) for n in inside}  # of a name or in quotes
+            case ast.MatchClass(cls=ast.Name(id=name)):
+                named = {name}
+            case ast.Compare(left=left, comparators=others):
+                asked = any(isinstance(n, ast.Attribute) and n.attr == "family" for n in (left, *others))
+                named = classes if asked else set()
+            case ast.ImportFrom(module=module, names=names):
+                imported = {str(module), *(f"{module}.{n.name}" for n in names)}
+                named = classes if imported & modules else set()
+        if named & classes:
+            yield node.lineno
+
+
+def test_outside_a_family_nobody_asks_which_it_is() -> None:
+    """A capability is asked for (`Body.parts`, `Family`), never a class: a body that nobody planned then needs no second place."""
+    classes, root = of_families(), File(twin.__file__).parent
+    assert {"HingeChain", "SoftBody", "HandBody", "Equilibrium", "SoftStatics"} <= classes
+    found = [
+        f"{file.relative_to(root)}:{line}"
+        for file in sorted(root.rglob("*.py"))
+        if file.relative_to(root).parts[0] not in HOME
+        for line in told_apart(ast.parse(file.read_text()), classes)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "assert isinstance(body, SoftBody)",
+        "solver = cast('Equilibrium', solver)",
+        "if robot.family != 'hand': pass",
+        "from twin.robots.hand_schema import Hand",
+        "from twin.robots import continuum",
+    ],
+)
+def test_and_who_asks_is_found(line: str) -> None:
+    assert list(told_apart(ast.parse(line), of_families())) == [1]

@@ -26,13 +26,17 @@ class World:
         self.history = 0.0  # what of an effect depends on more than the pose, sigma
         self.study: Any = SimpleNamespace(
             objective=SimpleNamespace(n=N), progress=lambda words: None, fall=lambda a, b: a.z**2 - b.z**2,
-            evidence=SimpleNamespace(beyond_pose=lambda z: self.history),
+            evidence=SimpleNamespace(beyond_pose=self.beyond_pose),
         )  # fmt: skip
         self.harmful: set[str] = set()
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
         monkeypatch.setattr(stage, "left_out", lambda study, fit: self.left_out(fit.effects))
         monkeypatch.setattr(stage, "extended", lambda study, rest, rival, start: self.of(*rest.effects, rival))
+
+    def beyond_pose(self, z: np.ndarray) -> float:
+        self.asked = z
+        return self.history
 
     def of(self, *effects: str) -> Any:
         missing = {e: a**2 for e, a in self.sigmas.items() if e not in effects}
@@ -81,6 +85,7 @@ def test_what_depends_on_how_a_pose_was_reached_is_no_inaccuracy_of_the_descript
     world = World(monkeypatch, friction=0.5)
     world.history = history
     assert world.gated("friction", accuracy=0.6).best.effects == (("friction",) if kept else ())
+    np.testing.assert_array_equal(world.asked, world.of().fit.z - world.of("friction").fit.z)  # of what the effect changed
 
 
 @pytest.mark.parametrize(("sensed", "kept"), [({"large"}, True), (set(), False), ({"large", "small"}, False)])
@@ -98,6 +103,7 @@ def test_beside_a_much_larger_one_it_must_take_half_of_what_is_left_on_trials_le
     monkeypatch: pytest.MonkeyPatch, left: float, unseen: float, kept: bool
 ) -> None:
     world = World(monkeypatch, large=4.0, small=0.5)
+    assert world.gated("large", "small").small == (), "nothing smooth is left, with it or without: no fault of a law"
     world.rest = {("large", "small"): (left, unseen), ("large",): (1.0, 1.0)}
     found = world.gated("large", "small")
     assert found.best.effects == (("large", "small") if kept else ("large",))

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from twin.diagnose.judge import Signs, probability, verdict
+from twin.diagnose import judge as stage
+from twin.diagnose.judge import Signs, judge, look, probability, verdict
 from twin.diagnose.null import Thresholds
 
 BARS = Thresholds()
@@ -53,3 +54,105 @@ def test_a_set_with_an_immaterial_effect_does_not_count() -> None:
     found = sets(friction=0.0, friction__delay=30.0, creep=0.0)
     assert probability(found, "friction", {"delay"}) == pytest.approx(0.5)
     assert probability(found, "friction", set()) > 0.5
+
+
+BASE, FRICTION, BOTH, CREEP, DELAY = (), ("friction",), ("creep", "friction"), ("creep",), ("delay",)
+
+
+def weighed(effects: tuple[str, ...], score: float, cost: float = 0.0, size: float = 1.0) -> Any:
+    """A set of effects as the search leaves it: `cost` of its fit, `size` (sigma) of the smooth error left."""
+    z = np.zeros((4, 1))
+    fit = SimpleNamespace(fitted=lambda e: {e: 1.0}, cost=cost, z=z, effects=effects, evaluation=SimpleNamespace(raw=[z]))
+    return SimpleNamespace(effects=effects, score=score, fit=fit, discrepancy=SimpleNamespace(size=size, mean=z))
+
+
+@pytest.fixture
+def staged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What `judge` asks of other stages, to be set: signs, a second robot, sets that are worse on trials left out."""
+    said: dict[str, Any] = {"signs": CLEAN, "rigs": None, "worse": ()}
+
+    def left_out(study: Any, fit: Any) -> Any:
+        return SimpleNamespace(worse=lambda other: fit.effects in said["worse"], structure=0.07)
+
+    monkeypatch.setattr(stage, "look", lambda *_: said["signs"])
+    monkeypatch.setattr(stage, "rigs", lambda *_: said["rigs"])
+    monkeypatch.setattr(stage, "left_out", left_out)
+    return said
+
+
+def judged(best: Any, *others: Any, small: tuple[str, ...] = ()) -> Any:
+    base = weighed(BASE, -400.0, cost=1000.0, size=2.0)
+    ranked = tuple(sorted((base, best, *others), key=lambda w: -w.score))
+    sizes = {"friction": 1.0, "creep": 3.0}
+    gated = SimpleNamespace(
+        best=best, doubts=(), small=tuple(SimpleNamespace(effect=e) for e in small), contribution=lambda study, e: sizes.get(e, 0.0)
+    )
+    study = SimpleNamespace(progress=lambda words: None, bench=None, trials=[0])
+    return judge(study, SimpleNamespace(base=base, all=ranked), gated, BARS)  # type: ignore[arg-type]
+
+
+def test_claims_come_largest_first_and_what_was_not_claimed_follows(staged: dict[str, Any]) -> None:
+    best, other = weighed(BOTH, 0.0, cost=100.0), weighed(DELAY, -60.0)
+    found = judged(best, other, weighed(("delay", "lag"), -80.0))
+    assert found.verdict == "explained"
+    assert [(c.effect, c.contribution) for c in found.claims] == [("creep", 3.0), ("friction", 1.0)]
+    # Tempered by 20: the rivals weigh e^-3 and e^-4; what is left, 0.02 sigma, is below the bar and costs nothing.
+    assert found.claims[0].probability == pytest.approx(1.0 / (1.0 + np.exp(-3.0) + np.exp(-4.0)))
+    assert [(c.effect, c.beside) for c in found.runners_up] == [("delay", ()), ("lag", ("delay",))]
+    assert found.between == (best, other)
+    assert judged(best, other, small=("delay",)).runners_up == ()
+
+
+def test_what_is_left_makes_claims_less_sure_by_its_share(staged: dict[str, Any]) -> None:
+    """0.5 of 2 sigma left: three quarters. A law at its limit is as likely as not."""
+    staged["signs"] = replace(CLEAN, after=0.5)
+    found = judged(weighed(FRICTION, 0.0))
+    assert found.verdict == "partly_explained"
+    assert found.claims[0].probability == pytest.approx(0.75)
+    staged["signs"] = replace(CLEAN, strained=("mu at its bound",), strange=True)
+    assert judged(weighed(FRICTION, 0.0)).claims[0].probability == pytest.approx(0.5)
+
+
+def test_sets_as_good_as_the_claimed_are_ambiguous_unless_they_only_add(staged: dict[str, Any]) -> None:
+    near, far, more = weighed(CREEP, -9.0), weighed(DELAY, -13.0), weighed(BOTH, -1.0)
+    assert judged(weighed(FRICTION, 0.0), near, far, more).ambiguous == (CREEP,)  # within ACCEPT = 12
+
+
+def test_a_second_robot_is_seen_only_where_no_effects_explain_as_much(staged: dict[str, Any]) -> None:
+    """The effects lower the cost by 900."""
+    best = weighed(FRICTION, 0.0, cost=100.0)
+    staged["rigs"] = SimpleNamespace(fall=800.0)
+    assert judged(best).rigs is None
+    assert judged(best).verdict == "explained"
+    staged["rigs"] = SimpleNamespace(fall=1000.0)
+    found = judged(best)
+    assert (found.verdict, found.claims, found.final.effects, found.rigs) == ("unexplained", (), BASE, staged["rigs"])
+    assert (found.signs.after, found.signs.unseen) == (2.0, 0.07)  # those of the robot as it stays
+
+
+def test_effects_that_do_worse_on_trials_left_out_count_nothing(staged: dict[str, Any]) -> None:
+    staged["worse"] = (FRICTION,)
+    found = judged(weighed(FRICTION, 0.0))
+    assert (found.verdict, found.claims, found.final.effects) == ("noise", (), BASE)
+
+
+@pytest.mark.parametrize(
+    ("sign", "size", "strange"),
+    [("none", 2.0, False), ("misbent", 2.0, True), ("misbent", 0.1, False), ("change", 2.0, True), ("change", 0.1, False),
+     ("strained", 0.1, True)],
+)  # fmt: skip
+def test_what_no_known_effect_does_is_strange(sign: str, size: float, strange: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error at one place or one that began at once, where there is an error (0.12 sigma) to speak of; a law at its
+    limit always."""
+    monkeypatch.setattr(stage, "misbent", lambda *_: sign == "misbent")
+    monkeypatch.setattr(stage, "change", lambda *_: "here" if sign == "change" else None)
+    monkeypatch.setattr(stage, "strained", lambda fit: ["mu at its bound"] if sign == "strained" else [])
+    monkeypatch.setattr(stage, "halved", lambda *_: True)
+    monkeypatch.setattr(stage, "left_out", lambda *_: SimpleNamespace(structure=0.3))
+    monkeypatch.setattr(stage, "Spectrum", SimpleNamespace(of=lambda *_: SimpleNamespace(peak=lambda z: (3.0, 0.2))))
+    bench = SimpleNamespace(measured=[np.zeros((4, 1))])
+    noise = SimpleNamespace(whitener=SimpleNamespace(noise=SimpleNamespace(sigma=1.0)))
+    study: Any = SimpleNamespace(bench=bench, trials=[0], objective=noise)
+    signs = look(study, weighed(BASE, 0.0, size=size), weighed(FRICTION, 0.0, size=size), BARS)
+    assert (signs.before, signs.after, signs.unseen, signs.line) == (size, size, 0.3, (3.0, 0.2))
+    assert (signs.halved, signs.strange, bool(signs.strained)) == (True, strange, sign == "strained")

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tools.tip_wrench import tip_wrench
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.errors import TwinError
 from twin.kinematics import HeatedRobot, LoadedRobot, inverse
-from twin.kinematics.tip_wrench import tip_wrench
 from twin.robots import load
 from twin.twin import Twin
 

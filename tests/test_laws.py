@@ -71,6 +71,9 @@ def test_a_delay_shifts_tensions_and_displacements_alike() -> None:
     # The signals are sines of 0.3 rad/s; cubics through samples up to 0.8 s apart miss them by far less than 1 % of the swing.
     np.testing.assert_allclose(delayed.tension, 1.5 + np.sin(0.3 * then[:, None] + np.arange(3)), atol=0.01)
     np.testing.assert_allclose(delayed.displacement, 5e-3 * np.sin(0.3 * then[:, None] + np.arange(3)), atol=5e-5)
+    two, up = np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0]])
+    short = Signals(two, two, up, up, np.zeros((2, 0, 3)), two)
+    np.testing.assert_allclose(law("time_delay", delay=0.25).command(short).tension[1], [0.75, 1.5, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -117,6 +120,17 @@ def test_a_lag_of_a_step_and_of_a_ramp() -> None:
     ramp = seen.with_(tension=t[:, None] * np.ones(3))
     late = law("actuator_lag", time=1.0, time_2=2.0).drive(ramp).tension[-1, 0]
     assert late == pytest.approx(60.0 - 3.0, rel=1e-9)
+
+
+def test_a_late_share_of_strain_comes_exponentially_whenever_rows_were_taken() -> None:
+    """A sudden strain e: read is e (1 - share exp(-t / tau)), t since the row before it, at rows of no even spacing."""
+    t, e = np.array([0.0, 0.1, 0.7, 1.9, 2.0, 7.0]), 0.05 * np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    one = np.full((6, 1), 1e3)
+    others = {"sensor": 1e3 * (1.0 + e[:, None]) ** 2, "sensor_rest": one}
+    zero = np.zeros((6, 1))
+    seen = Signals(t, t, zero, zero, np.zeros((6, 0, 3)), t, others=others)
+    read = named("sensor_hysteresis")({"share": 0.2, "time": 1.5}, 1).sense(seen).others["sensor"][:, 0]
+    np.testing.assert_allclose(np.sqrt(read / 1e3) - 1.0, e * (1.0 - 0.2 * np.exp(-t / 1.5)), atol=1e-14)
 
 
 def test_laws_meet_in_the_order_of_the_signal() -> None:
@@ -188,6 +202,34 @@ def test_laws_that_change_the_body_all_change_it() -> None:
             moved = (abs(was) + 1e-3) / abs(was) * np.exp(0.1j) if i == 1 else 1.0
             assert abs(now - was * moved) < 1e-15
             assert body.spec.site(name).pos[2] == z
+
+
+def test_a_drum_that_is_not_round_errs_by_its_turn_and_reports_what_it_believes() -> None:
+    """delivered = u + s sin(2 pi u / turn) + c (1 - cos(2 pi u / turn)); where tensions command, the encoder says the u that
+    delivers what the tendon did."""
+    crooked = law("transmission_error", turn=0.02, sine_1=2e-4, cosine_1=-3e-4, cosine_2=1e-4)
+    u = np.array([[0.0, 0.0, 0.0], [2.5e-3, 5e-3, 5e-3], [7e-3, -1e-2, 3e-3]])
+    time, zero = np.arange(3.0), np.zeros((3, 3))
+    phase = 2.0 * np.pi * u / 0.02
+    delivered = u + np.sin(phase) * [2e-4, 0.0, 0.0] + (1.0 - np.cos(phase)) * [-3e-4, 1e-4, 0.0]
+    held = Signals(time, time, zero, u, np.zeros((3, 0, 3)), time, (Drive.DISPLACEMENT,) * 3)
+    np.testing.assert_allclose(crooked.drive(held).displacement, delivered, atol=1e-15)
+    pulled = held.with_(drives=(Drive.TENSION,) * 3, displacement=delivered)
+    np.testing.assert_allclose(crooked.sense(pulled).displacement, u, atol=1e-7)  # m: an iteration that shrinks by 0.1 each time
+
+
+def test_holes_are_moved_about_the_axis_or_away_from_it_or_both() -> None:
+    def holes(*effects: Effect) -> np.ndarray:
+        """Radius and azimuth (3, n, 2) of every tendon's."""
+        body = ROBOT.build()
+        for effect in effects:
+            effect.edit(body)
+        xy = np.array([[body.spec.site(name).pos[:2] for name in sites] for sites in body.tendons])
+        return np.stack([np.hypot(*np.moveaxis(xy, -1, 0)), np.unwrap(np.arctan2(xy[..., 1], xy[..., 0]))], axis=-1)
+
+    moved = holes(law("tendon_routing", radius_1=1e-3, angle_2=0.3, radius_3=-5e-4, angle_3=-0.2)) - holes()
+    expected = np.array([[1e-3, 0.0], [0.0, 0.3], [-5e-4, -0.2]])
+    np.testing.assert_allclose(moved, np.broadcast_to(expected[:, None], moved.shape), atol=1e-12)
 
 
 def test_an_asymmetric_body_is_stiff_about_one_axis_and_soft_about_the_other() -> None:
@@ -292,6 +334,9 @@ def test_springs_and_drives_are_sought_where_they_are() -> None:
     limits = [s.values["limit"] for s in named("actuator_saturation").starts([still], 3)]
     assert limits
     assert max(limits) < still.tension.max()
+    harder = still.with_(tension=3.0 * still.tension)
+    both = named("actuator_saturation").starts([still, harder], 3)
+    assert [s.values["limit"] for s in both] == pytest.approx([3.0 * x for x in limits])
     reached = still.markers[..., :2]
     for start in named("contact").starts([still], 3):
         towards = np.array([np.cos(start.values["azimuth"]), np.sin(start.values["azimuth"])])

@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import Day
 from twin.bench import Bench, prepare
-from twin.diagnose.loops import Loops, loops
+from twin.diagnose.loops import Loops, _along, loops
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
 
@@ -75,6 +75,21 @@ def test_one_visit_in_each_direction_leaves_time_and_direction_confounded() -> N
     # Times between the visits differ by order (200 s at most against some 80): half of what the drift does stays in the lag.
     assert abs(again.lag) < 0.5 * once.lag
     assert both.lag == pytest.approx(2.0 * HALF + again.lag, rel=0.05)
+
+
+def test_a_drift_is_half_the_difference_of_pairs_that_begin_pulling_and_that_begin_releasing() -> None:
+    """The pulls of TWICE come back after 199, 40 and 40 s in the mean of 80, 80 and 40 rows, 93 s; its release after 40 s."""
+    for rate in (1.5e-5, -4e-5):
+        each = loops(recorded(TWICE, lag=HALF, drift=rate, noise=1e-9)).each
+        assert [loop.drift for loop in each] == pytest.approx([rate * 0.5 * (93.0 + 40.0)] * 3, rel=0.05)
+
+
+def test_the_way_of_a_pull_is_from_the_least_fifth_to_the_largest() -> None:
+    rng = np.random.default_rng(1)
+    u, y = rng.permutation(100)[:, None] / 100.0, rng.normal(size=(100, 3))
+    order = np.argsort(u[:, 0])
+    way = y[order[80:]].mean(axis=0) - y[order[:20]].mean(axis=0)
+    np.testing.assert_allclose(_along(u, y), way / np.linalg.norm(way), atol=1e-12)
 
 
 def test_commands_that_never_come_back_show_no_loop() -> None:

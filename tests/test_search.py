@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from twin.diagnose import search as stage
+from twin.diagnose.budget import Budget
 from twin.diagnose.null import Thresholds
-from twin.diagnose.search import search
+from twin.diagnose.search import _material, search
 
 STUDY: Any = SimpleNamespace(
-    objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1)
+    objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1), budget=Budget()
 )
 
 
@@ -41,15 +42,33 @@ class World:
         """All promise enough to be tried."""
         return [SimpleNamespace(effect=e, start=None, gain=1e6) for e in self.worth if e not in fit.effects]
 
-    def found(self) -> Any:
+    def found(self, study: Any = STUDY) -> Any:
         base = self.of()
         patterns: Any = SimpleNamespace(beside=lambda effects: None)
-        return search(STUDY, base, patterns, Thresholds())
+        return search(study, base, patterns, Thresholds())
 
 
 def test_three_effects_are_found_together(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "drift": 200.0, "tilt": -5.0})
     assert world.found().best.effects == ("creep", "drift", "friction")
+
+
+def test_when_the_time_is_up_the_best_so_far_stands_and_the_rest_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time for two sets: those that promise most are tried first, so friction is found, and what was not tried is said once."""
+    left, budget = [2], Budget(1e9)
+
+    def clock() -> float:
+        left[0] -= 1
+        return 0.0 if left[0] >= 0 else 2e9
+
+    study = SimpleNamespace(**vars(STUDY))
+    study.budget = budget
+    monkeypatch.setattr("time.monotonic", clock)
+    world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "drift": 200.0})
+    assert world.found(study).best.effects == ("friction",)
+    assert budget.untried == ["drift", "friction + creep", "friction + drift", "creep + friction", "creep + drift"]
+    assert "not tried: drift, friction + creep" in budget.words()[0]
+    assert not Budget(1.0).words()
 
 
 def test_an_effect_that_does_not_pay_is_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,6 +91,31 @@ def test_an_imitation_that_led_is_dropped_when_the_causes_are_there(monkeypatch:
     worth = {"routing": 600.0, "decoy_a": 350.0, "decoy_b": 340.0, "friction": 300.0, "creep": 280.0}
     found = World(monkeypatch, worth, {"creep+friction": 500.0, "creep+friction+routing": -95.0}).found()
     assert found.best.effects == ("creep", "friction")
+
+
+def test_of_two_the_one_that_the_other_does_without_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Creep promises nothing until routing is there, and is worth as much without it: its set alone is met by dropping."""
+    world = World(monkeypatch, {"routing": 600.0, "creep": 690.0}, {"creep+routing": -595.0})
+
+    def rank(*asked: Any) -> list[Any]:
+        return [c for c in world.rank(*asked) if c.effect == "routing" or "routing" in asked[2].effects]
+
+    monkeypatch.setattr(stage, "rank", rank)
+    assert world.found().best.effects == ("creep",)
+
+
+def test_where_no_further_effect_pays_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, {"friction": 500.0, "creep": 11.0, "tilt": 10.0})
+    assert world.found().best.effects == ("friction",)
+    assert max(len(effects) for effects in world.refitted) == 2
+
+
+def test_a_candidate_must_promise_what_would_be_material() -> None:
+    """|z|^2 of bar^2 n, or of 15 % (an amplitude) of what the set explains in the group in which it explains least."""
+    fit = SimpleNamespace(fit=None)
+    for fall, least in (([4e5, 9e5], 0.15**2 * 4e5), ([1e4, 9e5], 0.5**2 * 1e4), ([-5.0, 9e5], 0.5**2 * 1e4)):
+        study: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), fall=lambda a, b, fall=fall: np.array(fall))
+        assert _material(study, fit, fit, 0.5) == pytest.approx(least)  # type: ignore[arg-type]
 
 
 def test_every_set_weighed_is_listed_best_first(monkeypatch: pytest.MonkeyPatch) -> None:

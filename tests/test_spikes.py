@@ -55,6 +55,22 @@ def test_a_spike_is_left_out_whole_and_said(quiet: tuple[Bench, list[np.ndarray]
     assert missing(found) == missing(bench) + 3 * rows
     assert len(words) == 1
     assert f"{bench.outputs[columns[0]].channel.name.rsplit('_', 1)[0]} {rows})" in words[0]
+    far = float(words[0].rsplit("up to ")[1].removesuffix(" mm"))
+    assert far == pytest.approx(np.sqrt(9.0**2 + 9.0**2 + 6.0**2), abs=1.5)  # four sigma of a row's noise and its window's, 0.25 mm
+
+
+def test_a_trial_too_short_to_have_neighbours_is_left_as_it_is_and_one_not_measured_too(
+    quiet: tuple[Bench, list[np.ndarray]],
+) -> None:
+    bench, predicted = quiet
+    short = replace(bench, measured=(bench.measured[0], bench.measured[1][:3]))
+    spiky = planted(planted(short, 0, [30], of_marker(bench, 4), np.full(3, 9e-3)), 1, [1], of_marker(bench, 4), np.full(3, 9e-3))
+    found, words = without_spikes(spiky, [predicted[0], predicted[1][:3]])
+    assert missing(found) == missing(spiky) + 3
+    np.testing.assert_array_equal(found.measured[1], spiky.measured[1])
+    assert len(words) == 1
+    blind = replace(bench, measured=tuple(np.full_like(y, np.nan) for y in bench.measured))
+    assert without_spikes(blind, predicted) == (blind, [])
 
 
 def test_what_moves_the_whole_body_stays(quiet: tuple[Bench, list[np.ndarray]]) -> None:

@@ -9,8 +9,10 @@ import pytest
 
 from tests.test_design import bench
 from tools.bench.design import bench_day
-from twin.bench import Bench
+from twin.bench import Bench, prepare
 from twin.diagnose.split import split
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import load
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +63,34 @@ def test_measurements_do_not_count(day: Bench) -> None:
     rng = np.random.default_rng(1)
     other = replace(day, measured=tuple(rng.normal(size=y.shape) for y in day.measured))
     assert split(other, 3) == split(day, 3)
+
+
+def pulls(tops: list[float], resting: int | None = None, nudged: tuple[tuple[int, int], ...] = ()) -> Bench:
+    """Trials in each of which tendon 1 is pulled to one of `tops` (N) and let go, each with a payload of its own: none repeats
+    another, and each shows what no other does. One may rest for 25 s on the way, some (trial, tendon) be nudged, by 1 mN."""
+    channels = [Channel(f"tendon_{i}_tension", "input", "N") for i in (1, 2, 3)] + [Channel("disk_8_x", "output", "mm")]
+    trials = []
+    for k, top in enumerate(tops):
+        time = np.arange(41.0)
+        values = {c.name: np.zeros(41) for c in channels} | {"tendon_1_tension": top * np.sin(np.pi * time / 40.0) ** 2}
+        if k == resting:
+            time = time + 25.0 * (time > 20.0)
+        values |= {f"tendon_{i}_tension": 1e-3 * (time == 20.0) for trial, i in nudged if trial == k}
+        trials.append(Trial(f"{k}.csv", time, values, {"tip_payload": 1e-3 * k}, start=100.0 * k))
+    recording = Recording("continuum", "a plan", "simulation: none", np.zeros(3), tuple(channels), tuple(trials))
+    return prepare(recording, load("continuum"))
+
+
+def sealed_of(bench: Bench) -> set[int]:
+    """Trials that one of 30 seeds seals: of eight alike each with a chance of 1 - 0.75^30."""
+    return {k for seed in range(30) for k in split(bench, seed)[1]}
+
+
+def test_the_only_hold_and_the_only_end_of_a_range_are_not_sealed_and_an_end_that_two_show_is() -> None:
+    """The commands span 2 N, a tenth of which is 0.2 N."""
+    alike = [2.0] * 6
+    assert sealed_of(pulls([2.0, 2.0, *alike])) == set(range(8))
+    assert sealed_of(pulls([2.0, 2.0, *alike], resting=0)) == set(range(1, 8))
+    assert sealed_of(pulls([2.0, 2.0, *alike], nudged=((0, 2), (0, 3), (1, 2), (2, 3)))) == set(range(8)), "a nudge is no motion"
+    assert sealed_of(pulls([4.0, 3.85, *alike])) == set(range(8))
+    assert sealed_of(pulls([4.0, 3.75, *alike])) == set(range(1, 8))

@@ -32,6 +32,7 @@ from tests.other_continua import (
 )
 from tools.bench.rod import Rod, follow
 from tools.bench.rod import solve as rod_solve
+from tools.tip_wrench import tip_wrench
 from twin.body import Problem
 from twin.compiled import jit
 from twin.effects import Drive, Loads, Route
@@ -40,7 +41,6 @@ from twin.equilibrium.lengths import pulls
 from twin.equilibrium.newton import place
 from twin.errors import DataError
 from twin.kinematics import LoadedRobot, inverse
-from twin.kinematics.tip_wrench import tip_wrench
 from twin.report.robot_page import draw
 from twin.robots import Robot, load
 from twin.twin import Twin

@@ -17,7 +17,6 @@ from twin.shape.cloud_fit import BEYOND, CLOUD
 from twin.shape.estimator import Felt
 from twin.shape.modal import Network
 from twin.shape.sensing import sense
-from twin.soft import SoftBody
 from twin.soft.skin import Skin, distances, facing
 from twin.soft.statics import single_thread, turned
 from twin.twin import Twin
@@ -28,8 +27,7 @@ TRIALS = 1500
 
 def search(recording: Recording, twin: Twin, seed: int = 1) -> tuple[dict[str, float], int]:
     """Values by parameter, and how many were tried."""
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = twin.robot.silicone(twin.body())
     free = [p for p in twin.robot.nuisance if p.name.startswith(("sensors.", "mounting."))]
     skin, net = Skin.of(body), Network.of(twin.robot)
     clouds = {t.name: t.clouds for t in recording.trials}

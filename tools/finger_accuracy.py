@@ -17,7 +17,7 @@ from tools.bench.finger.equilibria import Equilibrium, Finger, equilibrium
 from twin.body import Problem
 from twin.effects import Drive, Loads
 from twin.robots import load
-from twin.soft import SoftBody, SoftStatics
+from twin.soft import SoftStatics
 
 FULL = 0.0741  # strain at 2 N
 STEPS = 8
@@ -25,8 +25,8 @@ STEPS = 8
 
 def twin(E: float, kind: Drive, command: np.ndarray, side: np.ndarray, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Centreline (19, 3) mm, strains (4,) and ms a warm solve."""
-    body = load("finger").build({"silicone.youngs_modulus": E})
-    assert isinstance(body, SoftBody)
+    robot = load("finger")
+    body = robot.silicone(robot.build({"silicone.youngs_modulus": E}))
     solver = SoftStatics(body)
     way = np.outer(np.arange(1, STEPS + 1) / STEPS, command)
     problem = Problem(np.arange(float(STEPS)), way, Loads(gravity, force=side), drives=(kind,) * 4)

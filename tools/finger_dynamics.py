@@ -22,7 +22,7 @@ from twin.body import Path as Answer
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route
 from twin.robots import load
-from twin.soft import HandBody, HandDynamics, HandStatics, SoftBody, SoftDynamics, SoftStatics, dynamics
+from twin.soft import HandDynamics, HandStatics, SoftDynamics, SoftStatics, dynamics
 from twin.soft.scene import Scene, Thing
 
 FULL = 0.0741  # strain at 2 N
@@ -57,8 +57,8 @@ def moved(asked: Problem, step: float | None = None) -> tuple[Answer, float]:
     try:
         if step is not None:
             dynamics.step_for = lambda body: step
-        body = load("finger").build()
-        assert isinstance(body, SoftBody)
+        robot = load("finger")
+        body = robot.silicone(robot.build())
         solver = SoftDynamics(body)
         began = time.process_time()
         path = solver.solve(asked)
@@ -70,8 +70,8 @@ def moved(asked: Problem, step: float | None = None) -> tuple[Answer, float]:
 
 
 def finger(repeats: int) -> None:
-    body = load("finger").build()
-    assert isinstance(body, SoftBody)
+    robot = load("finger")
+    body = robot.silicone(robot.build())
     step = dynamics.step_for(body)
     print(f"finger, {1e3 * step:g} ms a step          tip at rest  strain at rest  half a step: worst, mean   speed")
     for motion in (eased, to_and_fro, exchanged):
@@ -87,8 +87,8 @@ def finger(repeats: int) -> None:
 
 
 def hand(repeats: int, picture: Path | None) -> None:
-    body = load("hand").build()
-    assert isinstance(body, HandBody)
+    robot = load("hand")
+    body = robot.hand(robot.build())
     one = problem(eased, seconds=0.4, hold=0.6)
     asked = replace(one, command=np.tile(one.command, (1, 3)), drives=one.drives * 3)
     ends = [solver.solve(asked).markers[-1] for solver in (HandDynamics(body), HandStatics(body))]

@@ -25,10 +25,10 @@ from tools.bench.nuisance import built
 from tools.bench.rod import Rod
 from tools.bench.sensors import Noise
 from tools.bench.write import write_set
+from tools.tip_wrench import tip_wrench
 from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.effects import Loads
 from twin.kinematics import LoadedRobot, inverse
-from twin.kinematics.tip_wrench import tip_wrench
 from twin.measurements import read
 from twin.robots import load
 from twin.robots.continuum_flex import build, settle

@@ -1,6 +1,7 @@
 """One line of the program changed: do the tests see it?
 
     python -m tools.mutants run [--seed 0] [--each 25] [--only GROUP ...]    tries them, into tools/mutants/outcomes.json, resumed
+    python -m tools.mutants again [--only GROUP ...]                         what survived without a reason, once more
     python -m tools.mutants table                                            rate by package, and the survivors with their reasons
 
 Mutants are made from the syntax tree (an operator or a sign turned, a comparison's edge moved, a number doubled, halved or one

@@ -6,6 +6,7 @@ import argparse
 import json
 import tomllib
 from collections import Counter
+from collections.abc import Callable
 from fnmatch import fnmatchcase
 from pathlib import Path
 from random import Random
@@ -25,26 +26,31 @@ NEW = "survived"  # or never tried
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tools.mutants", description="One line changed: do the tests see it?")
-    parser.add_argument("what", choices=["run", "table"])
+    parser.add_argument("what", choices=["run", "again", "table"], help="again: what survived without a reason")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--each", type=int, default=25, help="mutants sampled of each group")
     parser.add_argument("--only", nargs="+", choices=sorted(GROUPS), help="groups")
     parser.add_argument("--patience", type=float, default=300.0, help="s, for the tests of one mutant")
     args = parser.parse_args()
-    if args.what == "run":
-        run(args.only or list(GROUPS), args.seed, args.each, args.patience)
+    if args.what != "table":
+        drawn = (lambda texts: sampled(texts, args.seed, args.each)) if args.what == "run" else survivors
+        run(args.only or list(GROUPS), drawn, args.patience)
     print(table(_known()))
 
 
-def run(groups: list[str], seed: int, each: int, patience: float) -> None:
-    """Tries the sampled mutants and those by hand, of these groups; the killed are not tried again, nor survivors
-    with a reason. Raises SystemExit where a group's tests fail on the tree as it is."""
+def run(groups: list[str], drawn: Callable[[dict[str, str]], list[Mutant]], patience: float) -> None:
+    """Tries the mutants drawn from each group's files, by name, and those by hand; the killed are not tried again, nor survivors
+    with a reason, and those whose line is no more are forgotten. Raises SystemExit where a group's tests fail on the tree as it
+    is."""
     tree = Tree(HERE.parents[1])
     try:
-        known, texts = _known(), tree.texts()
+        texts = tree.texts()
+        there = {m.key for m in every(texts)}
+        known = {key: outcome for key, outcome in _known().items() if key in there}
         for group in groups:
             own = {f: t for f, t in texts.items() if group_of(f) == group}
-            todo = [m for m in (*by_hand(own), *sampled(own, seed, each)) if known.get(m.key, NEW) == NEW and not reason(m.key)]
+            here = {m.key: m for m in (*by_hand(own), *drawn(own))}
+            todo = [m for key, m in here.items() if known.get(key, NEW) == NEW and not reason(key)]
             if todo and (code := tree.run(group, None, None)) != 0:
                 raise SystemExit(f"the tests of {group} do not pass on the tree as it is (pytest's exit code {code})")
             for mutant in todo:
@@ -55,9 +61,19 @@ def run(groups: list[str], seed: int, each: int, patience: float) -> None:
         tree.close()
 
 
+def every(texts: dict[str, str]) -> list[Mutant]:
+    return [*by_hand(texts), *(m for file, text in texts.items() for m in mutants(file, text))]
+
+
 def sampled(texts: dict[str, str], seed: int, each: int) -> list[Mutant]:
-    every = [m for file, text in texts.items() for m in mutants(file, text)]
-    return Random(seed).sample(every, min(each, len(every)))
+    there = [m for file, text in texts.items() for m in mutants(file, text)]
+    return Random(seed).sample(there, min(each, len(there)))
+
+
+def survivors(texts: dict[str, str]) -> list[Mutant]:
+    """Those known to have survived."""
+    known = _known()
+    return [m for m in every(texts) if known.get(m.key) == NEW]
 
 
 def table(known: dict[str, str]) -> str:

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.errors import DataError, SolveError
+from twin.errors import SolveError
 from twin.factory.points import named_points
 from twin.factory.solve import CLOSE, hang, march, weight_of
-from twin.soft import SoftBody, SoftStatics
+from twin.soft import SoftStatics
 from twin.soft.solid import Solid
 from twin.soft.statics import single_thread, turned
 from twin.twin import Twin
@@ -37,9 +37,7 @@ class HeldFinger:
 
     def __init__(self, twin: Twin) -> None:
         """Hanging at rest. Raises DataError for a robot that is no single soft finger."""
-        body = twin.body()
-        if not isinstance(body, SoftBody):
-            raise DataError(f"robot {twin.robot.name!r} is no silicone finger: only the family 'soft' is held by its shape")
+        body = twin.robot.silicone(twin.body())
         self.body, self.route = body, twin.laws.route
         self.statics = SoftStatics(body)
         self.rest = named_points(twin.robot).rest

@@ -27,7 +27,5 @@ class Budget:
         if not self.untried:
             return ()
         untried = ", ".join(self.untried)
-        return (
-            f"the budget of {self.seconds:.3g} s ended the search; not tried: {untried}. The verdict stands on what was tried; more "
-            "time may find more",
-        )
+        after = f"the budget of {self.seconds:.3g} s ended the search; not tried: {untried}."
+        return (f"{after} The verdict stands on what was tried; more time may find more",)

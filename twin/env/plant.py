@@ -6,7 +6,7 @@ By MuJoCo's steps, or from one static equilibrium to the next: a robot moved slo
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from twin.body import Problem
 from twin.dynamics import Dynamics, Moving, Seen
 from twin.effects import Drive, Loads
 from twin.env.wires import Wires
-from twin.errors import DataError, SolveError
-from twin.hinges import HingeChain
-from twin.robots.family import family
+from twin.errors import SolveError
 from twin.twin import Twin
 
 
@@ -59,13 +57,11 @@ class Plant:
     """A body with tendons, driven by commanded load-cell readings at equal intervals. One instance serves one thread."""
 
     def __init__(self, twin: Twin, interval: float, payload: float = 0.0, dynamic: bool = True) -> None:
-        """At rest, slack, under its own gravity and `payload` (kg). Raises DataError for a robot without dynamics, SolveError where
-        the load has no equilibrium."""
-        self.twin, self.interval, self.body = twin, interval, twin.body()
-        if family(twin.robot.family).dynamics is None or not isinstance(self.body, HingeChain):
-            raise DataError(f"robot {twin.robot.name!r} has no dynamics here: give a twin of a backbone pulled by tendons")
+        """At rest, slack, under its own gravity and `payload` (kg). Raises DataError for a robot without a backbone, SolveError
+        where the load has no equilibrium."""
+        self.twin, self.interval, self.body = twin, interval, twin.robot.chain(twin.body())
         laws, n = twin.laws, twin.robot.n_tendon
-        dynamics = cast(Dynamics, twin.robot.solver(self.body, dynamic=True))
+        dynamics = Dynamics(self.body)
         loads, stiffness = laws.surround(Loads(twin.robot.gravity, payload)), laws.stiffness(np.full(1, ROOM), np.zeros(1))
         self.moving = (Moving if dynamic else Resting)(
             dynamics, Problem(np.zeros(1), np.zeros((1, n)), loads, laws.route, creep=laws.creep, stiffness=stiffness)

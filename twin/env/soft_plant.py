@@ -16,7 +16,6 @@ from twin.body import Problem
 from twin.effects import Drive, Loads
 from twin.env.wires import Wires
 from twin.errors import DataError
-from twin.soft import HandBody, SoftBody
 from twin.soft.dynamics import Moving, Relaxed, Started, step_for
 from twin.soft.flex import flex
 from twin.soft.scene import Scene, Sight, Thing
@@ -40,9 +39,7 @@ class FingerPlant:
     def __init__(self, twin: Twin, interval: float) -> None:
         """Hanging at rest; `interval` (s) is rounded to whole steps. Raises DataError for a robot that is no silicone finger,
         SolveError where it has no equilibrium."""
-        body = twin.body()
-        if not isinstance(body, SoftBody):
-            raise DataError(f"robot {twin.robot.name!r} is no silicone finger: give a twin of the family 'soft'")
+        body = twin.robot.silicone(twin.body())
         laws, n = twin.laws, body.n_tendon
         self.body, self._wires = body, Wires(laws, Drive.DISPLACEMENT, n)
         stiffness = laws.stiffness(np.full(1, ROOM), np.zeros(1))
@@ -86,9 +83,7 @@ class HandPlant:
     def __init__(self, twin: Twin, things: list[Thing], interval: float) -> None:
         """At rest, the servos at zero. Raises DataError for a robot that is no hand and for effects that do not act here,
         SolveError where it has no equilibrium."""
-        body = twin.body()
-        if not isinstance(body, HandBody):
-            raise DataError(f"robot {twin.robot.name!r} is no hand: give a twin of the family 'hand'")
+        body = twin.robot.hand(twin.body())
         idle = [e.id for e in twin.effects if e.acts_in("soften", "deform", "command", "drive", "sense")]
         if idle:
             raise DataError(f"effects {', '.join(idle)} do not act among things that the hand touches: remove them from the twin")

@@ -3,7 +3,6 @@
 robot.py       a twin under its loads: forward kinematics, step by step
 heated.py      the same pulled by SMA springs, stepped in time
 inverse.py     the tensions for a wanted tip, by sectors or in general
-tip_wrench.py  the reference of Peng et al.: a rod under a tip wrench
 """
 
 from twin.kinematics.heated import HeatedRobot

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
 
 import mujoco
 import numpy as np
@@ -19,8 +18,7 @@ from twin.equilibrium import Equilibrium
 from twin.equilibrium.chain import Law, Load, State, Statics, become, copied
 from twin.equilibrium.move import STRIDE, answer, pull
 from twin.equilibrium.newton import no_factors, place
-from twin.errors import DataError, SolveError
-from twin.hinges import HingeChain
+from twin.errors import SolveError
 from twin.twin import Twin
 
 
@@ -46,10 +44,8 @@ class LoadedRobot:
 
         Raises DataError for a robot without a backbone that tensions bend.
         """
-        self.twin, laws, body = twin, twin.laws, twin.body()
-        if "backbone" not in body.parts:
-            raise DataError(f"robot {twin.robot.name!r} has no backbone: its shape under tensions is not known here")
-        self.solver, self.length = cast(Equilibrium, twin.robot.solver(body)), cast(HingeChain, body).length
+        self.twin, laws, body = twin, twin.laws, twin.robot.chain(twin.body())
+        self.solver, self.length = Equilibrium(body), body.length
         loads = laws.surround(loads or Loads(twin.robot.gravity))
         self.softness = 1.0 / float(laws.stiffness(np.full(1, temperature), np.zeros(1))[0])
         self.loads, self.temperature, self.route = loads, temperature, laws.route

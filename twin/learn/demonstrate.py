@@ -53,10 +53,7 @@ def stream(seed: int, attempt: int) -> np.random.Generator:
 
 
 def body_of(robot: Robot, values: dict[str, float]) -> HandBody:
-    body = robot.build(values)
-    if not isinstance(body, HandBody):
-        raise DataError(f"robot {robot.name!r} is no hand; demonstrations are shown to hands")
-    return body
+    return robot.hand(robot.build(values))
 
 
 def demonstrate(order: Order, folder: Path, jobs: int, progress: Callable[[str], None] = lambda words: None) -> Counter[Outcome]:

@@ -10,10 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twin.errors import DataError
-from twin.quantities import overrides
 from twin.robots import Robot, load
-from twin.robots.hand_schema import Hand, of_finger
 from twin.sensors import strain
 from twin.shape.estimator import Felt
 from twin.shape.modal import Modal
@@ -46,12 +43,9 @@ def aligned(robot: Robot, values: dict[str, float], seed: int) -> dict[str, floa
 
 def fingers(robot: Robot, values: dict[str, float]) -> list[Twin]:
     """A twin of each finger of a hand. Raises DataError for a robot that is no hand."""
-    if robot.family != "hand":
-        raise DataError(f"robot {robot.name!r} is no hand; demonstrations and policies are of hands")
-    structure, one = Hand.model_validate(dict(robot.structure)), load(FINGER)
-    known, all_values = {p.name for p in one.parameters}, overrides(robot.parameters, values)
-    own = (of_finger(k, structure, all_values) for k in range(structure.fingers))
-    return [Twin(one, {n: v for n, v in each.items() if n in known}, ()) for each in own]
+    hand, one = robot.hand(robot.build(values)), load(FINGER)
+    known = {p.name for p in one.parameters}
+    return [Twin(one, {n: v for n, v in own.items() if n in known}, ()) for own in hand.numbers]
 
 
 class Eye:

@@ -27,7 +27,7 @@ from twin.quantities import each
 from twin.robots.backbone import BODIES, Backbone, Piece
 from twin.robots.continuum_schema import SCHEMA, Continuum, disk_masses, hole_places
 
-__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
+__all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
 ALUMINIUM = [0.72, 0.74, 0.78, 1.0]
 NITI = [0.35, 0.38, 0.44, 1.0]
@@ -229,3 +229,10 @@ def dynamics(body: HingeChain) -> Dynamics:
 
 def figure(body: HingeChain) -> ChainFigure:
     return ChainFigure(body, statics(body))
+
+
+def chain(body: HingeChain) -> HingeChain:
+    return body
+
+
+silicone = hand = None

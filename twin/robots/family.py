@@ -11,19 +11,25 @@ from typing import Any, Protocol, cast
 from twin.body import Body, Solver
 from twin.errors import UnknownNameError
 from twin.figure import Figure
+from twin.hinges import HingeChain
 from twin.robots.schema import Schema
+from twin.soft import HandBody, SoftBody
 
 
 class Family(Protocol):
     """A module of `twin.robots` with these names is a family, found by the name that `robot.toml` gives.
 
-    SCHEMA: all it reads of a file. `dynamics` is None where bodies are solved by statics only. `figure`, that of a
-    body, is None where bodies are not drawn.
+    SCHEMA: all it reads of a file. What not every body can is None where it cannot: `dynamics` solves it in motion, `figure` draws
+    it; `chain`, `silicone` and `hand` give it as that mechanics knows it (a chain of hinges, one piece of silicone, silicone
+    fingers on a palm), to those who need more of a body than its solver: `Robot` asks for them.
     """
 
     SCHEMA: Schema
     dynamics: Callable[[Any], Solver] | None
     figure: Callable[[Any], Figure] | None
+    chain: Callable[[Any], HingeChain] | None
+    silicone: Callable[[Any], SoftBody] | None
+    hand: Callable[[Any], HandBody] | None
 
     def build(self, structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
         """The robot of these counts and values (SI, by parameter name). Raises DataError for what cannot be built."""

@@ -18,14 +18,15 @@ from twin.soft import HandBody, HandDynamics, HandStatics
 from twin.soft.figure import PALM, THICK, HandFigure
 from twin.soft.statics import turned
 
-__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
+__all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HandBody:
     """The hand of `structure` and `values` (SI, by parameter name) that SCHEMA allows."""
     shape = Hand.model_validate(dict(structure))
     one, n = shape.finger().model_dump(), shape.fingers
-    fingers = tuple(soft.build(one, of_finger(k, shape, values)) for k in range(n))
+    numbers = tuple(of_finger(k, shape, values) for k in range(n))
+    fingers = tuple(soft.build(one, own) for own in numbers)
     angle = 2.0 * np.pi * np.arange(n) / n
     places = values["palm.radius"] * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
     turns = np.stack([turned(a + np.pi) for a in angle])
@@ -50,6 +51,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HandB
         tendons=tuple(tuple(_prefix(k) + site for site in sites) for k, finger in enumerate(fingers) for sites in finger.tendons),
         markers=tuple(_prefix(k) + site for k, finger in enumerate(fingers) for site in finger.markers),
         fingers=fingers,
+        numbers=numbers,
         places=places,
         turns=turns,
     )
@@ -81,3 +83,10 @@ def dynamics(body: HandBody) -> HandDynamics:
 
 def figure(body: HandBody) -> HandFigure:
     return HandFigure(body)
+
+
+def hand(body: HandBody) -> HandBody:
+    return body
+
+
+chain = silicone = None

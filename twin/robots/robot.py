@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -15,16 +15,19 @@ from twin.body import Body, Problem, Solver
 from twin.effects import Loads
 from twin.errors import DataError, TwinError, UnknownNameError, listed, shown
 from twin.forms import Form, Line, fill
+from twin.hinges import HingeChain
 from twin.measurements.files import is_file, read_text
 from twin.quantities import Parameter, Values, overrides
 from twin.robots.effect_tables import read_effects
 from twin.robots.family import family
 from twin.robots.schema import GRAVITY, Fact, Quantity, Row, Schema, Structure, absent, parameters, unknown
 from twin.robots.toml_file import LARGEST, checked
+from twin.soft import HandBody, SoftBody
 from twin.springs import Spring, springs_of
 
 FORMAT = "twin-robot/1"
 FILE = "robot.toml"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,23 @@ class Robot:
         if made_by.dynamics is None:
             raise DataError(f"robot {self.name!r} is predicted by statics only: a {self.family} has no dynamics here")
         return made_by.dynamics(body)
+
+    def chain(self, body: Body) -> HingeChain:
+        """A body of this robot's family as the chain of hinges that it is. Raises DataError where it is none."""
+        return self._able(family(self.family).chain, "has no backbone: give a twin of one pulled by tendons")(body)
+
+    def silicone(self, body: Body) -> SoftBody:
+        """A body of this robot's family as the one piece of silicone that it is. Raises DataError where it is none."""
+        return self._able(family(self.family).silicone, "is no soft body: give a twin of a single silicone finger")(body)
+
+    def hand(self, body: Body) -> HandBody:
+        """A body of this robot's family as the fingers on a palm that it is. Raises DataError where it is none."""
+        return self._able(family(self.family).hand, "is no hand: give a twin of silicone fingers on a palm")(body)
+
+    def _able(self, view: Callable[[Any], T] | None, lacking: str) -> Callable[[Any], T]:
+        if view is None:
+            raise DataError(f"robot {self.name!r} {lacking}")
+        return view
 
     def objections(self, values: Values) -> list[str]:
         """What is wrong between this robot's numbers, at the given values, that are each in order."""

@@ -15,7 +15,7 @@ from twin.sensors import Cords
 from twin.soft import Cone, SoftBody, SoftDynamics, SoftStatics, lattice, straight
 from twin.soft.figure import SoftFigure
 
-__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
+__all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
 SILICONE, CORD, SENSOR, SPOT = [0.93, 0.9, 0.82, 0.45], [0.85, 0.6, 0.15, 1.0], [0.15, 0.15, 0.18, 1.0], [0.9, 0.2, 0.2, 1.0]
 DISCS = 24  # of the picture
@@ -118,3 +118,10 @@ def dynamics(body: SoftBody) -> SoftDynamics:
 
 def figure(body: SoftBody) -> SoftFigure:
     return SoftFigure(body)
+
+
+def silicone(body: SoftBody) -> SoftBody:
+    return body
+
+
+chain = hand = None

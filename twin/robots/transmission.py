@@ -18,7 +18,7 @@ from twin.effects import Drive
 from twin.equilibrium.antagonists import Pair, follow
 from twin.robots.transmission_schema import SCHEMA, Transmission
 
-__all__ = ["SCHEMA", "build", "dynamics", "figure", "statics"]
+__all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
 STEEL = [0.72, 0.74, 0.78, 1.0]
 TIMESTEP = 1e-3  # s
@@ -135,4 +135,4 @@ def statics(body: Jaw) -> Antagonists:
 
 
 dynamics = None  # a jaw is predicted by statics only
-figure = None
+figure = chain = silicone = hand = None

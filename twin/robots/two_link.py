@@ -287,4 +287,4 @@ def statics(body: Finger) -> Statics:
 
 
 dynamics = None  # its first mode is some 5 Hz; slow logs are all it is for
-figure = None
+figure = chain = silicone = hand = None

@@ -30,7 +30,7 @@ from twin.shape.band import Bands, Behind, widened_by
 from twin.shape.cloud_fit import BEYOND, CLOUD, CloudFit
 from twin.shape.estimator import Felt, estimators
 from twin.shape.modal import Network
-from twin.shape.sensing import Sensed, sense
+from twin.shape.sensing import Sensed, feeling, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
 from twin.soft import SoftBody, SoftStatics
 from twin.soft.skin import Skin, distances, facing
@@ -83,8 +83,7 @@ def align(recording: Recording, twin: Twin, progress: Callable[[str], None] = la
 def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) -> Aligned:
     begun = time.perf_counter()
     shown, notices = _shown(recording, twin)
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = feeling(twin)
     skin = Skin.of(body)
     progress("turning the finger onto its clouds")
     before = _misfit(skin, shown, body.turn)
@@ -156,8 +155,7 @@ def _angle(skin: Skin, shown: Sequence[Shown], twin: Twin) -> tuple[float, float
 
 def _known(shown: Sequence[Shown], fit: CloudFit, statics: SoftStatics, net: Network, twin: Twin) -> Known:
     """Strains that the shapes have, and resistances measured there."""
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = feeling(twin)
     parts = []
     for trial in shown:
         if trial.nodes is not None:
@@ -201,8 +199,7 @@ def _strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.
 
 def _behind(trial: Shown, fit: CloudFit, net: Network, twin: Twin) -> Behind:
     """The named points behind a pushed trial's clouds."""
-    body = twin.body()
-    assert isinstance(body, SoftBody)
+    body = feeling(twin)
     felt, found, at = _fitted(trial, fit, net, body)
     weights = body.lattice.weights(named_points(twin.robot).rest)
     moved = np.einsum("pn,fnc->fpc", weights, net.modes.nodes(np.stack([z for z, _ in found])))

@@ -21,8 +21,7 @@ from twin.errors import DataError
 from twin.sensors import Cords, resistance, strain
 from twin.shape.free import Free, far
 from twin.shape.modal import Network
-from twin.shape.sensing import Sensed
-from twin.soft import SoftBody
+from twin.shape.sensing import Sensed, feeling
 from twin.twin import Twin
 
 LEAST = 0.005  # of log R: 0.0017 at most was seen of sensors that do not drift (bench days 501, 512, 513 and one of another bench)
@@ -34,12 +33,11 @@ def steadied(trials: Sequence[Sensed], starts: Sequence[float | None], twin: Twi
     if any(effect.physical for effect in twin.effects):
         return tuple(trials), ()  # its tendons make other strains than those the network has learnt
     try:
-        free, body = Network.of(twin.robot).free, twin.body()
+        free, cords = Network.of(twin.robot).free, feeling(twin).cords
     except DataError:  # a robot without these weights: no strains to compare with
         return tuple(trials), ()
-    assert isinstance(body, SoftBody)
     clock = [float(k) if None in starts else float(s or 0.0) for k, s in enumerate(starts)]
-    told = [(t, g) for t, trial in zip(clock, trials, strict=True) if (g := _drift(trial, free, body.cords)) is not None]
+    told = [(t, g) for t, trial in zip(clock, trials, strict=True) if (g := _drift(trial, free, cords)) is not None]
     if not told:
         return tuple(trials), ()
     times, drifts = np.array([t for t, _ in told]), np.stack([g for _, g in told])

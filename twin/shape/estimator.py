@@ -15,9 +15,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from twin.errors import DataError, UnknownNameError
+from twin.errors import UnknownNameError
 from twin.factory import Points, named_points
-from twin.soft import SoftBody
+from twin.shape.sensing import feeling
 from twin.twin import Twin
 
 Z90 = 1.645  # standard deviations: the band is 1.645 std wide
@@ -64,10 +64,7 @@ class Estimator(ABC):
 
     def __init__(self, twin: Twin) -> None:
         """Raises DataError for a robot that no estimator knows."""
-        body = twin.body()
-        if not isinstance(body, SoftBody) or len(body.cord_paths) == 0:
-            raise DataError(f"robot {twin.robot.name!r} feels no strain: shape is estimated for soft bodies with strain sensors")
-        self.twin, self.body = twin, body
+        self.twin, self.body = twin, feeling(twin)
         self.points: Points = named_points(twin.robot)
 
     @classmethod

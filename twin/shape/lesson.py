@@ -61,9 +61,7 @@ class Data:
 
 def load(folder: Path, robot: Robot) -> Data:
     """From the shards in `folder`. Raises DataError where they cannot be read, are too few, or the robot is no finger."""
-    body = robot.build()
-    if not isinstance(body, SoftBody):
-        raise DataError(f"robot {robot.name!r} is no soft body; shape is learned of fingers")
+    body = robot.silicone(robot.build())
     points = named_points(robot)
     weights = body.lattice.weights(points.rest)
     d = shard.read(folder, ["sample", "converged", "nodes", "strain", "command", "tension", "kind"])

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.bench import CONTACT, Inputs, prepare
-from twin.body import Body
 from twin.effects import Drive
 from twin.errors import DataError
 from twin.measurements import Recording
@@ -43,14 +42,20 @@ class Sensed:
         return strain(self.resistance, cords)
 
 
+def feeling(twin: Twin) -> SoftBody:
+    """The finger of a twin. Raises DataError for a robot that feels no strain or is no single finger."""
+    body = twin.body()
+    if "strain sensors" not in body.parts:
+        raise DataError(f"robot {twin.robot.name!r} feels no strain: shape is estimated for soft bodies with strain sensors")
+    return twin.robot.silicone(body)
+
+
 def sense(recording: Recording, twin: Twin) -> tuple[tuple[Sensed, ...], tuple[str, ...]]:
     """Trials in the order of the recording, and what a reader should know.
 
     Raises DataError for a missing column of a sensor, a resistance that is not above zero, or tendons not driven by displacement.
     """
-    body = twin.body()
-    if not isinstance(body, SoftBody) or not len(body.cord_paths):
-        raise DataError(f"robot {twin.robot.name!r} feels no strain: shape is estimated for soft bodies with strain sensors")
+    body = feeling(twin)
     channels = [f"sensor_{i + 1}_resistance" for i in range(len(body.cord_paths))]
     there = {c.name for c in recording.channels}
     if missing := [c for c in channels if c not in there]:
@@ -103,10 +108,9 @@ def _alive(name: str, channels: list[str], values: np.ndarray, rest: np.ndarray)
     return out, said
 
 
-def _trial(twin: Twin, body: Body, inputs: Inputs, reported: np.ndarray, contact: str | None) -> Sensed:
+def _trial(twin: Twin, body: SoftBody, inputs: Inputs, reported: np.ndarray, contact: str | None) -> Sensed:
     laws = twin.laws
     driven = laws.drive(laws.command(inputs.signals.with_(antagonists=body.antagonists)))
-    assert isinstance(body, SoftBody)
     known = np.where(np.isfinite(reported), reported, body.cords.rest)
     rest, R = np.broadcast_to(body.cords.rest, known.shape), known.copy()
     if any(e.acts_in("sense") for e in twin.effects):

@@ -6,6 +6,7 @@ finger to finger.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -21,10 +22,11 @@ from twin.soft.statics import SoftPath, SoftStatics, turned
 
 @dataclass(frozen=True, kw_only=True)
 class HandBody(Body):
-    """Fingers, where their frames are (n, 3) m and how they are turned (n, 3, 3), in the palm's frame. A payload or a force at "the
-    tip" is held by all fingers alike."""
+    """Fingers, the numbers that each was built of, where their frames are (n, 3) m and how they are turned (n, 3, 3), in the
+    palm's frame. A payload or a force at "the tip" is held by all fingers alike."""
 
     fingers: tuple[SoftBody, ...]
+    numbers: tuple[Mapping[str, float], ...]
     places: np.ndarray
     turns: np.ndarray
 

@@ -1,0 +1,194 @@
+"""The smooth error nobody named, against the same Gaussian written out in full; lines, against waves that were put in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from twin.bench import Bench, prepare
+from twin.diagnose.evidence import COMPONENTS, Evidence, Spectrum, regressors, slope
+from twin.diagnose.thresholds import HIGHEST, LOWEST, MEMORY, NOTHING
+from twin.measurements import Channel, Recording, Trial
+from twin.robots import load
+
+N, TRIALS = 30, 3
+ROWS = slice(N, 2 * N)  # of the second trial
+
+
+def made() -> Bench:
+    """Three trials of two tendons, the second in uneven rows, later and warmer, with some markers missing."""
+    channels = [Channel(f"tendon_{i}_tension", "input", "N") for i in (1, 2, 3)]
+    channels += [Channel(f"disk_8_{a}", "output", "mm") for a in "xyz"] + [Channel("tendon_1_displacement", "output", "mm")]
+    channels += [Channel("ambient_temperature", "context", "K")]
+    trials = []
+    for k in range(TRIALS):
+        time = np.linspace(0.0, 20.0, N) + (k == 1) * 0.3 * np.sin(np.arange(N))
+        values = {c.name: np.zeros(N) for c in channels} | {"ambient_temperature": np.full(N, 293.0 + 2.0 * k)}
+        values["tendon_1_tension"] = (1.0 + k) * np.sin(np.pi * time / 20.0) ** 2
+        values["tendon_2_tension"] = 1.5 + np.cos(0.4 * time + k)
+        if k == 1:
+            for a in "xyz":
+                values[f"disk_8_{a}"] = np.where(np.arange(N) % 7 == 3, np.nan, 0.0)
+        trials.append(Trial(f"{k}.csv", time, values, {"tip_payload": 0.01 * k}, start=100.0 * k))
+    return prepare(
+        Recording("continuum", "made", "simulation: none", np.zeros(3), tuple(channels), tuple(trials)), load("continuum")
+    )
+
+
+BENCH = made()
+EVIDENCE = Evidence(BENCH, range(TRIALS))
+M = len(BENCH.outputs)
+
+
+def covariance(variance: np.ndarray, j: int) -> np.ndarray:
+    """I + Phi D Phi' of channel j's measured rows, written out."""
+    phi = EVIDENCE.phi.matrix[EVIDENCE.present[:, j]]
+    return np.eye(len(phi)) + phi * variance[EVIDENCE.member[j], EVIDENCE.phi.component] @ phi.T
+
+
+def likelihood(z: np.ndarray, variance: np.ndarray) -> float:
+    """2 (log N(z; 0, C) - log N(z; 0, I)), channel by channel."""
+    total = 0.0
+    for j, r in enumerate(EVIDENCE.present.T):
+        C = covariance(variance, j)
+        total += 2.0 * (multivariate_normal.logpdf(z[r, j], cov=C) - multivariate_normal.logpdf(z[r, j], cov=np.eye(len(C))))
+    return total
+
+
+@pytest.fixture(scope="module")
+def residual() -> np.ndarray:
+    """White noise and a smooth error of each component that only the marker's channels have."""
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(N * TRIALS, M))
+    phi = EVIDENCE.phi
+    for c in range(len(COMPONENTS)):
+        z[:, :3] += 0.4 * phi.matrix[:, phi.component == c] @ rng.normal(size=((phi.component == c).sum(), 3))
+    return np.where(EVIDENCE.present, z, 0.0)
+
+
+def test_gain_and_mean_are_those_of_the_gaussian(residual: np.ndarray) -> None:
+    found = EVIDENCE.discrepancy(residual)
+    assert found.gain == pytest.approx(likelihood(residual, found.variance), rel=1e-9)
+    assert found.gain > 50.0
+    for j in range(M):
+        r, C = EVIDENCE.present[:, j], covariance(found.variance, j)
+        np.testing.assert_allclose(found.mean[r, j], (C - np.eye(len(C))) @ np.linalg.solve(C, residual[r, j]), atol=1e-8)
+        assert not found.mean[~r, j].any()
+    assert found.size == pytest.approx(np.sqrt((found.mean**2).sum() / found.mean.size))
+    total, again = EVIDENCE.log_likelihood_gain(residual)
+    assert total == pytest.approx(found.gain - (residual**2).sum())
+    assert again.gain == found.gain
+
+
+def test_no_other_variances_are_likelier(residual: np.ndarray) -> None:
+    """MacKay's fixed point: a quarter more or a fifth less of any variance lowers the likelihood, or raises it by less than it is
+    settled to; those at nothing are left out."""
+    found = EVIDENCE.discrepancy(residual)
+    best, tried = likelihood(residual, found.variance), 0
+    for g, c in np.ndindex(*found.variance.shape):
+        if 10.0 * max(NOTHING, LOWEST) < found.variance[g, c] < 0.5 * HIGHEST:
+            for factor in (0.8, 1.25):
+                other = found.variance.copy()
+                other[g, c] *= factor
+                assert likelihood(residual, other) < best + 0.02
+                tried += 1
+    assert tried >= 6
+    assert (found.variance[0] > found.variance[1]).sum() >= 4  # the displacement had noise alone
+
+
+def test_columns_are_made_white_by_the_inverse(residual: np.ndarray) -> None:
+    found, X = EVIDENCE.discrepancy(residual), np.random.default_rng(1).normal(size=(residual.size, 2))
+    X[~EVIDENCE.present.ravel()] = 0.0
+    white = EVIDENCE.whiten(found, X).reshape(-1, M, 2)
+    for j in range(M):
+        r = EVIDENCE.present[:, j]
+        np.testing.assert_allclose(
+            white[r, j], np.linalg.solve(covariance(found.variance, j), X.reshape(-1, M, 2)[r, j]), atol=1e-8
+        )
+
+
+def test_what_an_error_could_move_with_is_what_its_name_says() -> None:
+    """Columns of unit RMS, proportional to pulls over the largest, their products, slopes, lags, time and temperature."""
+    phi, inputs = regressors(BENCH, range(TRIALS)), BENCH.inputs
+    named = dict(zip(phi.names, phi.matrix.T, strict=True))
+    np.testing.assert_allclose(np.mean(phi.matrix**2, axis=0), 1.0)
+    top = np.max([i.command.max() for i in inputs])
+    T1, T2 = (np.concatenate([i.command[:, t] for i in inputs]) / top for t in (0, 1))
+    d1 = np.concatenate([slope(i, i.command / top)[:, 0] for i in inputs])
+    typical = np.median(np.abs(np.concatenate([slope(i, i.command / top) for i in inputs])))
+    clock = np.concatenate([i.clock for i in inputs])
+    payload = np.repeat([0.0, 0.01, 0.02], N)
+    late = []
+    for i in inputs:
+        u, y = i.command[:, 0] / top, i.command[0, 0] / top
+        for k in range(N):
+            if k:
+                keep = np.exp(-(i.time[k] - i.time[k - 1]) / MEMORY[0])
+                y = keep * y + (1.0 - keep) * u[k]
+            late.append(u[k] - y)
+    for name, column in {
+        "1": np.ones(N * TRIALS), "T1": T1, "T1 T2": T1 * T2, "T1 T1 T2": T1**2 * T2, "payload": payload,
+        "payload T2": payload * T2,
+        "direction of T1": np.tanh(d1 / typical), "direction of T1 x T1": np.tanh(d1 / typical) * T1, "rate of T1": d1,
+        "rate of T1 x T1": d1 * T1, f"T1 over the last {MEMORY[0]:g} s": np.array(late), "time": clock - clock.mean(),
+        "time^2": (clock - clock.mean()) ** 2, "time x T2": (clock - clock.mean()) * T2,
+        "temperature": np.repeat([-1.0, 0.0, 1.0], N), "temperature x T1": np.repeat([-1.0, 0.0, 1.0], N) * T1,
+        "trial 1.csv": np.repeat([0.0, 1.0, 0.0], N),
+    }.items():  # fmt: skip
+        np.testing.assert_allclose(named[name], column / np.sqrt(np.mean(column**2)), atol=1e-6, err_msg=name)
+    assert not any("T3" in name for name in named), "it is never pulled"
+
+
+def test_a_slope_is_that_of_three_samples_mean() -> None:
+    i = BENCH.inputs[0]
+    u = np.outer(i.time**2, [1.0, -2.0])
+    h = i.time[1] - i.time[0]
+    inner = slice(2, -2)  # (t-h)^2 + t^2 + (t+h)^2 over 3 is t^2 + 2 h^2 / 3: the same slope
+    np.testing.assert_allclose(slope(i, u)[inner], np.outer(2.0 * i.time, [1.0, -2.0])[inner], atol=1e-9)
+    np.testing.assert_allclose(slope(i, u)[0], 4.0 * h / 3.0 * np.array([1.0, -2.0]), atol=1e-9)
+    np.testing.assert_array_equal(slope(replace(i, time=i.time[:1]), u[:1]), np.zeros((1, 2)))  # one row alone stands still
+
+
+def test_what_goes_with_the_pose_is_not_beyond_it() -> None:
+    rng = np.random.default_rng(2)
+    phi = EVIDENCE.phi
+    pose = phi.matrix[:, phi.component == 0] @ rng.normal(size=((phi.component == 0).sum(), M))
+    assert EVIDENCE.beyond_pose(pose.ravel()) < 1e-3 * np.sqrt(np.mean(pose**2))
+    z = rng.normal(size=pose.shape)
+    left, count = 0.0, 0
+    for j in range(M):
+        r = EVIDENCE.present[:, j]
+        A = phi.matrix[r][:, phi.component == 0]
+        left += float(np.sum((z[r, j] - A @ np.linalg.lstsq(A, z[r, j], rcond=None)[0]) ** 2))
+        count += int(r.sum())
+    assert EVIDENCE.beyond_pose((pose + z).ravel()) == pytest.approx(np.sqrt(left / count), rel=1e-3)
+
+
+def test_a_discrepancy_is_named_by_what_carries_most(residual: np.ndarray) -> None:
+    found = EVIDENCE.discrepancy(residual)
+    told = EVIDENCE.strongest(found, 3)
+    size = np.sqrt(np.mean(found.coefficients**2, axis=1))
+    assert [value for _, value in told] == pytest.approx(sorted(size, reverse=True)[:3])
+    assert told[0][0] == EVIDENCE.phi.names[int(np.argmax(size))]
+
+
+def test_a_line_is_found_where_it_is_and_noise_has_none() -> None:
+    """A cosine of amplitude a in white noise of variance v gives n a^2 / 4 v' to each channel's and trial's periodogram, v' = v +
+    a^2 / 2, whose own mean and deviation are one; the score is the sum's over its deviation."""
+    spectrum, rng = Spectrum.of(BENCH, [0, 2]), np.random.default_rng(3)  # the evenly timed
+    longest, step = 20.0, 20.0 / (N - 1)
+    np.testing.assert_allclose(spectrum.grid, np.arange(4.0 / longest, 0.45 / step, 0.5 / longest))
+    time = np.concatenate([BENCH.inputs[k].time for k in (0, 2)])
+    f, a, m = float(spectrum.grid[9]), 1.0, 200
+    noise = rng.normal(size=(2 * N, m))
+    score, at = spectrum.peak(noise + a * np.cos(2.0 * np.pi * f * time[:, None] + rng.uniform(0, 2 * np.pi, m)) + 5.0)
+    assert at == pytest.approx(f)
+    # |sum|^2 / (n v') less what a grid point has between lines: v / v' of it, as the line takes the rest
+    each = N * a**2 / 4.0 / 1.5 + 1.0 / 1.5
+    assert score == pytest.approx((each - 1.0 / 1.5) * np.sqrt(2 * m), rel=0.1)  # 400 periodograms, and the grid's leaks
+    quiet = [spectrum.peak(rng.normal(size=(2 * N, m)))[0] for _ in range(50)]
+    assert 1.0 < np.mean(quiet) < 3.5  # the largest of some 20 nearly independent standard normals: 1.9
+    assert spectrum.peak(np.zeros((2 * N, 2)))[0] == 0.0
