@@ -168,14 +168,14 @@ def test_a_running_replay_draws_at_every_turn_of_the_loop_and_solves_nothing_for
     monkeypatch.setattr(app_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     server = viser.ViserServer(host="127.0.0.1", port=8670, verbose=False)
     try:
-        app = App(server, rubbing(), sample())
+        app = App(server, [("", rubbing())], sample())
         app.tick()
-        app.play.value, app.speed.value = True, 2.0
+        app.scrubber.play.value, app.scrubber.speed.value = True, 2.0
         for _ in range(90):
             now[0] += 1.0 / 60.0
             app.tick()
         assert app.drawn == 91
-        assert app.time.value == pytest.approx(3.0)  # 1.5 s at twice the speed
+        assert app.scrubber.time.value == pytest.approx(3.0)  # 1.5 s at twice the speed
         assert len(solved) == 2  # the trial as described and with its effect, once each
     finally:
         server.stop()
@@ -192,7 +192,7 @@ class Served:
 
 def _served(twin: Twin, recording: Recording | None, port: int = 8650) -> Iterator[Served]:
     server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
-    app, over = App(server, twin, recording), threading.Event()
+    app, over = App(server, [("", twin)], recording), threading.Event()
 
     def loop() -> None:
         while not over.is_set():
@@ -277,13 +277,13 @@ def test_a_slider_moves_the_robot(browser, by_hand: Served) -> None:  # type: ig
     assert page.there()
     before, words = page.scene(), by_hand.app.words.content
     page.put("tendon 1, N", "2")
-    assert page.until(lambda: by_hand.app.pulls[0].value == 2.0)
+    assert page.until(lambda: by_hand.app.hand.pulls[0].value == 2.0)
     assert page.changed(before)
     assert by_hand.app.words.content != words
     assert "2.00 N" in by_hand.app.words.content
     before, x = page.scene(), _tip_x(by_hand.app)
-    page.put("push at the tip, N", "0.1")
-    assert page.until(lambda: by_hand.app.push.value == 0.1)
+    page.put("push, N", "0.1")
+    assert page.until(lambda: by_hand.app.hand.push.value == 0.1)
     assert page.changed(before)
     assert _tip_x(by_hand.app) > x + 1.0  # mm, along x: 0.1 N sideways bend a rod and a finger by far more
 
