@@ -1,10 +1,10 @@
 """Dynamic prediction: MuJoCo steps with the tension laws computed between them, in one compiled loop.
 
 Per step: slip states from the tendons' travel, segment tensions to `ctrl`; tip force, push and what the hinges' springs lack of
-the true elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. Tendons that motors or SMA springs hold at lengths are in winding.py. The
-slip state is explicit here: it is stable while the pre-sliding length in mm is at least half the step in ms, so the step shrinks
-with a short pre-sliding length. `discrete` integrates springs, those of hinges and wall, implicitly, so that none of them bounds
-the step; it damps: 2 % of critical at 1 ms on the first mode.
+the true elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. Tendons that motors or SMA springs hold at lengths are in
+winding.py. The slip state is explicit here: it is stable while the pre-sliding length in mm is at least half the step in ms, so
+the step shrinks with a short pre-sliding length. `discrete` integrates springs, those of hinges and wall, implicitly, so that none
+of them bounds the step; it damps: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ class App:
         """`twins` by name, which is shown where there are two. Each is compared with its robot as described. Raises DataError for a
         robot that is not drawn, a set that does not drive it, or two robots that the same sliders do not drive."""
         self.server = server
-        places = set_up(server, twins[0][1].robot.gravity, len(twins))
+        places = set_up(server, twins[0][1].robot.gravity, [twin.figure() for _, twin in twins])
         names = [f"{letter}: {name}" if len(twins) > 1 else "" for letter, (name, _) in zip("AB", twins, strict=False)]
         self.sides = [
             Side(server, twin, name, where, recording) for name, (_, twin), where in zip(names, twins, places, strict=True)
@@ -263,14 +263,15 @@ class App:
 
     def _coloured(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
         """Ranges that hold all of `frames`, or up to the largest tension (N) and warmest spring (K) there may be."""
-        figure, most = self.sides[0].figure, tension or float(np.ceil(10.0 * max(f.tension.max() for f in frames)) / 10.0)
+        figure, pulled = self.sides[0].figure, max(float(f.tension.max()) for f in frames)
+        most = tension if tension is not None and tension > pulled else float(np.ceil(10.0 * pulled) / 10.0)
         ranges = {shade: figure.coloured(shade, most) for shade in figure.shades}
         if any(f.temperature.size for f in frames):
             ranges["temperature"] = figure.coloured("temperature", max(warmest, *(f.temperature.max() for f in frames)))
-        before, self._ranges = [bar(r) for r in self._bars] if self._ranges else [], ranges
-        now = [bar(r) for r in self._bars]
-        if now != before or not self._bar.content:
-            self._bar.content = "".join(now)
+        self._ranges = ranges
+        now = "".join(bar(r) for r in self._bars)
+        if now != self._bar.content:
+            self._bar.content = now
 
 
 def _named(side: Side) -> str:

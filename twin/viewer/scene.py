@@ -5,7 +5,7 @@ viser alone: mjviser draws no flex and gives a tendon one colour.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import trimesh
@@ -14,25 +14,27 @@ import viser
 from twin.figure import Figure, Frames, Range
 from twin.viewer.colours import colours
 
-MEASURED, PREDICTED, ARROW, PUSH, DARK = (214, 39, 40), (31, 119, 180), (20, 20, 20), (255, 127, 14), 60
+MEASURED, PREDICTED, ARROW, PUSH, DARK = (214, 39, 40), (31, 119, 180), (20, 20, 20), (255, 54, 1), 60
 CORD, THIN, GLASS = 0.014, 0.006, (200, 205, 215)
 NOTHING = np.zeros((0, 3), np.float32)
-APART = 0.95  # heights between two robots side by side
+APART, THIN_ONE = 0.9, 0.2  # heights between two robots side by side that are at most so wide
 LONGEST = 0.3  # heights of the arrow of the largest push
 
 
-def set_up(server: viser.ViserServer, down: np.ndarray, n: int) -> list[np.ndarray]:
-    """The camera before n robots side by side, gravity pointing `down` (3,); where each stands (3,), heights."""
+def set_up(server: viser.ViserServer, down: np.ndarray, figures: Sequence[Figure]) -> list[np.ndarray]:
+    """The camera before robots side by side, gravity pointing `down` (3,); where each stands (3,), heights."""
     up = -down / np.linalg.norm(down) if np.any(down) else np.array([0.0, 0.0, 1.0])
     server.scene.set_up_direction(tuple(up))
     side = np.cross(up, [1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.cross(up, [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)
-    away = 1.45 if n == 1 else 1.9
+    n, wide = len(figures), max(2.0 * float(f.cylinders[:, 0].max(initial=0.0)) / f.height for f in figures)
+    apart = APART + max(0.0, wide - THIN_ONE)
+    away = 1.45 if n == 1 else 1.05 + 0.5 * apart
     camera = server.initial_camera
     camera.position = tuple(np.array([0.0, 0.0, 0.5]) + away * side + 0.35 * up)
     camera.look_at, camera.up = (0.0, 0.0, 0.5), tuple(up)
     right = np.cross(-side, up)
-    return [(k - 0.5 * (n - 1)) * APART * right for k in range(n)]
+    return [(k - 0.5 * (n - 1)) * apart * right for k in range(n)]
 
 
 class Scene:
@@ -122,7 +124,9 @@ class Scene:
 
     def pushed(self, at: np.ndarray, force: np.ndarray) -> None:
         """An arrow that ends at (3,) m, along a force (3,) over the largest there is."""
-        end, size = self._scale * at, float(np.linalg.norm(force))
+        size, faces = float(np.linalg.norm(force)), len(self._figure.faces)
+        rim = 0.0 if faces else float(self._figure.cylinders[:, 0].max())  # of a disk, which is pushed in its middle
+        end = self._scale * (at - rim * force / max(size, 1e-12))
         arrow = np.stack([end - LONGEST * force, end])[None] if size > 0.0 else np.zeros((0, 2, 3))
         self._push.points = arrow.astype(np.float32)
 
