@@ -3,8 +3,8 @@
     python -m tools.viewer_memory [ROBOT] [--pictures 216000] [--clients 4]
 
 An hour at 60 pictures a second, drawn as fast as they come. Clients are other processes that take all they are sent, stay for some
-seconds and come again; the robot's effects are switched and its trials changed meanwhile. Prints the resident memory as it goes, its
-growth from the first tenth on, by a straight line, and what all of it was.
+seconds and come again; effects are switched and trials changed meanwhile. Prints the resident memory as it goes, and its growth
+from the first tenth on.
 """
 
 from __future__ import annotations

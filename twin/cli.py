@@ -177,7 +177,7 @@ class View:
     speed: Annotated[float, arg(help="trial seconds a second, of the film")] = 1.0
 
     def run(self) -> None:
-        from twin.viewer import film, serve
+        from twin.viewer import serve, take_film
 
         twins, recording = self._shown()
         if self.film is None:
@@ -190,7 +190,7 @@ class View:
         if not self.film.absolute().parent.is_dir():
             raise DataError(f"{self.film.absolute().parent} is no folder; make it, or give another file with --film")
         with working("taking a film") as progress:
-            film(twins, recording, self.trial, self.speed, self.film, progress)
+            take_film(twins, recording, self.trial, self.speed, self.film, progress)
         out.print(f"wrote {self.film}", highlight=False, markup=False)
 
     def _shown(self) -> tuple[list[tuple[str, Twin]], Recording | None]:

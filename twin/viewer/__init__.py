@@ -8,6 +8,6 @@ app.py      the panel, and the loop that serves it          headless.py  a film 
 """
 
 from twin.viewer.app import App, serve
-from twin.viewer.headless import film
+from twin.viewer.headless import take_film
 
-__all__ = ["App", "film", "serve"]
+__all__ = ["App", "serve", "take_film"]

@@ -23,7 +23,7 @@ OPENING = 60.0  # s for the browser to come
 QUIETLY = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 
 
-def film(
+def take_film(
     twins: Sequence[tuple[str, Twin]], recording: Recording, trial: str | None, speed: float, out: Path,
     progress: Callable[[str], None],
 ) -> None:  # fmt: skip

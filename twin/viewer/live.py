@@ -16,6 +16,7 @@ from twin.twin import Twin, alone
 
 TURNS = 24  # back to which friction is followed
 STEP = 0.1  # s between equilibria while springs heat, which takes them tens of seconds
+ROUNDING = 1e-9  # s
 RESTING = 0.01  # K/s: at rest
 LONGEST = 900.0  # s within which springs come to rest
 BEYOND = 45.0  # K that the warmest spring may rest above its phase change without stress: its tension has had that then
@@ -68,7 +69,7 @@ class Heated:
         if not np.array_equal(current, self._current):
             self._current, self._rate = current, np.inf
         robot, self._owed = self._robot, self._owed + passed
-        while self._owed >= STEP:
+        while self._owed > STEP - ROUNDING:
             before = robot.warm.copy()
             robot.step(current, STEP)
             self._rate = float(np.abs(robot.warm - before).max()) / STEP
