@@ -170,7 +170,7 @@ def test_a_running_replay_draws_at_every_turn_of_the_loop_and_solves_nothing_for
 
 def test_springs_under_sliders_heat_as_a_trial_of_the_same_currents_does() -> None:
     """30 s of heating, 10 s of cooling, in steps of a tick as they come."""
-    twin, hot, cold = rubbing(), np.array([1.0, 0.0, 0.4]), np.zeros(3)
+    twin, hot, cold = rubbing(), np.array([1.25, 0.0, 0.4]), np.zeros(3)
     live = Heated(twin)
     for _ in range(90):
         live.shape(hot, Loads(G), 1.0 / 3.0)

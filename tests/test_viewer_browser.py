@@ -6,19 +6,20 @@ Needs Chromium (Debian's `chromium`) and is skipped, loudly, where there is none
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from PIL import Image
 
-from tests.viewer_page import Page, browser, rubbing, sample, served
+from tests.viewer_page import Page, browser, look, rubbing, sample, served
 from twin.effects import Drive
 from twin.twin import Twin
 from twin.viewer import App
 from twin.viewer import film as film_module
 
-__all__ = ["browser"]  # a fixture
+__all__ = ["browser", "look"]  # fixtures
+Look = Callable[[str], Page]
 
 
 def _tip_x(app: App) -> float:
@@ -32,9 +33,9 @@ def _click(page: Page) -> None:
     page.page.mouse.click(320 + 60 + x, 160 + 60 + y)
 
 
-def test_a_backbone_by_tension_then_by_currents_and_pushed_where_it_is_clicked(browser: Any) -> None:
+def test_a_backbone_by_tension_then_by_currents_and_pushed_where_it_is_clicked(look: Look) -> None:
     with served([("", Twin.of("continuum"))]) as here:
-        page, app = Page(browser, here.address), here.app
+        page, app = look(here.address), here.app
         assert page.there()
         before, words = page.scene(), app.words.content
         page.put("tendon 1, N", "2")
@@ -60,9 +61,9 @@ def test_a_backbone_by_tension_then_by_currents_and_pushed_where_it_is_clicked(b
         assert page.page.get_by_text("push at, mm").is_visible()
 
 
-def test_a_finger_its_cords_and_a_push_where_its_skin_is_clicked(browser: Any) -> None:
+def test_a_finger_its_cords_and_a_push_where_its_skin_is_clicked(look: Look) -> None:
     with served([("", Twin.of("finger"))]) as here:
-        page, app = Page(browser, here.address), here.app
+        page, app = look(here.address), here.app
         assert page.there()
         before, words = page.scene(), app.words.content
         page.put("tendon 1, N", "2")
@@ -82,10 +83,10 @@ def test_a_finger_its_cords_and_a_push_where_its_skin_is_clicked(browser: Any) -
         assert page.until(lambda: (app.hand.height.value, app.hand.aside.value) != (height, aside))
 
 
-def test_scrubber_effect_switch_picture_and_film(browser: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scrubber_effect_switch_picture_and_film(look: Look, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(film_module, "RATE", 1.0)  # pictures a second: four of the trial at twenty times its speed
     with served([("", rubbing())], sample()) as here:
-        page, app = Page(browser, here.address), here.app
+        page, app = look(here.address), here.app
         assert page.there()
         before, words = page.scene(), app.words.content
         page.put("time, s", "6")
@@ -112,9 +113,9 @@ def test_scrubber_effect_switch_picture_and_film(browser: Any, monkeypatch: pyte
         assert getattr(taken, "n_frames", 1) == int(app.scrubber.time.max / 20.0) + 1
 
 
-def test_two_twins_two_clients_one_that_goes_and_a_second_server_on_the_port(browser: Any) -> None:
+def test_two_twins_two_clients_one_that_goes_and_a_second_server_on_the_port(look: Look) -> None:
     with served([("report", rubbing()), ("continuum", Twin.of("continuum"))], sample()) as here:
-        first, second = Page(browser, here.address), Page(browser, here.address)
+        first, second = look(here.address), look(here.address)
         assert first.there()
         assert second.there()
         first.page.close()

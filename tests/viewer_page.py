@@ -76,13 +76,27 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
+@pytest.fixture
+def look(browser: Any) -> Iterator[Callable[[str], Page]]:
+    """Opens a page at an address; all are closed in the end, as one that nobody looks at draws on."""
+    opened: list[Page] = []
+
+    def at(address: str) -> Page:
+        opened.append(Page(browser, address))
+        return opened[-1]
+
+    yield at
+    for one in opened:
+        one.page.close()
+
+
 class Page:
     """A browser's window of 1366 x 768, of which the left 1,000 columns below the notices are the scene."""
 
     def __init__(self, browser: Any, address: str) -> None:
         self.page = browser.new_page(viewport={"width": 1366, "height": 768})
         self.page.goto(address)
-        self.page.wait_for_selector("canvas")
+        self.page.wait_for_selector("canvas", timeout=60_000)
 
     def scene(self) -> np.ndarray:
         shot = self.page.screenshot(clip={"x": 320, "y": 160, "width": 700, "height": 560})
