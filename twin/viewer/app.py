@@ -5,6 +5,7 @@ Callbacks of the panel only note what is wanted: one loop solves and draws, sinc
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -293,9 +294,16 @@ def _warm(side: Side) -> str:
     return f"; springs at {springs} degC, **{side.heated.time:.0f} s** after they were cold, {how}"
 
 
+def served(port: int, label: str | None = None) -> viser.ViserServer:
+    """A server on 127.0.0.1, at the first free port from `port` on."""
+    # Browsers open connections ahead and drop those they do not need, each of which would be a traceback.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    return viser.ViserServer(host="127.0.0.1", port=port, label=label, verbose=False)
+
+
 def serve(twins: Sequence[tuple[str, Twin]], recording: Recording | None, port: int, told: Callable[[str], None]) -> None:
     """Serve on 127.0.0.1, the first free port from `port` on, until interrupted; `told` the address once the picture stands."""
-    server = viser.ViserServer(host="127.0.0.1", port=port, label=f"twin view {twins[0][1].robot.name}", verbose=False)
+    server = served(port, f"twin view {twins[0][1].robot.name}")
     try:
         app = App(server, twins, recording)
         app.tick()

@@ -85,7 +85,7 @@ class Film:
     def take(self, words: str, ranges: Sequence[Range]) -> None:
         """One picture of what is drawn. Raises DataError where none comes."""
         picture = captioned(render(self.client), words, ranges)
-        self._pictures.append(picture.quantize(128, dither=Image.Dither.NONE))
+        self._pictures.append(picture.quantize(256, dither=Image.Dither.NONE))
 
     def gif(self) -> bytes:
         out, (first, *others) = io.BytesIO(), self._pictures

@@ -9,15 +9,14 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import viser
-
 from twin.errors import DataError
 from twin.measurements import Recording
 from twin.twin import Twin
-from twin.viewer.app import App
+from twin.viewer.app import App, served
 from twin.viewer.film import HIGH, WIDE
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+PORT = 8080  # or the next one that is free
 OPENING = 60.0  # s for the browser to come
 # Without a screen, and drawing by the processor.
 QUIETLY = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
@@ -32,7 +31,7 @@ def take_film(
     browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     if browser is None:
         raise DataError("no Chromium is found to draw a film: apt-get install chromium, or save the film in the viewer's page")
-    server = viser.ViserServer(host="127.0.0.1", port=8080, verbose=False)
+    server = served(PORT)
     try:
         app = App(server, twins, recording)
         if trial is not None and trial not in app.scrubber.labels:
