@@ -6,6 +6,7 @@ eight of that.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import mujoco
@@ -15,7 +16,7 @@ import pytest
 from twin.bench import prepare
 from twin.body import Path, Problem
 from twin.dynamics import Dynamics
-from twin.effects import Loads, Route, catalogue
+from twin.effects import Loads, Push, Route, catalogue
 from twin.equilibrium import Equilibrium
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
@@ -232,6 +233,16 @@ def test_effects_act_alike_in_steps_and_statics(effect: tuple[str, dict[str, flo
     for channel in rest.outputs():
         # m: at the end of two seconds of rest: a swing of some 0.1 mm, damped by 30 ms, is gone but for the static solve's 1e-7 rad
         np.testing.assert_allclose(by_steps[channel.name][-1], by_statics[channel.name][-1], rtol=0, atol=2e-6)
+
+
+def test_a_push_acts_alike_in_steps_and_statics() -> None:
+    body = load("continuum").build({"damping.time": 0.03})
+    loads = Loads(np.array([0.0, 0.0, 9.81]), push=Push(np.array([0.0, 0.1, 0.0]), 0.5))
+    problem = Problem(np.array([0.0, 0.5]), np.tile([1.0, 0.3, 0.0], (2, 1)), loads)
+    moved, rested = (solver.solve(problem).markers[-1] for solver in (Dynamics(body), Equilibrium(body)))
+    free = Equilibrium(body).solve(replace(problem, loads=Loads(loads.gravity))).markers[-1]
+    assert np.linalg.norm(rested - free, axis=1).max() > 5e-3  # m
+    np.testing.assert_allclose(moved, rested, rtol=0, atol=2e-6)  # m, as above
 
 
 def test_the_rates_choose_the_way() -> None:

@@ -10,7 +10,7 @@ import pytest
 from tools.bench.rod import NoEquilibrium, Rod, follow
 from tools.bench.rod import solve as rod_solve
 from twin.body import DIRECT, NOT_FOUND, Problem
-from twin.effects import Loads, Route, catalogue
+from twin.effects import Loads, Push, Route, catalogue
 from twin.equilibrium import Equilibrium
 from twin.robots import load
 
@@ -134,6 +134,23 @@ def test_a_tip_force_bends_it_as_a_cantilever() -> None:
     # m: F L^3 / (3 EI) = 37 um. Two joint sets with a coupling integrate a linear moment exactly but for the rod's part within
     # each interval, (h / L)^2 / 4 = 0.4 % at most.
     np.testing.assert_allclose(tip, [0, force * LENGTH**3 / (3 * EI), LENGTH], rtol=0, atol=1.5e-7)
+
+
+@pytest.mark.parametrize("height", [0.5, 1.0])
+def test_a_push_on_a_disk_bends_it_as_a_cantilever(height: float) -> None:
+    force, a = 1e-4, height * LENGTH
+    loads = Loads(NOWHERE, push=Push(np.array([0.0, force, 0.0]), height))
+    tip = tips(solver().solve(Problem(np.zeros(1), np.zeros((1, 3)), loads, tolerance=EXACT)))[0]
+    # m, under the tip force's tolerance: F a^2 (3 L - a) / (6 EI), 37 um at the tip
+    np.testing.assert_allclose(tip, [0.0, force * a**2 * (3.0 * LENGTH - a) / (6.0 * EI), LENGTH], rtol=0, atol=1.5e-7)
+
+
+def test_a_push_on_the_tip_s_disk_is_a_force_at_the_tip() -> None:
+    """Bent far, where the tangent matters."""
+    pull, force = np.array([[1.0, 0.3, 0.0]]), np.array([0.05, 0.1, -0.02])
+    ways = Loads(HANGING, force=force), Loads(HANGING, push=Push(force))
+    one, other = (solver().solve(Problem(np.zeros(1), pull, loads, tolerance=EXACT)) for loads in ways)
+    np.testing.assert_allclose(other.markers, one.markers, rtol=0, atol=1e-9)
 
 
 def test_it_buckles_where_euler_says() -> None:

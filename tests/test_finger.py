@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tools.bench.finger.equilibria import Finger, equilibrium
 from twin.body import DIRECT, NOT_FOUND, Problem
-from twin.effects import Drive, Loads, Route, Signals, named
+from twin.effects import Drive, Loads, Push, Route, Signals, named
 from twin.robots import load
 from twin.sensors import Cords, resistance, strain
 from twin.soft import SoftBody, SoftPath, SoftStatics
@@ -215,6 +215,22 @@ def test_a_wall_holds_the_skin_back() -> None:
     np.testing.assert_allclose(free.markers[skin < 0.015], held.markers[skin < 0.015], atol=1e-6)
     assert tip(held)[-1, 0] + 0.008 < 0.0225  # of 2 kN/m a ring, pressed with some newtons
     assert tip(free)[-1, 0] + 0.008 > 0.03
+
+
+def test_a_push_on_the_skin_and_a_force_at_the_tip_are_reciprocal() -> None:
+    """Betti: what a small force at the tip moves a point of the skin by, the same force there moves the tip by."""
+    one, force, nothing = body(mounting__angle=0.1), np.array([2e-4, 1e-4, -1e-4]), np.full(4, OUT)
+    marker = 4
+    x, y, z = one.seen[marker]
+    push = Push(force, z / one.cone.length, float(np.arctan2(y, x)) + one.turn)
+    rest, at_tip, there = (
+        solve(one, nothing, loads=loads)
+        for loads in (Loads(np.zeros(3)), Loads(np.zeros(3), force=force), Loads(np.zeros(3), push=push))
+    )  # fmt: skip
+    moved = (at_tip.markers - rest.markers)[0, marker] @ force
+    assert moved > 1e-9  # J: the tip's force does work there
+    # Of strains of 1e-3 the law is linear to some 1e-3.
+    assert (there.markers - rest.markers)[0, -1] @ force == pytest.approx(moved, rel=5e-3)
 
 
 def test_unequal_planes_bend_unequally() -> None:

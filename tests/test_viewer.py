@@ -1,51 +1,35 @@
-"""The viewer: what it draws is what the twin predicts, and a real browser shows it and drives it.
-
-The browser's part needs Chromium (Debian's `chromium`) and is skipped, loudly, where there is none.
-"""
+"""The viewer: what it draws is what the twin predicts. A real browser looks at it in test_viewer_browser.py."""
 
 from __future__ import annotations
 
 import io
-import shutil
-import threading
-import time
-import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import viser
 from PIL import Image
 
+from tests.viewer_page import rubbing, sample
 from twin.body import Problem
-from twin.effects import Drive, Loads, Route, named
+from twin.cli import View
+from twin.effects import Drive, Loads, Push, Route
 from twin.errors import DataError
 from twin.evaluate import evaluate
 from twin.figure import Range
-from twin.measurements import Recording, read
 from twin.twin import Twin, simulate
 from twin.viewer import App
 from twin.viewer import app as app_module
 from twin.viewer import replay as replay_module
 from twin.viewer.colours import bar, colours
-from twin.viewer.live import Live
-from twin.viewer.replay import Replay
+from twin.viewer.film import Film
+from twin.viewer.live import Heated, Live, most_current
+from twin.viewer.replay import KEPT, Replay
 
-SAMPLE = Path(__file__).parents[1] / "models/continuum/samples/friday"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 G = np.array([0.0, 0.0, 9.81])
-
-
-def rubbing() -> Twin:
-    return replace(Twin.of("continuum"), effects=(named("tendon_friction")({"mu": 0.21}),))
-
-
-def sample() -> Recording:
-    whole = read(SAMPLE)
-    return replace(whole, trials=whole.select(["circle_1", "slow_1"]).trials)
 
 
 # ---- what is drawn ----------------------------------------------------------------------------------------------------------
@@ -168,149 +152,172 @@ def test_a_running_replay_draws_at_every_turn_of_the_loop_and_solves_nothing_for
     monkeypatch.setattr(app_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     server = viser.ViserServer(host="127.0.0.1", port=8670, verbose=False)
     try:
-        app = App(server, rubbing(), sample())
+        app = App(server, [("", rubbing())], sample())
         app.tick()
-        app.play.value, app.speed.value = True, 2.0
+        app.scrubber.play.value, app.scrubber.speed.value = True, 2.0
         for _ in range(90):
             now[0] += 1.0 / 60.0
             app.tick()
         assert app.drawn == 91
-        assert app.time.value == pytest.approx(3.0)  # 1.5 s at twice the speed
+        assert app.scrubber.time.value == pytest.approx(3.0)  # 1.5 s at twice the speed
         assert len(solved) == 2  # the trial as described and with its effect, once each
     finally:
         server.stop()
 
 
-# ---- in a browser -----------------------------------------------------------------------------------------------------------
+# ---- springs, cords, pushes, films ---------------------------------------------------------------------------------------------
 
 
-@dataclass
-class Served:
-    app: App
-    address: str
+def test_springs_under_sliders_heat_as_a_trial_of_the_same_currents_does() -> None:
+    """30 s of heating, 10 s of cooling, in steps of a tick as they come."""
+    twin, hot, cold = rubbing(), np.array([1.25, 0.0, 0.4]), np.zeros(3)
+    live = Heated(twin)
+    for _ in range(90):
+        live.shape(hot, Loads(G), 1.0 / 3.0)
+    for _ in range(60):
+        shown = live.shape(cold, Loads(G), 1.0 / 6.0)
+    assert live.time == pytest.approx(40.0)
+    time = np.arange(0.0, 40.05, 0.1)
+    command = np.where(time[:, None] < 29.95, hot, cold)
+    drives, ambient = (Drive.CURRENT,) * 3, np.full(len(time), 296.15)
+    problem = Problem(time, command, Loads(G), twin.laws.route, drives, heating=twin.heating(ambient))
+    path = twin.robot.solver(twin.body()).solve(problem)
+    assert path.others["temperature"].max() > 370.0  # K: past the phase change, so that there is a history to keep
+    assert np.allclose(live.temperature, path.others["temperature"][-1], atol=0.05)  # K; and m: two solves' tolerance
+    assert np.allclose(shown.markers[0], path.markers[-1], atol=2e-5)
+    replayed = twin.figure().frames(path, Loads(G), twin.laws.route, problem.heating).at(-1)
+    for name in ("coil", "piece", "tension", "temperature"):
+        assert np.allclose(getattr(replayed, name), getattr(shown, name), rtol=0, atol=0.06 if name == "temperature" else 2e-3)
 
 
-def _served(twin: Twin, recording: Recording | None, port: int = 8650) -> Iterator[Served]:
-    server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
-    app, over = App(server, twin, recording), threading.Event()
+def test_springs_are_drawn_as_long_as_they_are_and_stay_warm_under_another_load() -> None:
+    live = Heated(Twin.of("continuum"))
+    rest = live.rest(np.zeros(3), Loads(G))
 
-    def loop() -> None:
-        while not over.is_set():
-            app.tick()
-            time.sleep(0.005)
+    def lengths(shown: Any) -> np.ndarray:
+        return np.ptp(shown.coil[0, ..., 2].reshape(3, -1), axis=1)
 
-    thread = threading.Thread(target=loop)
-    thread.start()
-    yield Served(app, f"http://127.0.0.1:{server.get_port()}")
-    over.set()
-    thread.join()
-    server.stop()
+    pulled = live.rest(np.array([most_current(Twin.of("continuum"))[0], 0.0, 0.0]), Loads(G))
+    assert not live.changing
+    shortened = lengths(rest) - lengths(pulled)
+    # The tendon on the inside goes in by r theta, those at 120 degrees out by half of it.
+    assert shortened[0] > 2e-3
+    assert shortened[1:] == pytest.approx([-0.5 * shortened[0]] * 2, rel=0.03)
+    warm = live.temperature.copy()
+    live.shape(np.array([1.1, 0.0, 0.0]), Loads(G, payload=0.02, push=Push(np.array([0.0, 0.05, 0.0]), 0.5)), 0.0)
+    assert np.array_equal(live.temperature, warm)
+    assert live.changing
+
+
+def test_cords_are_coloured_by_what_they_read() -> None:
+    """Bent towards tendon 1 at 0 degrees, the cords at 45 and 315 degrees shorten and read less, the others more."""
+    twin = Twin.of("finger")
+    shown = Live(twin).shape(np.array([2.0, 0.0, 0.0, 0.0]), Loads(G))
+    change = shown.resistance[0].reshape(4, -1)
+    assert np.ptp(change, axis=1).max() == 0.0
+    assert change[:, 0] == pytest.approx(change[[3, 2, 1, 0], 0], abs=1e-4)
+    assert change[0, 0] < -0.05 < 0.0 < change[1, 0]
+    # R/R0 = (1 + kappa e)^2 of cords as described, kappa 1: and e is the drawn line's own.
+    line, straight = (Live(twin).shape(np.array(T), Loads(0 * G)).cord[0].reshape(4, -1, 2, 3) for T in ([2.0, 0, 0, 0], [0.0] * 4))
+    length, rest = (np.linalg.norm(c[:, :, 1] - c[:, :, 0], axis=2).sum(axis=1) for c in (line, straight))
+    weightless = Live(twin).shape(np.array([2.0, 0.0, 0.0, 0.0]), Loads(0 * G)).resistance[0].reshape(4, -1)[:, 0]
+    assert (length / rest) ** 2 - 1.0 == pytest.approx(weightless, abs=1e-6)
 
 
 @pytest.fixture
-def replayed() -> Iterator[Served]:
-    yield from _served(rubbing(), sample())
+def server() -> Any:
+    server = viser.ViserServer(host="127.0.0.1", port=8680, verbose=False)
+    yield server
+    server.stop()
 
 
-@pytest.fixture(params=["continuum", "finger"])
-def by_hand(request: pytest.FixtureRequest) -> Iterator[Served]:
-    yield from _served(Twin.of(request.param), None)
+@pytest.mark.parametrize("robot", ["continuum", "hand"])
+def test_a_push_taken_at_a_point_is_at_that_point(server: Any, robot: str) -> None:
+    app = App(server, [("", Twin.of(robot))])
+    hand, figure = app.hand, app.sides[0].figure
+    app.tick()
+    shown = app.sides[0].shown
+    assert shown is not None
+    for hold in range(5, len(figure.holds), 401):
+        hand.take(hold)
+        found, wanted = figure.grips(shown)[[hand.point(), hold]]
+        assert np.linalg.norm(found - wanted) < 4e-3  # m: half the drawn points' distance around, and a slider's step
+        # Seen from outside, that point is met first.
+        outwards = -hand.force / np.linalg.norm(hand.force)
+        origin = wanted / figure.height + 3.0 * outwards
+        if robot == "hand":
+            assert figure.holds[app.sides[0].scene.touched(shown, origin, -outwards) or 0, 2] == figure.holds[hold, 2]
+    assert app.sides[0].scene.touched(shown, np.array([9.0, 9.0, 9.0]), np.array([1.0, 0.0, 0.0])) is None
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[object]:
-    if CHROMIUM is None:
-        warnings.warn("NO BROWSER: the viewer was not tried; apt-get install chromium", stacklevel=1)
-        pytest.skip("no chromium here: apt-get install chromium")
-    from playwright.sync_api import sync_playwright
+def test_a_film_has_every_instant_from_first_to_last(server: Any) -> None:
+    app = App(server, [("", rubbing())], sample())
+    app.tick()
+    seen: list[float] = []
 
-    software = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-    with sync_playwright() as play:
-        chromium = play.chromium.launch(executable_path=CHROMIUM, args=software)
-        yield chromium
-        chromium.close()
+    def get_render(high: int, wide: int, timeout: float) -> np.ndarray:
+        seen.append(app.scrubber.time.value)
+        return np.full((high, wide, 3), 255 - len(seen), np.uint8)
 
-
-class Page:
-    """A browser's window of 1366 x 768, of which the left 1,000 columns below the notices are the scene."""
-
-    def __init__(self, browser, address: str) -> None:  # type: ignore[no-untyped-def]
-        self.page = browser.new_page(viewport={"width": 1366, "height": 768})
-        self.page.goto(address)
-        self.page.wait_for_selector("canvas")
-
-    def scene(self) -> np.ndarray:
-        shot = self.page.screenshot(clip={"x": 320, "y": 160, "width": 700, "height": 560})
-        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
-
-    def until(self, true) -> bool:  # type: ignore[no-untyped-def]
-        """Whether `true()` comes true within 30 s; a software renderer on a busy machine takes its time."""
-        end = time.monotonic() + 30.0
-        while time.monotonic() < end:
-            if true():
-                return True
-            self.page.wait_for_timeout(250)
-        return False
-
-    def changed(self, before: np.ndarray) -> bool:
-        """Whether over 500 pixels of the scene become other ones: a disk is larger."""
-        return self.until(lambda: int((np.abs(self.scene() - before).max(axis=2) > 40).sum()) > 500)
-
-    def there(self) -> bool:
-        """Whether the scene is more than its white: a robot fills thousands of pixels."""
-        return self.until(lambda: int((self.scene().min(axis=2) < 200).sum()) > 3000)
-
-    def put(self, label: str, value: str) -> None:
-        """Into the number beside a slider."""
-        row = self.page.locator("label", has_text=label).first.locator("xpath=ancestor::div[.//input[@type='text']][1]")
-        box = row.locator("input[type=text]").first
-        box.fill(value)
-        box.press("Enter")
+    client, made = cast(Any, SimpleNamespace(get_render=get_render)), []
+    app.scrubber.speed.value = 20.0
+    app.begin_film(client, lambda name, content: made.append((name, content)))
+    while app.filming:
+        app.tick()
+    (name, content), end = made[0], app.scrubber.time.max
+    assert name == "circle_1.gif"
+    assert seen == pytest.approx(np.arange(len(seen)) * 1.6)  # s: 20 trial seconds a second, 12.5 pictures
+    assert end - 1.6 < seen[-1] <= end
+    picture = Image.open(io.BytesIO(content))
+    assert getattr(picture, "n_frames", 1) == len(seen)
+    assert picture.size == (800, 600)
+    with pytest.raises(DataError, match=r"set the speed to 2\.1 or more"):
+        Film(client, 100.0, 1.0)
 
 
-def _tip_x(app: App) -> float:
-    return float(app.words.content.split("**")[1])
+def test_a_browser_that_goes_ends_its_film_and_nothing_else(server: Any) -> None:
+    app = App(server, [("", rubbing())], sample())
+    app.tick()
+
+    def get_render(high: int, wide: int, timeout: float) -> np.ndarray:
+        raise RuntimeError("the client disconnected")
+
+    app.begin_film(cast(Any, SimpleNamespace(get_render=get_render)), lambda name, content: None)
+    app.tick()
+    assert not app.filming
+    assert "no picture came" in app.words.content
+    app._wanted = True
+    app.tick()
+    assert "over the trial" in app.words.content
 
 
-def test_a_slider_moves_the_robot(browser, by_hand: Served) -> None:  # type: ignore[no-untyped-def]
-    page = Page(browser, by_hand.address)
-    assert page.there()
-    before, words = page.scene(), by_hand.app.words.content
-    page.put("tendon 1, N", "2")
-    assert page.until(lambda: by_hand.app.pulls[0].value == 2.0)
-    assert page.changed(before)
-    assert by_hand.app.words.content != words
-    assert "2.00 N" in by_hand.app.words.content
-    before, x = page.scene(), _tip_x(by_hand.app)
-    page.put("push at the tip, N", "0.1")
-    assert page.until(lambda: by_hand.app.push.value == 0.1)
-    assert page.changed(before)
-    assert _tip_x(by_hand.app) > x + 1.0  # mm, along x: 0.1 N sideways bend a rod and a finger by far more
+def test_two_twins_are_told_apart_and_two_that_no_slider_drives_are_refused(server: Any) -> None:
+    app = App(server, [("report", rubbing()), ("continuum", Twin.of("continuum"))], sample())
+    app.tick()
+    assert "A: report: error" in app.words.content
+    assert "B: continuum: error" in app.words.content
+    rubbed, plain = (side.track(0).rms for side in app.sides)
+    assert rubbed < 0.5 * plain
+    with pytest.raises(DataError, match="the same sliders do not drive continuum and finger"):
+        App(server, [("a", Twin.of("continuum")), ("b", Twin.of("finger"))])
 
 
-def test_scrubber_and_effect_switch_change_picture_and_numbers(browser, replayed: Served) -> None:  # type: ignore[no-untyped-def]
-    page, app = Page(browser, replayed.address), replayed.app
-    assert page.there()
-    before, words = page.scene(), app.words.content
-    page.put("time, s", "6")
-    assert page.changed(before)
-    assert page.until(lambda: "t = 5." in app.words.content)  # the last sample before 6 s: they come every half second
-    assert app.words.content != words
-    before, words = page.scene(), app.words.content
-    page.page.get_by_role("checkbox", checked=True).first.click()  # the effect's: nothing plays
-    assert page.until(lambda: "no effect" in app.words.content)
-    assert page.changed(before)
-    page.page.get_by_role("button", name="as described").click()
-    assert page.until(lambda: "(as described)" in app.words.content)
+def test_a_replay_keeps_no_more_than_it_may() -> None:
+    replay = Replay(sample(), rubbing())
+    for mu in range(KEPT + 2):
+        replay.track(replace(Twin.of("continuum"), values={"tendons.radius": 8e-3 + 1e-6 * mu}), 0)
+    assert len(replay._kept) == KEPT
 
 
-def test_two_clients_one_that_goes_and_a_second_server_on_the_port(browser, replayed: Served) -> None:  # type: ignore[no-untyped-def]
-    first, second = Page(browser, replayed.address), Page(browser, replayed.address)
-    assert first.there()
-    assert second.there()
-    first.page.close()
-    before = second.scene()
-    second.put("time, s", "6")
-    assert second.changed(before)
-    other = next(_served(Twin.of("continuum"), None, int(replayed.address.rpartition(":")[2])))
-    assert other.address != replayed.address
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ({"what": ("continuum", "finger", "hand")}, "at most two twins and one set"),
+        ({"what": ("continuum",), "film": Path("x.gif")}, "a film is of a replay"),
+        ({"film": Path("nowhere/x.gif")}, "is no folder"),
+    ],
+)
+def test_what_cannot_be_shown_is_said(words: dict[str, object], told: str) -> None:
+    said = View(**words)  # type: ignore[arg-type]
+    with pytest.raises(DataError, match=told):
+        said.run()

@@ -28,9 +28,9 @@ def pictures(robot: str) -> float:
     """Pictures a second of a replay whose loop never sleeps."""
     server = viser.ViserServer(host="127.0.0.1", port=8700, verbose=False)
     try:
-        app = App(server, Twin.of(robot), read(models_folder() / robot / "samples" / SETS[robot]))
+        app = App(server, [(robot, Twin.of(robot))], read(models_folder() / robot / "samples" / SETS[robot]))
         app.tick()
-        app.play.value = True
+        app.scrubber.play.value = True
         app.tick()
         began = time.perf_counter()
         for _ in range(PICTURES):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -251,7 +252,7 @@ def _temperature(recording: Recording, trial: Trial) -> np.ndarray:
 
 
 def _loads(recording: Recording, trial: Trial, robot: Robot, body: Body) -> Loads:
-    measured = {
+    measured: dict[str, Any] = {
         field: _columns(trial, [c.name])[0][:, 0]
         for c in recording.inputs()
         for name, field in body.loads.items()

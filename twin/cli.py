@@ -170,24 +170,45 @@ class View:
 
     what: Positional[
         Annotated[
-            str | None, arg(help="a robot, a twin.toml, a report's folder or a measurement set; without it the bundled sample")
+            tuple[str, ...],
+            arg(help="a robot, twin.toml or report's folder, or two side by side; a measurement set; default: the bundled sample"),
         ]
-    ] = None
-    set: Positional[Annotated[Path | None, arg(help="the set to replay with a twin")]] = None
+    ] = ()
     port: Annotated[int, arg(help="where to serve on 127.0.0.1; the next one that is free if it is taken")] = 8080
+    film: Annotated[Path | None, arg(help="write a GIF of the set's replay here, drawn by Chromium unseen, and end")] = None
+    trial: Annotated[str | None, arg(help="which trial the film is of; default: the first")] = None
+    speed: Annotated[float, arg(help="trial seconds a second, of the film")] = 1.0
 
     def run(self) -> None:
-        from twin.storage import read_twin
-        from twin.viewer import serve
+        from twin.viewer import serve, take_film
 
-        if self.what is None or self.set is not None or (Path(self.what) / "measurements.toml").is_file():
-            folder = self.set or (None if self.what is None else Path(self.what))
-            recording, twin = _load(folder, self.what if self.set else None)
-        else:
-            recording, twin = None, read_twin(self.what)
-        with working(f"drawing {twin.robot.name}"):
-            pass
-        serve(twin, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
+        twins, recording = self._shown()
+        if self.film is None:
+            with working(f"drawing {twins[0][1].robot.name}"):
+                pass
+            serve(twins, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
+            return
+        if recording is None or not self.speed > 0.0:
+            raise DataError("a film is of a replay, at a speed above 0: give a measurement set as well")
+        if not self.film.absolute().parent.is_dir():
+            raise DataError(f"{self.film.absolute().parent} is no folder; make it, or give another file with --film")
+        with working("taking a film") as progress:
+            take_film(twins, recording, self.trial, self.speed, self.film, progress)
+        out.print(f"wrote {self.film}", highlight=False, markup=False)
+
+    def _shown(self) -> tuple[list[tuple[str, Twin]], Recording | None]:
+        """The twins by name, and the set to replay with them."""
+        from twin.storage import read_twin
+
+        sets = [w for w in self.what if (Path(w) / "measurements.toml").is_file()]
+        named = [w for w in self.what if w not in sets]
+        if len(sets) > 1 or len(named) > 2:
+            raise DataError(f"{len(named)} twins and {len(sets)} sets were given; at most two twins and one set are shown")
+        if not sets and named:
+            return [(Path(w).name, read_twin(w)) for w in named], None
+        recording, first = _load(Path(sets[0]) if sets else None, named[0] if named else None)
+        names = [Path(w).name for w in named] or [first.robot.name]
+        return list(zip(names, [first, *(read_twin(w) for w in named[1:])], strict=True)), recording
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """Dynamic prediction: MuJoCo steps with the tension laws computed between them, in one compiled loop.
 
-Per step: slip states from the tendons' travel, segment tensions to `ctrl`; tip force and what the hinges' springs lack of the true
-elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. Tendons that motors or SMA springs hold at lengths are in winding.py. The
-slip state is explicit here: it is stable while the pre-sliding length in mm is at least half the step in ms, so the step shrinks
-with a short pre-sliding length. `discrete` integrates springs, those of hinges and wall, implicitly, so that none of them bounds
-the step; it damps: 2 % of critical at 1 ms on the first mode.
+Per step: slip states from the tendons' travel, segment tensions to `ctrl`; tip force, push and what the hinges' springs lack of
+the true elastic moment (elastic.py) to `qfrc_applied`; `mj_step`. Tendons that motors or SMA springs hold at lengths are in
+winding.py. The slip state is explicit here: it is stable while the pre-sliding length in mm is at least half the step in ms, so
+the step shrinks with a short pre-sliding length. `discrete` integrates springs, those of hinges and wall, implicitly, so that none
+of them bounds the step; it damps: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def hold(state, motion, winding, i, w):
 
 @jit
 def apply(at, state, motion, bowing, r):
-    """To qfrc_applied: the tip's force, and what the hinges' springs lack of the true elastic moment."""
+    """To qfrc_applied: the tip's force, the push, and what the hinges' springs lack of the true elastic moment."""
     chain, fixed, tip = at.chain, motion.fixed, at.chain.disk[-1]
     springs(chain.qpos, at.rest, chain, state.T, bowing, r, np.empty((0, 0)))
     for k in range(r.size):
@@ -118,6 +118,8 @@ def apply(at, state, motion, bowing, r):
             chain.qpos[k] - chain.qpos[p] - fixed[k] + fixed[p]
         )
         motion.applied[k] = native - r[k] + dot(at.load.force, lever(chain, k, chain.site[tip]))
+    for k in range(chain.below[at.load.pushed]):
+        motion.applied[k] += dot(at.load.push, lever(chain, k, chain.site[chain.disk[at.load.pushed]]))
 
 
 @jit

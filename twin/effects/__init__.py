@@ -10,7 +10,7 @@ import importlib
 import pkgutil
 from functools import cache
 
-from twin.effects.effect import Creep, Drive, Drives, Effect, Loads, Route, Signals, Start, driven_by
+from twin.effects.effect import Creep, Drive, Drives, Effect, Loads, Push, Route, Signals, Start, driven_by
 from twin.errors import UnknownNameError
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Drives",
     "Effect",
     "Loads",
+    "Push",
     "Route",
     "Signals",
     "Start",

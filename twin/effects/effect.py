@@ -58,15 +58,27 @@ def driven_by(drives: Drives, kind: Drive) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Push:
+    """A dead force (3,) N on a backbone or a silicone body: at the disk nearest to `height`, from 0 at the base to 1 at the tip; or
+    on the skin there, at `azimuth` (rad) about the body's axis, of `finger` (from 0) of a hand. All as the body is at rest."""
+
+    force: np.ndarray
+    height: float = 1.0
+    azimuth: float = 0.0
+    finger: int = 0
+
+
+@dataclass(frozen=True)
 class Loads:
     """Surroundings of one trial: gravity (3,) m/s^2; payload (kg) and force (3,) N at the tip; a wall (5,): normal, offset (m),
-    stiffness (N/m); torque (n,) or (1,) N m on a jaw's hinge, along its positive angle."""
+    stiffness (N/m); torque (n,) or (1,) N m on a jaw's hinge, along its positive angle; a push anywhere."""
 
     gravity: np.ndarray
     payload: float = 0.0
     force: np.ndarray = field(default_factory=lambda: np.zeros(3))
     wall: np.ndarray = field(default_factory=lambda: np.zeros(5))
     torque: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    push: Push | None = None
 
 
 @dataclass(frozen=True)

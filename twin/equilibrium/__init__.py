@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Path, Problem
-from twin.effects import Drive
+from twin.effects import Drive, Loads, Push
 from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.lengths import STIFFEST
@@ -95,6 +95,7 @@ class Equilibrium:
         self.spring = model.qpos_spring.copy()
         mujoco.mj_kinematics(model, data)
         ends = data.site_xpos[hole]
+        self._arclength = data.site_xpos[disk, 2] / body.length  # of each disk on the straight robot
         self.straight_path: np.ndarray = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)  # (n_tendon,) m
 
     @property
@@ -105,8 +106,14 @@ class Equilibrium:
         """What is in balance under the problem's loads."""
         loads, route = problem.loads, problem.route
         law = Law(float(route.mu), float(route.presliding), np.array(loads.wall, float))
-        load = Load(np.array(loads.gravity, float), float(loads.payload), np.array(loads.force, float))
-        return Statics(self.model._address, self.data._address, self.chain, self.spring, law, load)
+        return Statics(self.model._address, self.data._address, self.chain, self.spring, law, self.load(loads))
+
+    def load(self, loads: Loads, softness: float = 1.0) -> Load:
+        """Loads as statics knows them: over the stiffness, but for the payload, which gravity makes a force."""
+        push = loads.push or Push(np.zeros(3))
+        pushed = int(np.abs(self._arclength - push.height).argmin())
+        gravity, force, aside = (softness * np.array(v, float) for v in (loads.gravity, loads.force, push.force))
+        return Load(gravity, float(loads.payload), force, aside, pushed)
 
     def driving(self, problem: Problem) -> Driving:
         """What drives the trial."""

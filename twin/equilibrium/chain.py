@@ -1,9 +1,9 @@
 """The balance of forces of a chain of hinges (and slides) pulled by tendons, and its exact tangent.
 
 Energy of the chain without friction, with elastic energy E_el (elastic.py), tendon segments l_d under tension T_d,
-masses m at x, a dead force F at the tip, and disks at a distance `gap` from a wall of stiffness k:
+masses m at x, dead forces F at the tip and P at a disk, and disks at a distance `gap` from a wall of stiffness k:
 
-    E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip + 1/2 k sum max(0, -gap)^2
+    E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip - P.x_disk + 1/2 k sum max(0, -gap)^2
 
 `balance` returns r = dE/dq with T_d the tensions that friction leaves, and J = dr/dq. A segment's length depends only on
 the hinges between its two holes (none in a thick disk), so its geometric stiffness is a small block; gravity's Hessian follows
@@ -64,6 +64,8 @@ class Load(NamedTuple):
     gravity: np.ndarray  # (3,) m/s^2
     payload: float  # kg at the tip
     force: np.ndarray  # (3,) N at the tip
+    push: np.ndarray  # (3,) N at a disk
+    pushed: int  # which, from 0
 
 
 class Statics(NamedTuple):
@@ -179,6 +181,24 @@ def _add_weight(chain, load, r, J):
 
 
 @inner
+def push_force(chain, load, r, J):
+    """The dead force on a disk, added to r and, unless it is empty, J."""
+    x, n = chain.site[chain.disk[load.pushed]], chain.below[load.pushed]
+    X = np.empty((n, 3))
+    for i in range(n):
+        put(X[i], lever(chain, i, x))
+        r[i] -= dot(load.push, X[i])
+    if J.size:
+        for j in range(n):
+            b = turned(chain, j, load.push)
+            for i in range(j, n):
+                h = dot(b, X[i])
+                J[i, j] += h
+                if i > j:
+                    J[j, i] += h
+
+
+@inner
 def wall_force(chain, wall, r, J):
     """Penalty force k max(0, -gap) along the wall's normal at each disk centre, added to r and, unless it is empty, J."""
     normal, stiffness = (wall[0], wall[1], wall[2]), wall[4]
@@ -246,6 +266,8 @@ def balance(at, state, z, s, r, J):
     bowing = np.zeros(nt)
     springs(state.q, at.rest, chain, tension, bowing, r, J)
     _add_weight(chain, at.load, r, J)
+    if at.load.push[0] != 0.0 or at.load.push[1] != 0.0 or at.load.push[2] != 0.0:
+        push_force(chain, at.load, r, J)
     if law.wall[4] > 0.0:
         wall_force(chain, law.wall, r, J)
     room, X, dl = laid(chain.hole.shape[1] - 1), np.empty((nv, 3)), np.zeros(nv)

@@ -86,6 +86,7 @@ class Now(NamedTuple):
     at: Statics
     gravity: np.ndarray  # (3,) m/s^2
     force: np.ndarray  # (3,) N
+    push: np.ndarray  # (3,) N
     wall: float  # N/m
     rest: np.ndarray  # (nv,)
     state: State
@@ -131,6 +132,7 @@ def soften(now, driving, i, weight):
     for a in range(3):
         now.at.load.gravity[a] = now.gravity[a] * factor * weight
         now.at.load.force[a] = now.force[a] * factor * weight
+        now.at.load.push[a] = now.push[a] * factor * weight
     now.at.law.wall[4] = now.wall * factor
     now.held.factor[0] = factor
     for t in range(now.held.stretch.size):
@@ -145,7 +147,7 @@ def at_rest(plain, driving, slow, state):
     law, load, warm = plain.law, plain.load, np.full(nt, driving.ambient[0])
     at = Statics(
         plain.model, plain.data, plain.chain, np.empty(nv), Law(law.mu, law.presliding, law.wall.copy()),
-        Load(load.gravity.copy(), load.payload, load.force.copy()),
+        Load(load.gravity.copy(), load.payload, load.force.copy(), load.push.copy(), load.pushed),
     )  # fmt: skip
     elongation, tension = np.empty(nt), np.empty(nt)
     for t in range(nt):
@@ -155,8 +157,8 @@ def at_rest(plain, driving, slow, state):
         warm.copy(), elongation, tension,
     )  # fmt: skip
     now = Now(
-        at, load.gravity, load.force, law.wall[4], plain.rest, state, no_factors(nv, nt), held, Sought(straight.copy(), warm),
-        np.empty(state.s.shape), np.empty(nv), np.empty(nv), np.zeros(nt),
+        at, load.gravity, load.force, load.push, law.wall[4], plain.rest, state, no_factors(nv, nt), held,
+        Sought(straight.copy(), warm), np.empty(state.s.shape), np.empty(nv), np.empty(nv), np.zeros(nt),
     )  # fmt: skip
     soften(now, driving, 0, 1.0)
     rested(plain.rest, slow.delayed, at.rest)

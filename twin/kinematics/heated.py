@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from twin.bench import ROOM
-from twin.body import TOLERANCE, Problem
+from twin.body import DIRECT, TOLERANCE, Problem
 from twin.effects import Drive, Loads
+from twin.equilibrium import ChainPath
 from twin.equilibrium.chain import State
 from twin.equilibrium.lengths import Held, Sought, reach, remember
-from twin.equilibrium.newton import no_factors
+from twin.equilibrium.newton import no_factors, place
 from twin.errors import SolveError
 from twin.kinematics.robot import LoadedRobot
 from twin.springs.heat import heated
@@ -63,6 +64,29 @@ class HeatedRobot(LoadedRobot):
             raise SolveError("springs and body find no equilibrium; are the currents what was meant?")
         remember(self.held, self.now.s, self.now.T)
         return self.tension
+
+    def bear(self, loads: Loads) -> None:
+        """Other loads from now on, the springs as warm as they are. Raises SolveError, and keeps the loads, where that has no
+        equilibrium."""
+        before, moved = self.load, self.state()
+        self.load = self.solver.load(self.twin.laws.surround(loads), self.softness)
+        self.factors.fresh[0] = False
+        try:
+            self.step(np.zeros(self.n_tendon), 0.0)
+        except SolveError:
+            self.load = before
+            self.restore(moved)
+            raise
+
+    def path(self) -> ChainPath:
+        """As it stands, as a trial of one sample."""
+        place(self.statics, self.now.q)
+        chain = self.solver.chain
+        return ChainPath(
+            tension=self.tension[None], path=self.now.s[None, :, 0].copy(), markers=chain.site[chain.marker][None].copy(),
+            status=np.full(1, DIRECT), q=self.now.q[None].copy(), others={"temperature": self.warm[None].copy()},
+            slip=self.now.z.copy(), distal=self.now.s.copy(),
+        )  # fmt: skip
 
     @property
     def elongation(self) -> np.ndarray:

@@ -15,7 +15,7 @@ from twin.bench import ROOM
 from twin.body import TOLERANCE, Problem
 from twin.effects import Drive, Loads, Signals
 from twin.equilibrium import Equilibrium
-from twin.equilibrium.chain import Law, Load, State, Statics, become, copied
+from twin.equilibrium.chain import Law, State, Statics, become, copied
 from twin.equilibrium.move import STRIDE, answer, pull
 from twin.equilibrium.newton import no_factors, place
 from twin.errors import SolveError
@@ -51,8 +51,7 @@ class LoadedRobot:
         self.loads, self.temperature, self.route = loads, temperature, laws.route
         wall = np.array(loads.wall, float) * np.array([1, 1, 1, 1, self.softness])
         self.law = Law(float(self.route.mu), float(self.route.presliding), wall)
-        f = self.softness
-        self.load = Load(np.array(loads.gravity, float) * f, float(loads.payload), np.array(loads.force, float) * f)
+        self.load = self.solver.load(loads, self.softness)
         self.n_tendon = twin.robot.n_tendon
         self._reads = any(e.acts_in("command", "sense") for e in twin.effects)
         self.rest()

@@ -74,7 +74,7 @@ class Started:
         held = problem.which(Drive.DISPLACEMENT)
         stiffness = np.full(len(held), 1.0 / (problem.route.stretch + 1.0 / STIFFNESS))
         model.tendon_stiffness[placed.wraps.tendon] = np.where(held, stiffness, 0.0)
-        force = np.outer(self.statics.tip, problem.loads.force @ turned(self.body.turn)).ravel()
+        force = self.statics.pressed(problem.loads).ravel()
         return Limb(
             self.parts, room_for(self.parts, len(problem.creep.amplitude) > 0), placed.dof, placed.wraps, held, stiffness,
             trial.hanging, state.slip, state.beyond, state.tension, force, float(problem.route.mu), float(problem.route.presliding),

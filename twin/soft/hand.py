@@ -23,7 +23,7 @@ from twin.soft.statics import SoftPath, SoftStatics, turned
 @dataclass(frozen=True, kw_only=True)
 class HandBody(Body):
     """Fingers, the numbers that each was built of, where their frames are (n, 3) m and how they are turned (n, 3, 3), in the
-    palm's frame. A payload or a force at "the tip" is held by all fingers alike."""
+    palm's frame. A payload or a force at "the tip" is held by all fingers alike; a push is on one."""
 
     fingers: tuple[SoftBody, ...]
     numbers: tuple[Mapping[str, float], ...]
@@ -49,7 +49,11 @@ class HandBody(Body):
         """As finger k (from 0) has them, in its own frame."""
         turn, n = self.turns[k], len(self.fingers)
         wall = np.concatenate([loads.wall[:3] @ turn, [loads.wall[3] - loads.wall[:3] @ self.places[k]], loads.wall[4:]])
-        return replace(loads, gravity=loads.gravity @ turn, payload=loads.payload / n, force=loads.force @ turn / n, wall=wall)
+        push = loads.push if loads.push is not None and loads.push.finger == k else None
+        if push is not None:
+            push = replace(push, force=push.force @ turn, azimuth=push.azimuth - np.arctan2(turn[1, 0], turn[0, 0]))
+        force, payload = loads.force @ turn / n, loads.payload / n
+        return replace(loads, gravity=loads.gravity @ turn, payload=payload, force=force, wall=wall, push=push)
 
     def share(self, k: int, problem: Problem) -> Problem:
         """What a problem of the hand asks of finger k (from 0); `delayed` is a copy, for `keep_delayed`."""

@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
-from twin.effects import Drive
+from twin.effects import Drive, Loads
 from twin.errors import SolveError
 from twin.sensors import resistance
 from twin.soft.body import SoftBody
@@ -90,6 +90,17 @@ class SoftStatics:
                 _SOLVED.pop(next(iter(_SOLVED)), None)
         return path
 
+    def pressed(self, loads: Loads) -> np.ndarray:
+        """(n_free, 3) N on the nodes, in the finger's own frame, by the tip's force and the push."""
+        turn, push, cone = turned(self.body.turn), loads.push, self.body.cone
+        force = np.outer(self.tip, loads.force @ turn)
+        if push is not None:
+            z = push.height * cone.length
+            radius, azimuth = float(cone.radius(z)), push.azimuth - self.body.turn
+            point = np.array([[radius * np.cos(azimuth), radius * np.sin(azimuth), z]])
+            force = force + np.outer(self.body.lattice.weights(point)[0], push.force @ turn)
+        return force
+
     def markers(self, u: np.ndarray) -> np.ndarray:
         """(n, m + 1, 3) m in the base frame: the markers, and the tip."""
         tip = self.tip @ u + [0.0, 0.0, self.body.cone.length]
@@ -147,8 +158,8 @@ class Trial:
         self.problem, self.parts, body = problem, statics.parts, statics.body
         n, nt = problem.command.shape
         loads, turn = problem.loads, turned(body.turn)
-        at_tip = loads.payload * loads.gravity + loads.force
-        self.force = np.outer(body.lattice.volume, body.density * loads.gravity @ turn) + np.outer(statics.tip, at_tip @ turn)
+        weight = np.outer(body.lattice.volume, body.density * loads.gravity @ turn)
+        self.force = weight + np.outer(statics.tip, loads.payload * loads.gravity @ turn) + statics.pressed(loads)
         self.wall = np.concatenate([loads.wall[:3] @ turn, loads.wall[3:]])
         self.held = problem.which(Drive.DISPLACEMENT)
         self.scale = np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float)

@@ -1,10 +1,13 @@
 """The robot in a browser: as it stands under sliders, or as it moved in a measurement set, beside what was measured.
 
-live.py     the robot under sliders                         colours.py  values as colours, and the bar that says which
-replay.py   a set's trials, predicted by two twins          scene.py    a figure's frames (twin/figure.py) as viser draws them
-app.py      the panel, and the loop that serves it
+live.py     the robot under sliders, and under currents     controls.py  those sliders
+replay.py   a set's trials, predicted                       scrubber.py  their clock and their errors
+side.py     one of the twins that are shown                 colours.py   values as colours, and the bar that says which
+film.py     pictures and films of the scene                 scene.py     a figure's frames (twin/figure.py) as viser draws them
+app.py      the panel, and the loop that serves it          headless.py  a film without a window
 """
 
 from twin.viewer.app import App, serve
+from twin.viewer.headless import take_film
 
-__all__ = ["App", "serve"]
+__all__ = ["App", "serve", "take_film"]

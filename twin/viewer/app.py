@@ -5,164 +5,157 @@ Callbacks of the panel only note what is wanted: one loop solves and draws, sinc
 
 from __future__ import annotations
 
+import logging
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import viser
-import viser.uplot
 
-from twin.effects import Drive, Loads
-from twin.errors import TwinError
+from twin.effects import Drive
+from twin.errors import DataError, TwinError
 from twin.figure import Frames, Range
 from twin.measurements import Recording
-from twin.rollout import full_pull
 from twin.twin import Twin
 from twin.viewer.colours import bar
-from twin.viewer.live import Live
-from twin.viewer.replay import Replay, Track
-from twin.viewer.scene import Scene
+from twin.viewer.controls import MOST_PUSH, Controls
+from twin.viewer.film import Film, captioned, plain, png, render
+from twin.viewer.replay import Track
+from twin.viewer.scene import set_up
+from twin.viewer.scrubber import Scrubber, between
+from twin.viewer.side import DESCRIBED, Side
 
 RATE = 60.0  # Hz, of the loop
-MOST = 1.5  # full pulls at a slider's end
-MOST_PUSH = 0.2  # N: bends the rod and the finger by centimetres
+PAUSE = 0.25  # s: a clock that was held up for longer does not catch up
 TELLING, PLOTTING = 0.1, 1.0  # s between words and between plots of a running replay: a reader needs no more
-DESCRIBED, BETTER = "as described", "with effects"
 REPLAY, BY_HAND = "replay", "by hand"
-BY = {  # what is pulled by: name, unit, meaning, SI of one
-    Drive.TENSION: ("tension", "N", "tension as its load cell reads it", 1.0),
-    Drive.DISPLACEMENT: (
-        "displacement",
-        "mm",
-        "taken up by its motor from the hanging rest, negative let out; the others hold",
-        1e-3,
-    ),
-}
-NOW = {"label": "now", "stroke": "#d62728"}
+SHADES = {"tension": "tension of the tendons", "strain": "strain of the skin", "resistance": "resistance of the cords"}
+Sent = Callable[[str, bytes], None]
 
 
 class App:
-    """A twin in a browser, under sliders, or beside the trials of a set."""
+    """One twin in a browser or two beside each other, under the same sliders or beside the trials of a set."""
 
-    def __init__(self, server: viser.ViserServer, twin: Twin, recording: Recording | None = None) -> None:
-        """`twin` is compared with its robot as described. Raises DataError for a robot that is not drawn, or a set that does not
-        drive it."""
-        self.server, self.twin = server, twin
-        self._described = Twin.of(twin.robot)
-        self._figure = twin.figure()
-        self._replay = Replay(recording, twin) if recording is not None else None
-        self._scene = Scene(server, self._figure, twin.robot.gravity)
+    def __init__(self, server: viser.ViserServer, twins: Sequence[tuple[str, Twin]], recording: Recording | None = None) -> None:
+        """`twins` by name, which is shown where there are two. Each is compared with its robot as described. Raises DataError for a
+        robot that is not drawn, a set that does not drive it, or two robots that the same sliders do not drive."""
+        self.server = server
+        places = set_up(server, twins[0][1].robot.gravity, [twin.figure() for _, twin in twins])
+        names = [f"{letter}: {name}" if len(twins) > 1 else "" for letter, (name, _) in zip("AB", twins, strict=False)]
+        self.sides = [
+            Side(server, twin, name, where, recording) for name, (_, twin), where in zip(names, twins, places, strict=True)
+        ]
         self._wanted, self._clock, self._told, self._plotted = True, time.monotonic(), 0.0, 0.0
-        self._track: Track | None = None
-        self._live: tuple[Twin, Live] | None = None
-        self._range = self._figure.coloured(MOST)
+        self._asked: list[Callable[[], None]] = []  # what clicks and buttons left to the loop
+        self._film: tuple[Film, Sent] | None = None
+        self._resting = False
+        self._tracks: list[Track] = []
+        self._ranges: dict[str, Range] = {}
         self._panel(recording)
         self.drawn = 0  # pictures sent
 
     # ---- the panel ------------------------------------------------------------------------------------------------------
 
     def _panel(self, recording: Recording | None) -> None:
-        gui, robot = self.server.gui, self.twin.robot
+        gui, first, replay = self.server.gui, self.sides[0], self.sides[0].replay
         gui.configure_theme(control_width="medium", dark_mode=False)
-        told = f"**{robot.title}**" + (f"\n\n{recording.title}  \n*{recording.source}*" if recording else "")
-        gui.add_markdown(told)
-        self._bar = gui.add_html(bar(self._range))
+        told = "\n\n".join(f"{f'{s.name}, ' if s.name else ''}**{s.twin.robot.title}**" for s in self.sides)
+        gui.add_markdown(told + (f"\n\n{recording.title}  \n*{recording.source}*" if recording else ""))
+        self._bar = gui.add_html("")
         self.words = gui.add_markdown("")
-        self._mode = gui.add_dropdown("show", (REPLAY, BY_HAND) if self._replay else (BY_HAND,), hint="a trial, or your own pulls")
-        self._noted(self._mode)
-        self._twin_panel()
-        self._replay_panel()
-        self._drive_panel()
-
-    def _twin_panel(self) -> None:
-        gui, better = self.server.gui, bool(self.twin.effects or self.twin.values)
-        with gui.add_folder("twin", visible=better):
-            self.which = gui.add_button_group("predicted", (DESCRIBED, BETTER), hint="before and after a diagnosis")
-            self.which.value = BETTER if better else DESCRIBED
-            self._noted(self.which)
-            self.effects = {
-                e.id: gui.add_checkbox(e.id.replace("_", " "), True, hint=f"moves with {e.moves_with}") for e in self.twin.effects
-            }
-            for box in self.effects.values():
-                self._noted(box)
-
-    def _replay_panel(self) -> None:
-        gui, replay = self.server.gui, self._replay
+        self._mode = gui.add_dropdown("show", (REPLAY, BY_HAND) if replay else (BY_HAND,), hint="a trial, or your own pulls")
+        shades = tuple(SHADES[s] for s in first.figure.shades)
+        self.shade = gui.add_dropdown("colour by", shades, visible=len(shades) > 1, hint="what the colours of the robot mean")
+        self.picture = gui.add_button("save picture", hint="of the scene as you see it, its colour bar beside it, as PNG")
+        for handle in (self._mode, self.shade):
+            self._changed(handle)
+        for side in self.sides:
+            side.panel(gui, self._changed)
         self._replaying = gui.add_folder("replay", visible=replay is not None)
+        lines = [s.name for s in self.sides] if len(self.sides) > 1 else [DESCRIBED, "as shown"]
         with self._replaying:
-            self.trial = gui.add_dropdown("trial", tuple(replay.labels) if replay else ("none",))
-            self.play = gui.add_checkbox("play", False, hint="from here on, again and again")
-            self.time = gui.add_slider("time, s", 0.0, 1.0, 0.01, 0.0)
-            self.speed = gui.add_slider("speed", 0.1, 20.0, 0.1, 1.0, hint="trial seconds a second")
-            self.arrows = gui.add_slider("residual x", 0.0, 20.0, 1.0, 5.0, hint="length of the arrows from predicted to measured")
-            lines = ({}, {"label": DESCRIBED, "stroke": "#999"}, {"label": "as shown", "stroke": "#1f77b4"}, NOW)
-            self.plot = gui.add_uplot(
-                (np.zeros(2),) * 4, tuple(viser.uplot.Series(**line) for line in lines),  # type: ignore[typeddict-item]
-                title="marker error, mm, over time, s", scales={"x": viser.uplot.Scale(time=False)}, height=200,
-            )  # fmt: skip
-        for handle in (self.trial, self.time, self.arrows):
-            self._noted(handle)
-
-    def _drive_panel(self) -> None:
-        gui, robot = self.server.gui, self.twin.robot
-        self._driving = gui.add_folder("by hand", visible=self._replay is None)
-        full, ports = full_pull(self.twin), self.twin.robot.build().drives
-        ways = [d for d in (Drive.TENSION, Drive.DISPLACEMENT) if all(any(p.drive is d for p in port) for port in ports)]
-        most = {Drive.TENSION: round(MOST * full.tension, 1), Drive.DISPLACEMENT: round(MOST * 1e3 * full.displacement, 1)}
-        # One motor can take up only what others let out.
-        least = {Drive.TENSION: 0.0, Drive.DISPLACEMENT: -most[Drive.DISPLACEMENT]}
+            self.scrubber = Scrubber(gui, replay.labels if replay else (), lines, self._changed)
+            self.film = gui.add_button("save film", hint="the trial from first to last at this speed, as GIF; keep the window open")
+        self._driving = gui.add_folder("by hand", visible=replay is None)
         with self._driving:
-            self.by = gui.add_dropdown("pull by", tuple(BY[d][0] for d in ways), visible=len(ways) > 1, hint="what motors hold")
-            self.sliders = {
-                d: [
-                    gui.add_slider(f"tendon {i}, {BY[d][1]}", least[d], most[d], 0.01, 0.0, hint=BY[d][2], visible=d is ways[0])
-                    for i in range(1, robot.n_tendon + 1)
-                ]
-                for d in ways
-            }
-            self.payload = gui.add_slider("payload, g", 0.0, 30.0, 1.0, 0.0, hint="at the tip", visible=not len(self._figure.faces))
-            self.tilt = gui.add_slider("gravity tilt, deg", 0, 180, 5, 0, hint="of its direction from that described")
-            self.azimuth = gui.add_slider("gravity azimuth, deg", 0, 355, 5, 0, hint="about the robot's axis")
-            self.push = gui.add_slider("push at the tip, N", 0.0, MOST_PUSH, 0.005, 0.0, hint="sideways, of a fixed direction")
-            self.aside = gui.add_slider("push azimuth, deg", 0, 355, 5, 0, hint="its direction about the robot's axis")
-            self.slack = gui.add_button("let go", hint="all tendons slack, friction's history forgotten")
-        for handle in (
-            *(s for of in self.sliders.values() for s in of),
-            self.payload,
-            self.tilt,
-            self.azimuth,
-            self.push,
-            self.aside,
-        ):
-            self._noted(handle)
-        self.by.on_update(lambda _: self._let_go())
-        self.slack.on_click(lambda _: self._let_go())
+            self.hand = Controls(gui, first.twin, first.figure, self._changed)
+        self._alike()
+        self.hand.by.on_update(lambda _: self._asked.append(self._let_go))
+        self.hand.rest.on_click(lambda _: self._asked.append(self._rest))
+        self.hand.slack.on_click(lambda _: self._asked.append(self._let_go))
+        self.picture.on_click(lambda event: self._asked.append(lambda: self._save(event)))
+        self.film.on_click(lambda event: self._asked.append(lambda: self._filmed(event)))
+        self.server.scene.on_click()(lambda event: self._asked.append(lambda: self._touched(event)))
 
-    def _noted(self, handle: Any) -> None:
+    def _alike(self) -> None:
+        """Raises DataError where two robots are not driven by the same sliders."""
+        one, *others = (tuple(tuple(sorted({p.drive for p in port})) for port in s.twin.robot.build().drives) for s in self.sides)
+        if any(other != one for other in others):
+            raise DataError(
+                f"the same sliders do not drive {' and '.join(s.twin.robot.name for s in self.sides)}: they have other tendons; "
+                "look at one after the other"
+            )
+
+    def _changed(self, handle: Any) -> None:
         def note(event: viser.GuiEvent) -> None:
             # What the loop itself moved needs no second picture.
             if event.client is not None:
                 self._wanted = True
 
-        (handle.on_click if isinstance(handle, viser.GuiButtonGroupHandle) else handle.on_update)(note)
-
-    @property
-    def drive(self) -> Drive:
-        """What the sliders are."""
-        return next(d for d, (name, *_) in BY.items() if name == self.by.value)
-
-    @property
-    def pulls(self) -> list[viser.GuiSliderHandle]:
-        """The sliders in use."""
-        return self.sliders[self.drive]
+        clicked = isinstance(handle, viser.GuiButtonGroupHandle | viser.GuiButtonHandle)
+        (handle.on_click if clicked else handle.on_update)(note)
 
     def _let_go(self) -> None:
-        for drive, sliders in self.sliders.items():
-            for slider in sliders:
-                slider.value, slider.visible = 0.0, drive is self.drive
-        self._live, self._wanted = None, True
+        self.hand.let_go()
+        for side in self.sides:
+            side.forget()
+
+    def _rest(self) -> None:
+        self._resting = True
+
+    def _touched(self, event: viser.SceneClickEvent) -> None:
+        """A push where a robot by hand was clicked."""
+        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+        for side in self.sides if self._mode.value == BY_HAND else ():
+            hold = None if side.shown is None else side.scene.touched(side.shown, origin, direction)
+            if hold is not None:
+                self.hand.take(hold)
+                return
+
+    # ---- pictures and films ---------------------------------------------------------------------------------------------
+
+    def _save(self, event: viser.GuiEvent) -> None:
+        if event.client is not None:
+            camera = event.client.camera
+            picture = render(event.client, int(camera.image_width), int(camera.image_height))
+            self._handed(event.client)("twin.png", png(captioned(picture, plain(self.words.content), self._bars)))
+
+    def _filmed(self, event: viser.GuiEvent) -> None:
+        if event.client is not None:
+            self.begin_film(event.client, self._handed(event.client))
+
+    def _handed(self, client: viser.ClientHandle) -> Sent:
+        return lambda name, content: client.send_file_download(name, content, save_immediately=True)
+
+    def begin_film(self, client: viser.ClientHandle, sent: Sent) -> None:
+        """Take a film of the chosen trial as `client` sees it; `sent` takes its name and content. Raises DataError for one of too
+        many pictures."""
+        self.scrubber.play.value = False
+        self._film = Film(client, float(self._tracks[0].time[-1]), self.scrubber.speed.value), sent
+
+    def _take(self, film: Film, sent: Sent) -> None:
+        self.scrubber.time.value = film.time
+        self._show_replay(0.0, True)
+        film.take(f"{self.scrubber.trial.value}\n{plain(self.words.content)}", self._bars)
+        self.words.content = f"taking a film: {film.time:.2f} of {film.end:.2f} s"
+        if film.done:
+            sent(f"{self.scrubber.trial.value}.gif", film.gif())
+            self._film, self._wanted = None, True
+
+    @property
+    def filming(self) -> bool:
+        return self._film is not None
 
     # ---- the loop -------------------------------------------------------------------------------------------------------
 
@@ -176,94 +169,114 @@ class App:
     def tick(self) -> None:
         """Draw what is wanted by now."""
         now = time.monotonic()
-        passed, self._clock = now - self._clock, now
-        replaying = self._mode.value == REPLAY
-        running = replaying and self.play.value and self._track is not None
-        if not (self._wanted or running):
-            return
-        asked, self._wanted = self._wanted, False
+        passed, self._clock = min(now - self._clock, PAUSE), now
         try:
-            if replaying:
-                self._show_replay(passed if running else 0.0, asked)
-            else:
-                self._show_live()
+            while self._asked:
+                self._wanted = True
+                self._asked.pop(0)()
+            if self._film is not None:
+                self._take(*self._film)
+            elif not self._shown(passed):
+                return
         except TwinError as error:
-            self.words.content = f"**{error}**"
+            self.words.content, self._film = f"**{error}**", None
             return
         self.drawn += 1
 
-    def _chosen(self) -> Twin:
-        if self.which.value == DESCRIBED:
-            return self._described
-        return replace(self.twin, effects=tuple(e for e in self.twin.effects if self.effects[e.id].value))
+    def _shown(self, passed: float) -> bool:
+        """Whether anything was drawn."""
+        replaying = self._mode.value == REPLAY
+        running = self.scrubber.play.value and bool(self._tracks) if replaying else self._heating
+        if not (self._wanted or running):
+            return False
+        asked, self._wanted = self._wanted, False
+        if replaying:
+            self._show_replay(passed if running else 0.0, asked)
+        else:
+            self._show_live(passed if running else 0.0)
+        return True
+
+    @property
+    def _heating(self) -> bool:
+        """Whether springs are warming or cooling as the clock goes on."""
+        if self.hand.drive is not Drive.CURRENT or self.hand.clock.value == 0.0:
+            return False
+        return any(s.heated is not None and s.heated.changing for s in self.sides)
 
     def _show_replay(self, passed: float, asked: bool) -> None:
-        replay = self._replay
-        assert replay is not None
-        k, twin = replay.labels.index(self.trial.value), self._chosen()
-        if asked or self._track is None:
-            self._track = replay.track(twin, k)
+        k = self.scrubber.chosen
+        if asked or not self._tracks:
+            self._tracks = [side.track(k) for side in self.sides]
             self._replaying.visible, self._driving.visible = True, False
-            self.time.max = max(round(float(self._track.time[-1]), 2), 0.01)
-            self._coloured(self._figure.coloured(float(np.ceil(10 * self._track.frames.tension.max()) / 10)))
-        track = self._track
-        t = self.time.value + passed * self.speed.value
-        t = t if t <= track.time[-1] else 0.0
-        i = int(np.clip(np.searchsorted(track.time, t, "right") - 1, 0, len(track.time) - 1))
-        j = min(i + 1, len(track.time) - 1)
-        share = float(np.clip((t - track.time[i]) / max(track.time[j] - track.time[i], 1e-9), 0.0, 1.0))
-        measured = replay.measured(k)
-        self._scene.draw(track.frames.at(i, share), self._range)
-        between = [(1.0 - share) * m[i] + share * m[j] for m in (track.markers, measured)]
-        self._scene.mark(between[0], between[1], self.arrows.value)
-        self._slide(t)
+            self.scrubber.time.max = max(round(float(self._tracks[0].time[-1]), 2), 0.01)
+            self._coloured([t.frames for t in self._tracks])
+        t = self.scrubber.on(passed, float(self._tracks[0].time[-1]))
+        i, share = between(self._tracks[0], t)
+        for side, track in zip(self.sides, self._tracks, strict=True):
+            assert side.replay is not None
+            measured, shown = side.replay.measured(k), track.frames.at(i, share)
+            j = min(i + 1, len(measured) - 1)
+            predicted, seen = ((1.0 - share) * m[i] + share * m[j] for m in (track.markers, measured))
+            side.scene.draw(shown, self._shade, self._ranges)
+            side.scene.mark(predicted, seen, self.scrubber.arrows.value)
+            side.scene.pushed(predicted[0], np.zeros(3))
         now = time.monotonic()
         if asked or now - self._told > TELLING:
             self._told = now
-            self._tell_replay(track, twin, k, i, asked)
+            self._tell_replay(k, i, asked)
 
-    def _slide(self, t: float) -> None:
-        if abs(t - self.time.value) > 1e-9:
-            self.time.value = t
-
-    def _tell_replay(self, track: Track, twin: Twin, k: int, i: int, asked: bool) -> None:
-        assert self._replay is not None
-        described = self._replay.track(self._described, k)
+    def _tell_replay(self, k: int, i: int, asked: bool) -> None:
+        before = [side.before(k) for side in self.sides]
         if asked or time.monotonic() - self._plotted > PLOTTING:
             self._plotted = time.monotonic()
-            present = np.where(np.arange(len(track.time)) == i, track.error, 0.0)  # a needle: the plot takes no missing numbers
-            self.plot.data = (track.time, *(1e3 * np.nan_to_num(e) for e in (described.error, track.error, present)))
-        named = ", ".join(e.id.replace("_", " ") for e in twin.effects) or "no effect"
-        named = DESCRIBED if self.which.value == DESCRIBED else named
-        now, whole, before = (1e3 * e for e in (track.error[i], track.rms, described.rms))
-        self.words.content = (
-            f"t = {track.time[i]:.2f} s: error **{now:.2f} mm**, over the trial **{whole:.2f} mm** ({named}); as described "
-            f"{before:.2f} mm  \nblue: predicted markers, red: measured, arrows: residual"
-        )
+            self.scrubber.draw(self._tracks if len(self.sides) > 1 else [*before, *self._tracks], i)
+        lines = [f"t = {self._tracks[0].time[i]:.2f} s"]
+        for side, track, described in zip(self.sides, self._tracks, before, strict=True):
+            now, whole, was = (1e3 * e for e in (track.error[i], track.rms, described.rms))
+            words = f"error **{now:.2f} mm**, over the trial **{whole:.2f} mm** ({side.told}); as described {was:.2f} mm"
+            lines.append(_named(side) + words)
+        self.words.content = "  \n".join([*lines, "blue: predicted markers, red: measured, arrows: residual"])
 
-    def _show_live(self) -> None:
+    def _show_live(self, passed: float) -> None:
         self._replaying.visible, self._driving.visible = False, True
-        twin = self._chosen()
-        if self._live is None or self._live[0] != twin:
-            self._live = twin, Live(twin, self.drive)
-        self._coloured(self._figure.coloured(float(self.sliders[Drive.TENSION][0].max)))
-        pull = np.array([p.value for p in self.pulls]) * BY[self.drive][3]
-        shown = self._live[1].shape(pull, self._loads())
-        self._scene.draw(shown, self._range)
-        self._scene.mark(shown.markers[0], np.full_like(shown.markers[0], np.nan), 0.0)
-        self.words.content = _standing(shown)
+        hand, rest, lines = self.hand, self._resting, []
+        self._resting = False
+        for side in self.sides:
+            if hand.drive is Drive.CURRENT:
+                shown = side.heat(hand.command, hand.loads, passed * hand.clock.value, rest)
+            else:
+                shown = side.stand(hand.drive, hand.command, hand.loads)
+            self._coloured([shown], hand.most, hand.warmest)
+            side.scene.draw(shown, self._shade, self._ranges)
+            side.scene.mark(shown.markers[0], np.full_like(shown.markers[0], np.nan), 0.0)
+            side.scene.pushed(side.figure.grips(shown)[hand.point()], hand.force / MOST_PUSH)
+            lines.append(_named(side) + _standing(shown) + _warm(side))
+        self.words.content = "  \n".join(lines)
 
-    def _loads(self) -> Loads:
-        tilt, azimuth = np.deg2rad(self.tilt.value), np.deg2rad(self.azimuth.value)
-        g = self.twin.robot.gravity
-        axis = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-        along = g * np.cos(tilt) + np.cross(axis, g) * np.sin(tilt) + axis * (axis @ g) * (1.0 - np.cos(tilt))  # Rodrigues
-        aside = np.deg2rad(self.aside.value)
-        return Loads(along, 1e-3 * self.payload.value, self.push.value * np.array([np.cos(aside), np.sin(aside), 0.0]))
+    @property
+    def _shade(self) -> str:
+        return next(s for s, told in SHADES.items() if told == self.shade.value)
 
-    def _coloured(self, over: Range) -> None:
-        if over != self._range:
-            self._range, self._bar.content = over, bar(over)
+    @property
+    def _bars(self) -> list[Range]:
+        """The ranges that are in the picture."""
+        return [r for shade, r in self._ranges.items() if shade in (self._shade, "temperature")]
+
+    def _coloured(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
+        """Ranges that hold all of `frames`, or up to the largest tension (N) and warmest spring (K) there may be."""
+        figure, pulled = self.sides[0].figure, max(float(f.tension.max()) for f in frames)
+        most = tension if tension is not None and tension > pulled else float(np.ceil(10.0 * pulled) / 10.0)
+        ranges = {shade: figure.coloured(shade, most) for shade in figure.shades}
+        if any(f.temperature.size for f in frames):
+            ranges["temperature"] = figure.coloured("temperature", max(warmest, *(f.temperature.max() for f in frames)))
+        self._ranges = ranges
+        now = "".join(bar(r) for r in self._bars)
+        if now != self._bar.content:
+            self._bar.content = now
+
+
+def _named(side: Side) -> str:
+    return f"{side.name}: " if side.name else ""
 
 
 def _standing(shown: Frames) -> str:
@@ -272,11 +285,27 @@ def _standing(shown: Frames) -> str:
     return f"tip at x **{x:.1f}**, y **{y:.1f}**, z **{z:.1f}** mm{ends}"
 
 
-def serve(twin: Twin, recording: Recording | None, port: int, told: Callable[[str], None]) -> None:
+def _warm(side: Side) -> str:
+    """The springs' heat in words, if currents pull."""
+    if side.heated is None:
+        return ""
+    springs = ", ".join(f"{T - 273.15:.0f}" for T in side.heated.temperature)
+    how = "still warming or cooling" if side.heated.changing else "at rest: the clock waits"
+    return f"; springs at {springs} degC, **{side.heated.time:.0f} s** after they were cold, {how}"
+
+
+def served(port: int, label: str | None = None) -> viser.ViserServer:
+    """A server on 127.0.0.1, at the first free port from `port` on."""
+    # Browsers open connections ahead and drop those they do not need, each of which would be a traceback.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    return viser.ViserServer(host="127.0.0.1", port=port, label=label, verbose=False)
+
+
+def serve(twins: Sequence[tuple[str, Twin]], recording: Recording | None, port: int, told: Callable[[str], None]) -> None:
     """Serve on 127.0.0.1, the first free port from `port` on, until interrupted; `told` the address once the picture stands."""
-    server = viser.ViserServer(host="127.0.0.1", port=port, label=f"twin view {twin.robot.name}", verbose=False)
+    server = served(port, f"twin view {twins[0][1].robot.name}")
     try:
-        app = App(server, twin, recording)
+        app = App(server, twins, recording)
         app.tick()
         told(f"http://127.0.0.1:{server.get_port()}")
         app.run()

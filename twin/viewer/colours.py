@@ -12,7 +12,7 @@ STOPS = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [25
 
 def colours(values: np.ndarray, over: Range) -> np.ndarray:
     """(..., 3) bytes of SI values; those beyond the ends have the ends' colours."""
-    share = np.clip((over.factor * values - over.low) / max(over.high - over.low, 1e-12), 0.0, 1.0) * (len(STOPS) - 1)
+    share = np.clip((over.factor * (values - over.zero) - over.low) / max(over.high - over.low, 1e-12), 0.0, 1.0) * (len(STOPS) - 1)
     return np.stack([np.interp(share, np.arange(len(STOPS)), c) for c in STOPS.T], axis=-1).astype(np.uint8)
 
 

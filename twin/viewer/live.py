@@ -1,15 +1,25 @@
-"""A robot under sliders: its shape under what pulls it and its loads, from where it stood."""
+"""A robot under sliders: its shape under what pulls it and its loads, from where it stood; under currents, as time goes on."""
 
 from __future__ import annotations
+
+from typing import cast
 
 import numpy as np
 
 from twin.bench import ROOM, Inputs
 from twin.effects import Drive, Loads
+from twin.equilibrium.figure import ChainFigure
 from twin.figure import Frames
+from twin.kinematics import HeatedRobot
+from twin.springs.heat import loss
 from twin.twin import Twin, alone
 
 TURNS = 24  # back to which friction is followed
+STEP = 0.1  # s between equilibria while springs heat, which takes them tens of seconds
+ROUNDING = 1e-9  # s
+RESTING = 0.01  # K/s: at rest
+LONGEST = 900.0  # s within which springs come to rest
+BEYOND = 45.0  # K that the warmest spring may rest above its phase change without stress: its tension has had that then
 
 
 class Live:
@@ -38,8 +48,68 @@ class Live:
         return self._figure.frames(trace.path, self._twin.laws.surround(loads), self._twin.laws.route).at(-1)
 
 
+class Heated:
+    """A backbone whose springs currents heat. Its clock goes on as it is told; `time` is s since the springs were cold."""
+
+    def __init__(self, twin: Twin) -> None:
+        """Raises DataError for a robot without springs."""
+        self._twin, self._figure = twin, cast(ChainFigure, twin.figure())
+        self._robot: HeatedRobot | None = None
+        self._loads: Loads | None = None
+        self._current = np.zeros(twin.robot.n_tendon)
+        self.time, self._owed, self._rate = 0.0, 0.0, np.inf
+
+    def shape(self, current: np.ndarray, loads: Loads, passed: float) -> Frames:
+        """One instant, `passed` (s) after the last, under currents (n_tendon,) A. Raises SolveError where there is none."""
+        if self._robot is None:
+            self._robot, self._loads = HeatedRobot(self._twin, loads), loads
+        elif self._loads is None or not _same(loads, self._loads):
+            self._robot.bear(loads)
+            self._loads, self._rate = loads, np.inf
+        if not np.array_equal(current, self._current):
+            self._current, self._rate = current, np.inf
+        robot, self._owed = self._robot, self._owed + passed
+        while self._owed > STEP - ROUNDING:
+            before = robot.warm.copy()
+            robot.step(current, STEP)
+            self._rate = float(np.abs(robot.warm - before).max()) / STEP
+            self._owed, self.time = self._owed - STEP, self.time + STEP
+        return self._figure.standing(robot.path(), self._twin.laws.route, robot.heating.spring)
+
+    def rest(self, current: np.ndarray, loads: Loads) -> Frames:
+        """As the springs rest at last under currents that stay."""
+        shown, began = self.shape(current, loads, STEP), self.time
+        while self.changing and self.time - began < LONGEST:
+            shown = self.shape(current, loads, 1.0)
+        return shown
+
+    @property
+    def changing(self) -> bool:
+        """Whether some spring warms or cools, as far as is known."""
+        return self._rate > RESTING
+
+    @property
+    def temperature(self) -> np.ndarray:
+        """(n_tendon,) K of the springs."""
+        assert self._robot is not None
+        return self._robot.warm
+
+
+def most_current(twin: Twin) -> tuple[float, float]:
+    """The current (A) under which the robot's springs, as long as on the straight robot, rest at a temperature (K), and that:
+    h (T - T_a) = R I^2. Raises DataError for a robot without springs."""
+    spring = twin.heating(np.full(1, ROOM)).spring
+    warmest = float(spring.austenite_finish.min()) + BEYOND
+    h = loss(spring.records, 0, warmest - ROOM, float(spring.initial_elongation[0]), ROOM)
+    return float(np.sqrt(h * (warmest - ROOM) / spring.resistance[0])), warmest
+
+
 def _same(a: Loads, b: Loads) -> bool:
-    return a.payload == b.payload and np.array_equal(a.gravity, b.gravity) and np.array_equal(a.force, b.force)
+    alike = a.payload == b.payload and np.array_equal(a.gravity, b.gravity) and np.array_equal(a.force, b.force)
+    if a.push is None or b.push is None:
+        return alike and a.push is b.push
+    one, other = (np.array([*p.force, p.height, p.azimuth, p.finger]) for p in (a.push, b.push))
+    return alike and np.array_equal(one, other)
 
 
 def _turned(turns: list[np.ndarray], pull: np.ndarray) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.bench import prepare
+from twin.effects import Drive
 from twin.errors import DataError
 from twin.figure import Frames
 from twin.measurements import Recording
@@ -25,8 +26,11 @@ class Track:
     rms: float
 
 
+KEPT = 16  # predictions, of some megabytes each
+
+
 class Replay:
-    """The trials of a set. Predictions are made when asked for, and kept."""
+    """The trials of a set. Predictions are made when asked for, and the last ones kept."""
 
     def __init__(self, recording: Recording, twin: Twin) -> None:
         """Raises DataError for a set without markers, or that does not drive the robot."""
@@ -52,7 +56,8 @@ class Replay:
             inputs = self._bench.inputs[trial]
             trace = simulate(twin, self._bench, trials=[trial], dynamic=self._dynamic)[0]
             assert trace.path is not None
-            frames = twin.figure().frames(trace.path, twin.laws.surround(inputs.loads), twin.laws.route)
+            heating = twin.heating(inputs.temperature) if Drive.CURRENT in inputs.drives else None
+            frames = twin.figure().frames(trace.path, twin.laws.surround(inputs.loads), twin.laws.route, heating)
             markers = report(twin.effects, trace.true).markers[:, list(self._columns)]
             away = np.linalg.norm(self.measured(trial) - markers, axis=2)
             with np.errstate(invalid="ignore"):
@@ -60,4 +65,7 @@ class Replay:
                 error = np.sqrt(np.nansum(away**2, axis=1) / np.where(counted, counted, np.nan))
             rms = float(np.sqrt(np.nanmean(away**2)))
             self._kept[twin, trial] = Track(inputs.time - inputs.time[0], frames, markers, error, rms)
-        return self._kept[twin, trial]
+        self._kept[twin, trial] = track = self._kept.pop((twin, trial))  # the last used stands last
+        while len(self._kept) > KEPT:
+            del self._kept[next(iter(self._kept))]
+        return track

@@ -5,6 +5,8 @@ viser alone: mjviser draws no flex and gives a tendon one colour.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import trimesh
 import viser
@@ -12,58 +14,102 @@ import viser
 from twin.figure import Figure, Frames, Range
 from twin.viewer.colours import colours
 
-MEASURED, PREDICTED, ARROW, CORD = (214, 39, 40), (31, 119, 180), (20, 20, 20), 0.014
+MEASURED, PREDICTED, ARROW, PUSH, DARK = (214, 39, 40), (31, 119, 180), (20, 20, 20), (255, 54, 1), 60
+CORD, THIN, GLASS = 0.014, 0.006, (200, 205, 215)
 NOTHING = np.zeros((0, 3), np.float32)
+APART, THIN_ONE = 0.9, 0.2  # heights between two robots side by side that are at most so wide
+LONGEST = 0.3  # heights of the arrow of the largest push
+
+
+def set_up(server: viser.ViserServer, down: np.ndarray, figures: Sequence[Figure]) -> list[np.ndarray]:
+    """The camera before robots side by side, gravity pointing `down` (3,); where each stands (3,), heights."""
+    up = -down / np.linalg.norm(down) if np.any(down) else np.array([0.0, 0.0, 1.0])
+    server.scene.set_up_direction(tuple(up))
+    side = np.cross(up, [1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.cross(up, [0.0, 1.0, 0.0])
+    side /= np.linalg.norm(side)
+    n, wide = len(figures), max(2.0 * float(f.cylinders[:, 0].max(initial=0.0)) / f.height for f in figures)
+    apart = APART + max(0.0, wide - THIN_ONE)
+    away = 1.45 if n == 1 else 1.05 + 0.5 * apart
+    camera = server.initial_camera
+    camera.position = tuple(np.array([0.0, 0.0, 0.5]) + away * side + 0.35 * up)
+    camera.look_at, camera.up = (0.0, 0.0, 0.5), tuple(up)
+    right = np.cross(-side, up)
+    return [(k - 0.5 * (n - 1)) * apart * right for k in range(n)]
 
 
 class Scene:
-    """The robot, one unit high, and what was measured beside it."""
+    """A robot, one unit high, and what was measured beside it."""
 
-    def __init__(self, server: viser.ViserServer, figure: Figure, down: np.ndarray) -> None:
-        """`down` (3,) is where gravity points when the camera is set up."""
-        self._server, self._scale = server, 1.0 / figure.height
-        self._figure = figure
-        scene, up = server.scene, -down if np.any(down) else np.array([0.0, 0.0, 1.0])
-        scene.set_up_direction(tuple(up / np.linalg.norm(up)))
-        side = np.cross(up, [1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 * np.linalg.norm(up) else np.cross(up, [0.0, 1.0, 0.0])
-        camera = server.initial_camera
-        camera.position = tuple(np.array([0.0, 0.0, 0.5]) + 1.45 * side / np.linalg.norm(side) + 0.35 * up / np.linalg.norm(up))
-        camera.look_at, camera.up = (0.0, 0.0, 0.5), tuple(up / np.linalg.norm(up))
-        scene.add_frame("/base", axes_length=0.12, axes_radius=0.004)
+    def __init__(self, server: viser.ViserServer, figure: Figure, name: str, where: np.ndarray) -> None:
+        """`name`, whose first letter tells it from others, is written beside it unless it is empty; `where` (3,) it stands."""
+        self._server, self._scale, self._figure, self._where = server, 1.0 / figure.height, figure, where
+        self._root = root = f"/robot_{name[:1] or 'shown'}"
+        scene = server.scene
+        scene.add_frame(root, axes_length=0.12, axes_radius=0.004, position=tuple(where))
+        if name:
+            scene.add_label(f"{root}/name", name, position=(0.0, 0.0, 1.12), anchor="center-center", font_screen_scale=1.2)
         self._links = self._cylinders(figure) if len(figure.cylinders) else None
-        self._cords: viser.LineSegmentsHandle | None = None
-        self._predicted = scene.add_point_cloud("/predicted", NOTHING, PREDICTED, point_size=0.03, point_shape="circle")
-        self._measured = scene.add_point_cloud("/measured", NOTHING, MEASURED, point_size=0.03, point_shape="circle")
-        self._arrows = scene.add_arrows(
-            "/residual", np.zeros((0, 2, 3), np.float32), ARROW, shaft_radius=0.004, head_radius=0.01, head_length=0.02
-        )
+        self._lines = {kind: self._segments(kind) for kind in ("tendons", "cords", "coils")}
+        self._skin: viser.GlbHandle | None = None
+        self._glass: viser.MeshHandle | None = None
+        self._predicted = scene.add_point_cloud(f"{root}/predicted", NOTHING, PREDICTED, point_size=0.03, point_shape="circle")
+        self._measured = scene.add_point_cloud(f"{root}/measured", NOTHING, MEASURED, point_size=0.03, point_shape="circle")
+        none = np.zeros((0, 2, 3), np.float32)
+        self._arrows = scene.add_arrows(f"{root}/residual", none, ARROW, shaft_radius=0.004, head_radius=0.01, head_length=0.02)
+        self._push = scene.add_arrows(f"{root}/push", none, PUSH, shaft_radius=0.009, head_radius=0.022, head_length=0.045)
 
     def _cylinders(self, figure: Figure) -> viser.BatchedMeshHandle:
         unit = trimesh.creation.cylinder(radius=1.0, height=2.0, sections=24)
         n, size = len(figure.cylinders), self._scale * figure.cylinders
         turn = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)).astype(np.float32)
         return self._server.scene.add_batched_meshes_simple(
-            "/links", unit.vertices.astype(np.float32), unit.faces.astype(np.uint32), turn, np.zeros((n, 3), np.float32),
-            batched_scales=size[:, [0, 0, 1]].astype(np.float32), batched_colors=figure.colour, lod="off", flat_shading=True,
+            f"{self._root}/links", unit.vertices.astype(np.float32), unit.faces.astype(np.uint32), turn,
+            np.zeros((n, 3), np.float32), batched_scales=size[:, [0, 0, 1]].astype(np.float32), batched_colors=figure.colour,
+            lod="off", flat_shading=True,
         )  # fmt: skip
 
-    def draw(self, shown: Frames, over: Range) -> None:
-        """The first instant of `shown`, coloured `over` a range: its skin by strain if it has one, else its tendons by tension."""
-        s = self._scale
+    def _segments(self, kind: str) -> viser.LineSegmentsHandle:
+        none = np.zeros((0, 2, 3), np.float32)
+        return self._server.scene.add_line_segments(f"{self._root}/{kind}", none, none.astype(np.uint8), thickness=CORD)
+
+    def draw(self, shown: Frames, shade: str, over: Mapping[str, Range]) -> None:
+        """The first instant of `shown`. `shade` is the field of it that colours its skin or, within a skin of glass, its cords or
+        tendons; each field's colours are `over` its range, where it has one."""
         with self._server.atomic():
             if self._links is not None:
-                self._links.batched_positions = (s * shown.place[0]).astype(np.float32)
+                self._links.batched_positions = (self._scale * shown.place[0]).astype(np.float32)
                 self._links.batched_wxyzs = shown.turn[0].astype(np.float32)
-            pieces = (s * shown.piece[0]).astype(np.float32)
-            along = colours(shown.tension[0], over) if not len(self._figure.faces) else np.full((len(pieces), 3), 60, np.uint8)
-            shades = np.repeat(_linear(along)[:, None], 2, axis=1)
-            if self._cords is None:
-                self._cords = self._server.scene.add_line_segments("/tendons", pieces, shades, thickness=CORD)
-            self._cords.points, self._cords.colors = pieces, shades
+            self._line("tendons", shown.piece[0], shown.tension[0], over["tension"] if shade == "tension" else None)
+            self._line("cords", shown.cord[0], shown.resistance[0], over["resistance"] if shade == "resistance" else None)
+            self._line("coils", shown.coil[0], shown.temperature[0], over.get("temperature"))
             if len(self._figure.faces):
-                shade = _linear(colours(shown.strain[0], over))
-                skin = trimesh.Trimesh(s * shown.skin[0], self._figure.faces, vertex_colors=shade, process=False)
-                self._server.scene.add_mesh_trimesh("/skin", skin)
+                self._wrap(shown, over["strain"] if shade == "strain" else None)
+
+    def _line(self, kind: str, pieces: np.ndarray, values: np.ndarray, over: Range | None) -> None:
+        line, shade = self._lines[kind], np.full((len(pieces), 3), DARK, np.uint8) if over is None else colours(values, over)
+        line.points = (self._scale * pieces).astype(np.float32)
+        line.colors = np.repeat(_linear(shade)[:, None], 2, axis=1)
+        line.thickness = CORD if over is not None else THIN
+
+    def _wrap(self, shown: Frames, over: Range | None) -> None:
+        """The skin, by strain `over` a range, or as glass."""
+        points = self._scale * shown.skin[0]
+        if over is not None:
+            skin = trimesh.Trimesh(
+                points, self._figure.faces, vertex_colors=_linear(colours(shown.strain[0], over)), process=False
+            )  # fmt: skip
+            self._skin = self._server.scene.add_mesh_trimesh(f"{self._root}/skin", skin)
+        elif self._skin is not None:
+            self._skin.remove()
+            self._skin = None
+        if self._glass is None and over is None:
+            self._glass = self._server.scene.add_mesh_simple(
+                f"{self._root}/glass", points.astype(np.float32), self._figure.faces, color=GLASS, opacity=0.25
+            )
+        if self._glass is not None:
+            self._glass.visible = over is None
+            if over is None:
+                self._glass.vertices = points.astype(np.float32)
 
     def mark(self, predicted: np.ndarray, measured: np.ndarray, enlarged: float) -> None:
         """Markers (m, 3) m as predicted and as measured (NaN where they were not); arrows from one to the other, so many times as
@@ -75,6 +121,25 @@ class Scene:
             self._measured.points = (s * measured[there]).astype(np.float32)
             arrows = np.stack([start, start + enlarged * away], axis=1) if enlarged > 0.0 else np.zeros((0, 2, 3))
             self._arrows.points = (s * arrows).astype(np.float32)
+
+    def pushed(self, at: np.ndarray, force: np.ndarray) -> None:
+        """An arrow that ends at (3,) m, along a force (3,) over the largest there is."""
+        size, faces = float(np.linalg.norm(force)), len(self._figure.faces)
+        rim = 0.0 if faces else float(self._figure.cylinders[:, 0].max())  # of a disk, which is pushed in its middle
+        end = self._scale * (at - rim * force / max(size, 1e-12))
+        arrow = np.stack([end - LONGEST * force, end])[None] if size > 0.0 else np.zeros((0, 2, 3))
+        self._push.points = arrow.astype(np.float32)
+
+    def touched(self, shown: Frames, origin: np.ndarray, direction: np.ndarray) -> int | None:
+        """Which of the figure's holds a ray (heights) meets first, if any."""
+        points = self._scale * self._figure.grips(shown) + self._where
+        along = (points - origin) @ direction
+        off = np.linalg.norm(points - origin - along[:, None] * direction, axis=1)
+        near = np.flatnonzero(off < max(1.3 * float(off.min()), NEAR))
+        return int(near[along[near].argmin()]) if off.min() < WIDE else None
+
+
+NEAR, WIDE = 0.02, 0.12  # heights off the ray: of points to choose the first from; beyond which nothing was meant
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
