@@ -6,13 +6,13 @@ import pytest
 from rich.console import Console
 from small_diagnosis import diagnosis, recording
 
-from twin.diagnose import Fold
+from twin.diagnose import Claim, Fold
 from twin.diagnose.loops import Loop, Loops
 from twin.quantities import Fitted
 from twin.report import console, sentence
 from twin.report.loops import advice, loop_words
 from twin.report.numbers import column, number, percent, plus_minus, rough
-from twin.report.sentence import blind, verdict_words
+from twin.report.sentence import blind, claim_words, verdict_words
 
 
 def test_explained_says_what_how_much_and_where_it_was_measured():
@@ -156,3 +156,14 @@ def test_effects_hidden_for_one_reason_share_it_and_a_full_design_is_silent():
     )
     assert blind(diagnosis(identifiability=(*of, backlash, warm))) == f"{words} log of the room)."
     assert blind(diagnosis(identifiability=of[:2])) is None
+
+
+def test_of_many_numbers_of_a_kind_the_surest_are_said() -> None:
+    """A gain of 1 is none: cords 2 and 5 read wrongly, the others as they should, however exactly that is known."""
+    gains = {1: (1.0, 1e-4), 2: (0.5, 0.01), 3: (1.02, 0.02), 4: (0.99, 0.02), 5: (1.3, 0.02)}
+    claim = Claim("sensor_gain", {f"gain_{i}": Fitted(v, s, "1") for i, (v, s) in gains.items()}, 0.0, 0.9)
+    words = claim_words(claim)
+    assert "gain 2 = 0.50" in words
+    assert "gain 5 = 1.30" in words
+    assert "gain 1 =" not in words
+    assert words.endswith("…")

@@ -46,10 +46,19 @@ def explained_share(diagnosis: Diagnosis) -> float | None:
 
 
 def claim_words(claim: Claim) -> str:
-    """As in "tendon friction, mu = 0.1030 ± 0.0013": the parameters that make the effect, those of its shape left out."""
-    main = [n for n in claim.parameters if n not in named(claim.effect).shape] or list(claim.parameters)
-    shown = [f"{n.replace('_', ' ')} = {plus_minus(claim.parameters[n])}" for n in main[:MOST]]
-    return ", ".join([effect_words(claim.effect), *shown, *(["…"] if len(main) > MOST else [])])
+    """As in "tendon friction, mu = 0.1030 ± 0.0013": the parameters that make the effect, those of its shape left out. Of many of
+    one kind, one a sensor, say, those that are surest not to be off."""
+    law = named(claim.effect)
+    main = [n for n in claim.parameters if n not in law.shape] or list(claim.parameters)
+    off = {p.name: p.value for p in law.per_tendon}
+    kinds = {n.rpartition("_")[0] for n in main}
+    shown = main[:MOST]
+    if len(kinds) == 1 and kinds <= set(off):
+        level = off[kinds.pop()]
+        surest = sorted(main, key=lambda n: -abs(claim.parameters[n].value - level) / (claim.parameters[n].std or math.inf))
+        shown = [n for n in main if n in surest[:MOST]]
+    words = [f"{n.replace('_', ' ')} = {plus_minus(claim.parameters[n])}" for n in shown]
+    return ", ".join([effect_words(claim.effect), *words, *(["…"] if len(main) > MOST else [])])
 
 
 def rivals(diagnosis: Diagnosis) -> list[str]:
