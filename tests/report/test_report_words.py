@@ -167,3 +167,11 @@ def test_of_many_numbers_of_a_kind_the_surest_are_said() -> None:
     assert "gain 5 = 1.30" in words
     assert "gain 1 =" not in words
     assert words.endswith("…")
+
+
+def test_what_the_budget_left_untried_stands_beside_the_verdict():
+    d = replace(diagnosis("unexplained"), untried=("tendon_friction", "backbone_creep", "tendon_friction + base_tilt", "contact"))
+    words = sentence(d)
+    assert "no effect tried may claim" in words
+    assert "before tendon friction, backbone creep, tendon friction + base tilt and 1 more." in words
+    assert "budget" not in sentence(diagnosis("unexplained"))

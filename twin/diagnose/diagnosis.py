@@ -102,3 +102,4 @@ class Diagnosis:
     notices: tuple[str, ...]
     settings: Settings
     scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
+    untried: tuple[str, ...] = ()  # sets of effects for which the budget left no time

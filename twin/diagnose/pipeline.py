@@ -135,6 +135,7 @@ def _reported(
         notices=(*bench.notices, *found.notices, *said.notices),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.found.all),
+        untried=tuple(study.budget.untried),
     )
 
 

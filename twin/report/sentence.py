@@ -85,7 +85,16 @@ def blind(diagnosis: Diagnosis) -> str | None:
 
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, what it rests on, and the error on sealed trials."""
-    return f"{verdict_words(diagnosis)} {error_words(diagnosis)}"
+    return f"{verdict_words(diagnosis)}{untried_words(diagnosis)} {error_words(diagnosis)}"
+
+
+def untried_words(diagnosis: Diagnosis) -> str:
+    """What the budget left no time for; nothing where all was tried."""
+    names = [" ".join(effect_words(word) for word in name.split()) for name in diagnosis.untried]
+    if not names:
+        return ""
+    rest = f" and {len(names) - MOST} more" if len(names) > MOST else ""
+    return f" The budget ended the search before {', '.join(names[:MOST])}{rest}."
 
 
 def verdict_words(diagnosis: Diagnosis) -> str:
@@ -96,8 +105,8 @@ def verdict_words(diagnosis: Diagnosis) -> str:
         start = (
             "No missing effect: after calibration only noise is left."
             if d.verdict == "noise"
-            else f"Unexplained: after calibration a structured error of {d.structure_before:.2f} sigma is left that no known "
-            f"effect may claim; it moves mostly with {left}."
+            else f"Unexplained: after calibration a structured error of {d.structure_before:.2f} sigma is left that no "
+            f"{'effect tried' if d.untried else 'known effect'} may claim; it moves mostly with {left}."
         )
         alike = f" It could be {' or '.join(others[:2])}: these data cannot tell which, so neither is claimed." if others else ""
         return start + alike
