@@ -26,7 +26,7 @@ from twin.twin import Twin
 
 ALL = sorted(KINDS)
 FULL: dict[str, Any] = {"observe": "full"}
-README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+README = (Path(__file__).parents[1] / "twin" / "env" / "README.md").read_text("utf-8")
 
 
 @cache
@@ -90,7 +90,7 @@ def test_bad_options_are_refused(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ALL)
 def test_its_tables_name_every_index_of_what_it_says(name: str) -> None:
     """The docstring says how long an observation is, with n = 3 tendons, p = 2 servos a finger, s = 4 cords, m = 11 markers and
-    f = 3 fingers as large as it is, and its tables stand in the README row by row."""
+    f = 3 fingers as large as it is, and its tables stand in twin/env/README.md row by row."""
     env, full = gymnasium.make(f"twin/{name}").unwrapped, made(name)
     text = inspect.getdoc(ContinuumReach if name == "ContinuumTrack-v0" else type(env)) or ""
     said, size, actions = {

@@ -18,7 +18,7 @@ from twin.soft.statics import turned
 from twin.twin import Twin
 
 FINGER = "finger"  # whose description, points and weights serve each finger of a hand
-LEFT = {  # standard deviations that an alignment leaves, relative, of the mounting angle in rad: half its largest errors (README)
+LEFT = {  # what an alignment leaves, one standard deviation (relative; the angle in rad): half its largest errors (twin/shape)
     "sensors.resistance": 5e-4, "sensors.stretch": 0.018, "sensors.compression": 3.5e-3, "mounting.angle": 1e-3,
 }  # fmt: skip
 
