@@ -17,6 +17,12 @@ def trial(payload: float = 0.0, torque: float = 0.0, seconds: float = 1.0) -> An
     return SimpleNamespace(loads=loads, time=seconds * TIME, command=np.sin(0.5 * TIME)[:, None])
 
 
+def beside_a_still_one(made: Any) -> Any:
+    """Of two tendons, one of which stays where it is."""
+    made.command = np.column_stack([made.command, np.ones(len(made.time))])
+    return made
+
+
 def bench(*trials: Any) -> Any:
     return SimpleNamespace(inputs=trials, outputs=[SimpleNamespace(group="angle")])
 
@@ -27,6 +33,12 @@ def test_trials_share_a_level_where_their_condition_is_alike() -> None:
     assert levels(loaded, range(3)) == {}, "two levels: one left out leaves no trend"
     paced = bench(trial(), trial(seconds=0.1), trial(seconds=1.1), trial(seconds=20.0))
     assert levels(paced, range(4)) == {"rate of pull": [[3], [0, 2], [1]]}
+    one = [beside_a_still_one(trial(seconds=s)) for s in (1.0, 0.1, 1.1, 20.0)]
+    assert levels(bench(*one), range(4)) == {"rate of pull": [[3], [0, 2], [1]]}, "of the tendon that moves"
+    mounted = [trial() for _ in range(4)]
+    for each, up in zip(mounted, ([0, 0, 1], [1, 0, 0], [0, 1, 0], [0, 1e-5, 1]), strict=True):
+        each.loads.gravity = 9.81 * np.array(up)
+    assert levels(bench(*mounted), range(4)) == {"mount": [[0, 3], [1], [2]]}
     assert levels(bench(trial(), trial(), trial()), range(3)) == {}, "one condition only"
     assert levels(bench(trial(), trial(0.01), trial(0.02)), range(3)) == {}, "a level of one trial is that trial left out"
 

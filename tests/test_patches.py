@@ -16,7 +16,7 @@ from twin.diagnose.objective import objective_of
 from twin.errors import DataError
 from twin.evaluate import rms
 from twin.measurements import Clouds, Recording, Trial, write
-from twin.measurements.patches import BANDS, PATCHES, cut, scatter, side
+from twin.measurements.patches import BANDS, NEIGHBOURS, PATCHES, cut, scatter, side
 from twin.robots import load
 from twin.soft import SoftBody
 from twin.soft.skin import GRAZING, Skin, stand
@@ -47,8 +47,8 @@ def test_the_camera_is_on_the_side_of_the_points() -> None:
 
 
 def test_points_all_around_are_of_no_side() -> None:
-    assert not side([frames(half(np.random.default_rng(0), 4000, spread=np.pi))]).any()
-    assert not side([]).any()
+    np.testing.assert_array_equal(side([frames(half(np.random.default_rng(0), 4000, spread=np.pi))]), np.zeros(3))
+    np.testing.assert_array_equal(side([]), np.zeros(3))
 
 
 @pytest.mark.parametrize("noise", [2e-4, 6e-4])
@@ -59,6 +59,21 @@ def test_the_scatter_of_points_about_a_curved_skin_is_found(noise: float) -> Non
     points = half(rng, 900)
     outwards = points * [1, 1, 0] / RADIUS
     assert scatter([frames(points + noise * rng.standard_normal((900, 1)) * outwards)]) == pytest.approx(noise, rel=0.1)
+
+
+def test_the_scatter_is_that_of_the_largest_frame_of_each_trial() -> None:
+    """A small noisy frame before and after it has no say; nor has a trial whose largest frame has too few points. All along the
+    normal, as above."""
+    rng, (noisy, clean) = np.random.default_rng(1), (3e-3, 4e-4)
+
+    def about(n: int, noise: float) -> np.ndarray:
+        points = half(rng, n)
+        return points + noise * rng.standard_normal((n, 1)) * points * [1, 1, 0] / RADIUS
+
+    day = [frames(about(300, noisy), about(900, clean), about(300, noisy)), frames(about(NEIGHBOURS, noisy))]
+    assert scatter(day) == pytest.approx(clean, rel=0.1)
+    assert np.isnan(scatter(day[1:]))
+    assert np.isfinite(scatter([frames(about(NEIGHBOURS + 1, noisy))]))
 
 
 def test_patches_are_bands_in_halves() -> None:

@@ -19,7 +19,7 @@ def screened(monkeypatch: pytest.MonkeyPatch, accuracy: float, *outputs: tuple[s
     bench = SimpleNamespace(outputs=[SimpleNamespace(group=g) for g, _ in outputs], robot=SimpleNamespace(accuracy=accuracy))
     noise = SimpleNamespace(sigma=np.array([s for _, s in outputs]))
     objective = SimpleNamespace(whitener=SimpleNamespace(noise=noise))
-    study: Any = SimpleNamespace(objective=objective, bench=bench, progress=lambda words: None)
+    study: Any = SimpleNamespace(objective=objective, bench=bench, progress=lambda words: asked.setdefault("said", words))
     base: Any = SimpleNamespace(fit="fit")
 
     def null(study: Any, fit: str, patterns: str, seed: int) -> Thresholds:
@@ -39,7 +39,7 @@ def screened(monkeypatch: pytest.MonkeyPatch, accuracy: float, *outputs: tuple[s
 def test_the_accuracy_is_in_sigmas_of_the_outputs_it_speaks_of(monkeypatch: pytest.MonkeyPatch) -> None:
     found, asked = screened(monkeypatch, 3e-4, ("marker", 2e-4), ("marker", 4e-4), ("displacement", 1.0))
     assert found.bars == Thresholds(accept=20.0, material=0.2, left=0.3, line=40.0, accuracy=pytest.approx(1.0))
-    assert asked == {"seed": 7, "material": pytest.approx(1.0)}
+    assert asked == {"said": "no-effect sets of this design", "seed": 7, "material": pytest.approx(1.0)}
     assert (found.patterns, found.table) == ("patterns", ("row",))
 
 

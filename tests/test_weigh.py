@@ -112,6 +112,8 @@ def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_par
     monkeypatch.setattr(catalogue()[CREEP], "richer_needs", frozenset({"wings"}))
     assert fuller(study(), plain, (CREEP,), 12.0) is plain
     assert len(fits.asked) == 1
+    monkeypatch.setattr(catalogue()[CREEP], "richer_needs", ROBOT.build().parts)
+    assert fuller(study(), plain, (CREEP,), 12.0) is not plain, "all the parts that there are"
 
 
 def test_a_fuller_law_that_cannot_be_solved_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
