@@ -134,7 +134,7 @@ def test_a_tip_alone_has_no_place() -> None:
 
 
 def bent(bench: Bench, *turns: tuple[int, float]) -> tuple[list[int], np.ndarray, list[np.ndarray]]:
-    """All trials of a curved rod, its error (n, m), and where it should be: at the chord `k` (0 from the base) a soft spot turns all
+    """All trials of a curved rod, its error (n, m), and where it should be: at chord `k` (0 at the base) a soft spot turns all
     above it by an angle about an axis, half of that within the chord itself."""
     trials = list(range(len(bench.inputs)))
     t = np.array([[0.004 * k, -0.002 * k, 0.02] for k in range(8)])

@@ -92,7 +92,9 @@ def test_what_the_robot_imitates_is_not_paid_for_and_gains_nothing_alone() -> No
 
 def ranked(monkeypatch: pytest.MonkeyPatch, of: list[tuple[str, float, float]], top: int) -> list[tuple[str, float, float]]:
     """What `rank` keeps of candidates (effect, gain white, gain beside)."""
-    known = Dictionary(tuple(Pattern(e, Start({"start": float(i)}, ()), (), ()) for i, (e, _, _) in enumerate(of)), np.empty((N, 0)))
+    known = Dictionary(
+        tuple(Pattern(e, Start({"start": float(i)}, ()), (), ()) for i, (e, _, _) in enumerate(of)), np.empty((N, 0))
+    )
 
     def measured(X: np.ndarray, VX: np.ndarray, *_: Any) -> list[float]:
         np.testing.assert_array_equal(X, np.column_stack([J, Z]))

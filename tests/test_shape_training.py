@@ -144,8 +144,8 @@ def lively(lesson: Lesson) -> Any:
 
 
 def felt_as_learned(shapes: Path, name: str) -> tuple[Any, Any, np.ndarray, Any, np.ndarray]:
-    """A lesson, its network, samples (b,) of one chain, the features by which the network is taught them, without errors of sensors,
-    and where (b, P, 3) m the estimator of the same weights sees the points move that feels them one after the other."""
+    """A lesson, its network, samples (b,) of one chain, the features by which the network is taught them, no sensor misread, and
+    where (b, P, 3) m the estimator of the same weights sees the points move that feels them one after the other."""
     import torch
 
     robot = load("finger")
