@@ -6,7 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from twin.diagnose import beyond as stage
 from twin.diagnose.beyond import beyond, levels
 
 TIME = np.arange(20.0)
@@ -49,6 +51,23 @@ def weighed(J: np.ndarray, y: np.ndarray, effects: tuple[str, ...]) -> Any:
     model = SimpleNamespace(free=free, vector=lambda: x)
     fit = SimpleNamespace(J=-J, z=y - J @ x, model=model, at_bound=lambda: np.zeros(len(x), bool))
     return SimpleNamespace(fit=fit, effects=effects)
+
+
+@pytest.mark.parametrize(
+    ("inside", "far", "harms"), [(1.1, 1.02, True), (1.1, 1.005, False), (0.9, 1.02, False), (1.0, 1.02, False)]
+)
+def test_an_effect_harms_that_helps_inside_and_enlarges_the_error_beyond(
+    inside: float, far: float, harms: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Squared errors without it 4 `inside` and 9 / `far`, with it 4 and 9: by more than half a percent (0.01 squared) beyond."""
+    squares = {("with", None): 4.0, ("with", "groups"): 9.0, ("less", None): 4.0 * inside, ("less", "groups"): 9.0 / far}
+    monkeypatch.setattr(stage, "left_out", lambda study, fit, groups=None: SimpleNamespace(square=squares[fit, groups]))
+    monkeypatch.setattr(stage, "levels", lambda bench, trials: {"payload": "groups"})
+    final, gated = SimpleNamespace(fit="with", effects=("creep",)), {"creep": "less", "gone": "less"}
+    gated = SimpleNamespace(without={e: SimpleNamespace(fit=fit) for e, fit in gated.items()})
+    (found,) = beyond(SimpleNamespace(bench=None, trials=[]), final, gated)  # type: ignore[arg-type]
+    assert (found.inside, found.beyond, found.levels) == (2.0, 3.0, 6)
+    assert found.harmful == (("creep",) if harms else ())
 
 
 def test_an_effect_that_takes_what_grows_with_the_payload_for_a_square_is_told_to_harm_beyond() -> None:

@@ -16,6 +16,7 @@ from tools.bench.design import bench_day
 from twin.bench import Bench
 from twin.diagnose import experiment as stage
 from twin.diagnose.experiment import Experiment, menu, next_experiment
+from twin.effects import Drive
 from twin.errors import SolveError
 from twin.residual import Noise
 
@@ -90,6 +91,37 @@ def test_a_tendon_that_does_not_pull_is_paid_out_where_displacements_are_command
     np.testing.assert_allclose(held.command[1:], np.tile([-0.75, -0.75, 0.75], (len(held.time) - 1, 1)) * top)
     assert not any("circle" in words for words, _ in menu(day))
     assert any("circle" in words for words, _ in menu(planned("default")))
+
+
+def test_a_circle_pulls_each_tendon_in_its_turn() -> None:
+    """0.6 (1 + cos) / 2, a third of a turn apart: together nine tenths of the largest command at all times."""
+    day = planned("default")
+    top = max(float(i.command.max()) for i in day.inputs)
+    circle = next(t for w, t in menu(day) if "circle" in w)
+    np.testing.assert_allclose(circle.command.sum(axis=1), 0.9 * top)
+    np.testing.assert_allclose(circle.command[[0, -1]] / top, np.tile([0.6, 0.15, 0.15], (2, 1)))
+    third = np.abs(circle.time - 80.0 / 3.0).argmin()
+    assert int(np.argmax(circle.command[third])) == 1
+
+
+def test_springs_are_heated_and_given_time_to_cool() -> None:
+    day = planned("default")
+    heated = tuple(replace(i, drives=(Drive.CURRENT,) * 3) for i in day.inputs)
+    proposed = {words: trial for words, trial in menu(replace(day, inputs=heated)) if "spring 2" in words}
+    assert len(proposed) == 8
+    for words, trial in proposed.items():
+        assert re.match(r"heat spring 2 with up to [\d.]+ A\b|step spring 2 to ", words)
+        assert trial.time[-1] >= 40.0, words
+    assert {"slowly (120 s)", "fast (40 s)", "slowly (240 s)"} <= {words.split(", ")[-2] for words in proposed}
+
+
+def test_a_jaw_is_asked_for_torques_from_none_to_the_largest() -> None:
+    day = planned("default")
+    turned = [replace(i, loads=replace(i.loads, torque=np.full(1, 0.02 + 0.01 * (k % 3)))) for k, i in enumerate(day.inputs)]
+    jaw: Any = SimpleNamespace(build=lambda: SimpleNamespace(loads={"jaw_torque": "torque"}))
+    proposed = menu(replace(day, inputs=tuple(turned), robot=jaw))
+    assert sorted({float(t.loads.torque[0]) for _, t in proposed}) == pytest.approx([0.0, 0.01, 0.02, 0.04])
+    assert {words.split(", ")[-1] for words, _ in proposed} == {f"load torque {x} N m" for x in ("0", "0.01", "0.02", "0.04")}
 
 
 # ---- by hand ---------------------------------------------------------------------------------------------------------------

@@ -105,6 +105,13 @@ def test_where_a_rival_leaves_nothing_no_size_is_told_apart(left: float, monkeyp
         assert np.isfinite(v.seen)
 
 
+def test_what_a_design_lacks_is_said_of_what_it_blinds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage, "shortcomings", lambda bench: [("holds", {"time_delay"}), ("loads", {"tendon_friction", "contact"})])
+    found = by_hand(along(1, 0), along(0, 1), robot=along(1, 0))
+    assert {e: v.lacking for e, v in found.items()} == {"tendon_friction": ("loads",), "time_delay": ("holds",)}
+    assert np.isinf(found["tendon_friction"].seen)
+
+
 def test_what_moves_nothing_is_never_seen() -> None:
     """As where a pattern has no equilibrium."""
     found = by_hand(along(0, 0), along(0, 1), robot=along(1, 0))

@@ -16,7 +16,7 @@ from twin.diagnose.objective import objective_of
 from twin.errors import DataError
 from twin.evaluate import rms
 from twin.measurements import Clouds, Recording, Trial, write
-from twin.measurements.patches import BANDS, NEIGHBOURS, PATCHES, cut, scatter, side
+from twin.measurements.patches import BANDS, FEWEST, NEIGHBOURS, PATCHES, cut, scatter, side
 from twin.robots import load
 from twin.soft import SoftBody
 from twin.soft.skin import GRAZING, Skin, stand
@@ -100,11 +100,23 @@ def test_too_few_points_say_nothing() -> None:
     assert not len(cut(None, np.array([1.0, 0.0, 0.0])).time)
 
 
+@pytest.mark.parametrize("missing", [0, 1])
+def test_a_patch_of_just_enough_points_says_where_it_is(missing: int) -> None:
+    """Six bands of two halves of `FEWEST` points; one fewer in the last."""
+    z = np.repeat(np.arange(1.0, BANDS + 1), 2 * FEWEST) * LENGTH / BANDS
+    y = np.tile(np.repeat([-RADIUS, RADIUS], FEWEST), BANDS)
+    points = np.column_stack([np.zeros(len(z)), y, z])[: len(z) - missing]
+    place = cut(frames(points), np.array([1.0, 0.0, 0.0])).place[0]
+    assert np.isnan(place).tolist() == [False] * (PATCHES - 1) + [bool(missing)]
+    np.testing.assert_allclose(place[: PATCHES - 1], RADIUS / np.sqrt(2.0))
+
+
 def test_a_frame_stands_on_the_row_next_to_it_and_outside_the_trial_on_none() -> None:
     points = half(np.random.default_rng(4), 2000)
     seen = cut(frames(points, points, points), np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0.0]))  # at 0, 1 and 2 s
     at = seen.at(np.array([0.1, 0.6, 1.2, 1.6]))
     assert np.isfinite(at).all(axis=1).tolist() == [False, False, True, False]
+    assert np.isfinite(seen.at(np.arange(3.0))).all(), "its first and last rows are in the trial"
 
 
 @pytest.fixture(scope="module")
