@@ -187,6 +187,13 @@ def test_fewer_than_four_markers_have_no_bend_between_them() -> None:
         assert misbent(few, trials, off[:, columns], [r[:, columns] for r in rest]) == found
 
 
+def test_three_markers_have_a_place() -> None:
+    few = planned(bench_day("hanging", np.random.default_rng(0)), disks=(2, 5, 8))
+    swing = np.sin(np.arange(few.n_sample))[:, None]
+    assert place(few, swing * np.repeat([1.0, 2.0, 3.0], 3)) == "it grows from disk_2 to disk_8"
+    assert place(few, swing * np.repeat([3.0, 2.0, 1.0], 3)) == "it fades from disk_2 to disk_8"
+
+
 def stepped(bench: Bench, after: int, size: float, drift: float = 0.0) -> np.ndarray:
     """Noise, with a step of `size` sigma in one channel from trial `after` on, and a drift of `drift` sigma through the day."""
     clock = np.concatenate([i.clock for i in bench.inputs])

@@ -119,6 +119,15 @@ def test_what_moves_nothing_is_never_seen() -> None:
     assert found["time_delay"].share == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("unit", [1e-5, 1e5])
+def test_the_share_is_the_same_in_whatever_units(unit: float) -> None:
+    """Held by a billionth of the rival's own pattern, of several sizes."""
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    found = by_hand(unit * along(0, 1, 0), unit * along(0, c, s), robot=along(1, 0, 0))
+    assert found["tendon_friction"].share == pytest.approx(0.25, rel=1e-5)
+    assert found["tendon_friction"].smallest[1] == pytest.approx(1.0 / unit, rel=1e-5)
+
+
 def test_of_several_rivals_the_closest_is_named() -> None:
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
     found = by_hand(along(0, 1, 0), along(0, c, s), along(0, s, c), robot=along(1, 0, 0))

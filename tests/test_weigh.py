@@ -86,10 +86,12 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
 
 
 def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    member = weighed(calibrated("base_tilt", CREEP, "tendon_friction"), score=10.0)
+    member, said = weighed(calibrated("base_tilt", CREEP, "tendon_friction"), score=10.0), []
+    told = study()
+    told.progress = said.append
     for score, kept in ((22.0, False), (22.1, True)):
         fits = Fits(monkeypatch, score)
-        found = fuller(study(), member, ("base_tilt", CREEP), 12.0)
+        found = fuller(told, member, ("base_tilt", CREEP), 12.0)
         assert (found is not member) is kept
         ((model, how),) = fits.asked
         creep = next(e for e in model.twin.effects if e.id == CREEP)
@@ -99,6 +101,7 @@ def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.Monke
             assert creep[name] == table[name].value + (0.0 if name in creep.shape else table[name].step)
         own = [i for i, f in enumerate(member.fit.model.free) if f.effect is None]
         np.testing.assert_array_equal(how["J"], member.fit.J[:, own])
+    assert said == 2 * [f"fuller law of {CREEP}"]
 
 
 def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,8 +127,10 @@ def test_a_fuller_law_that_cannot_be_solved_is_passed_over(monkeypatch: pytest.M
 
 def test_less_one_effect_the_rest_is_fitted_again_from_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     base, best = weighed(calibrated()), weighed(calibrated("base_tilt", "tendon_friction"))
-    fits = Fits(monkeypatch)
-    assert refit_without(study(), base, best, "base_tilt").effects == ("tendon_friction",)
+    fits, told, said = Fits(monkeypatch), study(), []
+    told.progress = said.append
+    assert refit_without(told, base, best, "base_tilt").effects == ("tendon_friction",)
+    assert said == ["without base_tilt"]
     ((_, how),) = fits.asked
     left = [i for i, f in enumerate(best.fit.model.free) if f.effect != "base_tilt"]
     np.testing.assert_array_equal(how["J"], best.fit.J[:, left])
