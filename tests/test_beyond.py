@@ -63,9 +63,10 @@ def test_an_effect_harms_that_helps_inside_and_enlarges_the_error_beyond(
     squares = {("with", None): 4.0, ("with", "groups"): 9.0, ("less", None): 4.0 * inside, ("less", "groups"): 9.0 / far}
     monkeypatch.setattr(stage, "left_out", lambda study, fit, groups=None: SimpleNamespace(square=squares[fit, groups]))
     monkeypatch.setattr(stage, "levels", lambda bench, trials: {"payload": "groups"})
-    final, gated = SimpleNamespace(fit="with", effects=("creep",)), {"creep": "less", "gone": "less"}
-    gated = SimpleNamespace(without={e: SimpleNamespace(fit=fit) for e, fit in gated.items()})
-    (found,) = beyond(SimpleNamespace(bench=None, trials=[]), final, gated)  # type: ignore[arg-type]
+    study: Any = SimpleNamespace(bench=None, trials=[])
+    final: Any = SimpleNamespace(fit="with", effects=("creep",))
+    gated: Any = SimpleNamespace(without={e: SimpleNamespace(fit="less") for e in ("creep", "gone")})  # the second was not kept
+    (found,) = beyond(study, final, gated)
     assert (found.inside, found.beyond, found.levels) == (2.0, 3.0, 6)
     assert found.harmful == (("creep",) if harms else ())
 
