@@ -192,6 +192,9 @@ def test_three_markers_have_a_place() -> None:
     swing = np.sin(np.arange(few.n_sample))[:, None]
     assert place(few, swing * np.repeat([1.0, 2.0, 3.0], 3)) == "it grows from disk_2 to disk_8"
     assert place(few, swing * np.repeat([3.0, 2.0, 1.0], 3)) == "it fades from disk_2 to disk_8"
+    seen_along_x = replace(few, outputs=few.outputs[::3])
+    assert place(seen_along_x, swing * [1.0, 3.0, 2.0]) == "it is largest around disk_5"
+    assert misbent(seen_along_x, [], swing, []) is None, "bends need all three"
 
 
 def stepped(bench: Bench, after: int, size: float, drift: float = 0.0) -> np.ndarray:
