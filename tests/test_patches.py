@@ -51,6 +51,12 @@ def test_points_all_around_are_of_no_side() -> None:
     np.testing.assert_array_equal(side([]), np.zeros(3))
 
 
+@pytest.mark.parametrize(("spread", "one_sided"), [(2.0, True), (2.6, False)])
+def test_more_than_half_around_is_of_a_side_until_little_is_left_out(spread: float, one_sided: bool) -> None:
+    """The middle of an arc is sin(s) / s of the radius off the axis: 0.45 and 0.20, to 0.7 / sqrt(400) by 400 points."""
+    assert side([frames(half(np.random.default_rng(0), 4000, spread=spread))]).any() == one_sided
+
+
 @pytest.mark.parametrize("noise", [2e-4, 6e-4])
 def test_the_scatter_of_points_about_a_curved_skin_is_found(noise: float) -> None:
     """Along the normal, some 900 points 2 mm apart on a radius of 7: 10 % covers what a paraboloid leaves of a cylinder and the
