@@ -55,6 +55,7 @@ def test_the_menu_has_a_pull_that_parts_direction_from_time() -> None:
     pull = trial.command[:, 0]
     turns = np.flatnonzero(np.diff(np.sign(np.diff(pull))))
     assert len(turns) == 3  # top, half, top
+    assert pull[[0, -1]].tolist() == [0.0, 0.0]
     assert pull[turns[1] + 1] == pytest.approx(0.5 * pull.max(), rel=0.05)
 
 
