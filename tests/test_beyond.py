@@ -6,7 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from twin.diagnose import beyond as stage
 from twin.diagnose.beyond import beyond, levels
 
 TIME = np.arange(20.0)
@@ -15,6 +17,12 @@ TIME = np.arange(20.0)
 def trial(payload: float = 0.0, torque: float = 0.0, seconds: float = 1.0) -> Any:
     loads = SimpleNamespace(payload=payload, torque=np.full(20, torque), gravity=np.array([0.0, 0.0, 9.81]))
     return SimpleNamespace(loads=loads, time=seconds * TIME, command=np.sin(0.5 * TIME)[:, None])
+
+
+def beside_a_still_one(made: Any) -> Any:
+    """Of two tendons, one of which stays where it is."""
+    made.command = np.column_stack([made.command, np.ones(len(made.time))])
+    return made
 
 
 def bench(*trials: Any) -> Any:
@@ -27,6 +35,12 @@ def test_trials_share_a_level_where_their_condition_is_alike() -> None:
     assert levels(loaded, range(3)) == {}, "two levels: one left out leaves no trend"
     paced = bench(trial(), trial(seconds=0.1), trial(seconds=1.1), trial(seconds=20.0))
     assert levels(paced, range(4)) == {"rate of pull": [[3], [0, 2], [1]]}
+    one = [beside_a_still_one(trial(seconds=s)) for s in (1.0, 0.1, 1.1, 20.0)]
+    assert levels(bench(*one), range(4)) == {"rate of pull": [[3], [0, 2], [1]]}, "of the tendon that moves"
+    mounted = [trial() for _ in range(4)]
+    for each, up in zip(mounted, ([0, 0, 1], [1, 0, 0], [0, 1, 0], [0, 1e-5, 1]), strict=True):
+        each.loads.gravity = 9.81 * np.array(up)
+    assert levels(bench(*mounted), range(4)) == {"mount": [[0, 3], [1], [2]]}
     assert levels(bench(trial(), trial(), trial()), range(3)) == {}, "one condition only"
     assert levels(bench(trial(), trial(0.01), trial(0.02)), range(3)) == {}, "a level of one trial is that trial left out"
 
@@ -37,6 +51,24 @@ def weighed(J: np.ndarray, y: np.ndarray, effects: tuple[str, ...]) -> Any:
     model = SimpleNamespace(free=free, vector=lambda: x)
     fit = SimpleNamespace(J=-J, z=y - J @ x, model=model, at_bound=lambda: np.zeros(len(x), bool))
     return SimpleNamespace(fit=fit, effects=effects)
+
+
+@pytest.mark.parametrize(
+    ("inside", "far", "harms"), [(1.1, 1.011, True), (1.1, 1.009, False), (0.9, 1.1, False), (1.0, 1.1, False)]
+)
+def test_an_effect_harms_that_helps_inside_and_enlarges_the_error_beyond(
+    inside: float, far: float, harms: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Squared errors without it 4 `inside` and 9 / `far`, with it 4 and 9: by more than half a percent (1.01 in squares) beyond."""
+    squares = {("with", None): 4.0, ("with", "groups"): 9.0, ("less", None): 4.0 * inside, ("less", "groups"): 9.0 / far}
+    monkeypatch.setattr(stage, "left_out", lambda study, fit, groups=None: SimpleNamespace(square=squares[fit, groups]))
+    monkeypatch.setattr(stage, "levels", lambda bench, trials: {"payload": "groups"})
+    study: Any = SimpleNamespace(bench=None, trials=[])
+    final: Any = SimpleNamespace(fit="with", effects=("creep",))
+    gated: Any = SimpleNamespace(without={e: SimpleNamespace(fit="less") for e in ("creep", "gone")})  # the second was not kept
+    (found,) = beyond(study, final, gated)
+    assert (found.inside, found.beyond, found.levels) == (2.0, 3.0, 6)
+    assert found.harmful == (("creep",) if harms else ())
 
 
 def test_an_effect_that_takes_what_grows_with_the_payload_for_a_square_is_told_to_harm_beyond() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,7 +20,7 @@ from twin.calibrate import Fit
 from twin.diagnose import Settings, calibration
 from twin.diagnose.evidence import Discrepancy, Evidence, Spectrum
 from twin.diagnose.null import Thresholds
-from twin.diagnose.places import place, where
+from twin.diagnose.places import misbent, place, where
 from twin.diagnose.split import split
 from twin.diagnose.words import change, nearest, since, structure, wave
 from twin.measurements import Recording
@@ -130,6 +131,70 @@ def test_the_place_in_words(plan: Bench, size: np.ndarray, said: str) -> None:
 def test_a_tip_alone_has_no_place() -> None:
     tip = planned(bench_day("tip_only", np.random.default_rng(0)))
     assert place(tip, np.ones((tip.n_sample, 3))) == ""
+
+
+def bent(bench: Bench, *turns: tuple[int, float]) -> tuple[list[int], np.ndarray, list[np.ndarray]]:
+    """All trials of a curved rod, its error (n, m), and where it should be: at chord `k` (0 at the base) a soft spot turns all
+    above it by an angle about an axis, half of that within the chord itself."""
+    trials = list(range(len(bench.inputs)))
+    t = np.array([[0.004 * k, -0.002 * k, 0.02] for k in range(8)])
+    turned = np.zeros(8)
+    for k, angle in turns:
+        turned[k] += 0.5 * angle
+        turned[k + 1 :] += angle
+    swing = np.sin(np.arange(bench.n_sample) + 0.5)[:, None, None]
+    moved = swing * np.cumsum(np.cross(turned[:, None] * np.array([0.6, 0.8, 0.0]), t), axis=0)
+    rest = [np.tile(np.cumsum(t, axis=0).ravel(), (len(i.time), 1)) for i in bench.inputs]
+    return trials, moved.reshape(bench.n_sample, 24), rest
+
+
+@pytest.mark.parametrize("at", [1, 4, 6])
+def test_a_bend_at_one_place_is_found_there(plan: Bench, at: int) -> None:
+    """Its jumps at both ends of a chord are alike; the turns are about an axis across chords that are not quite along z."""
+    trials, off, rest = bent(plan, (at, 0.01))
+    assert misbent(plan, trials, off, rest) == at
+    assert where(plan, trials, off, rest) == f" The fitted robot bends wrongly at one place, between disk_{at} and disk_{at + 1}."
+
+
+def test_a_bend_at_the_base_is_the_clamp(plan: Bench) -> None:
+    said = where(plan, *bent(plan, (0, 0.01)))
+    assert said == " The fitted robot is off from its base on, as a whole: look at the clamp and the camera."
+
+
+def test_of_two_bends_the_larger_is_the_place_if_its_jumps_have_twice_the_square(plan: Bench) -> None:
+    assert misbent(plan, *bent(plan, (2, 0.01), (5, 0.0069))) == 2
+    assert misbent(plan, *bent(plan, (2, 0.01), (5, 0.0073))) is None
+    assert where(plan, *bent(plan, (2, 0.01), (5, 0.0073))) == ""
+
+
+def test_rows_in_which_a_marker_is_missing_have_no_say_in_the_place(plan: Bench) -> None:
+    trials, off, rest = bent(plan, (4, 0.01))
+    measured = [y.copy() for y in plan.measured]
+    measured[0][3, 7] = np.nan
+    off[3] = 1e3 * off[4][::-1]
+    assert misbent(replace(plan, measured=tuple(measured)), trials, off, rest) == 4
+    assert misbent(plan, trials, off, rest) != 4
+    some = slice(len(plan.inputs[0].time), None)
+    assert misbent(plan, trials[1:], off[some], rest[1:]) == 4
+
+
+def test_fewer_than_four_markers_have_no_bend_between_them() -> None:
+    day = bench_day("hanging", np.random.default_rng(0))
+    for disks, found in (((2, 4, 6), None), ((2, 4, 6, 8), 1)):
+        few = planned(day, disks=disks)
+        trials, off, rest = bent(few, (3, 0.01))  # between disk_3 and disk_4
+        columns = [3 * (k - 1) + a for k in disks for a in range(3)]
+        assert misbent(few, trials, off[:, columns], [r[:, columns] for r in rest]) == found
+
+
+def test_three_markers_have_a_place() -> None:
+    few = planned(bench_day("hanging", np.random.default_rng(0)), disks=(2, 5, 8))
+    swing = np.sin(np.arange(few.n_sample))[:, None]
+    assert place(few, swing * np.repeat([1.0, 2.0, 3.0], 3)) == "it grows from disk_2 to disk_8"
+    assert place(few, swing * np.repeat([3.0, 2.0, 1.0], 3)) == "it fades from disk_2 to disk_8"
+    seen_along_x = replace(few, outputs=few.outputs[::3])
+    assert place(seen_along_x, swing * [1.0, 3.0, 2.0]) == "it is largest around disk_5"
+    assert misbent(seen_along_x, [], swing, []) is None, "bends need all three"
 
 
 def stepped(bench: Bench, after: int, size: float, drift: float = 0.0) -> np.ndarray:

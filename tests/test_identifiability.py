@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,7 @@ from tools.bench.design import Day, bench_day
 from tools.bench.effects import all_effects
 from twin.bench import Bench
 from twin.calibrate import Fit, Model, Objective
+from twin.diagnose import identifiability as stage
 from twin.diagnose.identifiability import Visibility, identifiability
 from twin.diagnose.patterns import Dictionary, Pattern, dictionary
 from twin.diagnose.thresholds import CLEAR
@@ -34,11 +36,19 @@ N = 100
 def by_hand(*columns: np.ndarray, robot: np.ndarray) -> dict[str, Visibility]:
     """Friction, delay and payload with one column each, beside a robot with one free parameter of column `robot` (n,)."""
     effects = (("tendon_friction", "mu"), ("time_delay", "delay"), ("tip_payload", "mass"))
-    patterns = tuple(Pattern(e, Start({}, (p,)), (p,), (i,)) for i, ((e, p), _) in enumerate(zip(effects, columns, strict=False)))
+    patterns = (pattern(e, (p,), i) for i, ((e, p), _) in enumerate(zip(effects, columns, strict=False)))
+    return of_patterns(columns, robot, *patterns)
+
+
+def pattern(effect: str, names: tuple[str, ...], *where: int) -> Pattern:
+    return Pattern(effect, Start({}, names), names, where)
+
+
+def of_patterns(columns: Sequence[np.ndarray], robot: np.ndarray, *patterns: Pattern) -> dict[str, Visibility]:
     free: Any = (SimpleNamespace(parameter=SimpleNamespace(std=None, step=1.0)),)
     base: Any = SimpleNamespace(J=robot[:, None], model=SimpleNamespace(free=free), at_bound=lambda: np.zeros(1, bool))
     objective: Any = SimpleNamespace(bench=bench(bench_day("default", np.random.default_rng(0))), n=N)
-    table = identifiability(objective, base, Dictionary(patterns, np.stack(columns, axis=1)), MATERIAL)
+    table = identifiability(objective, base, Dictionary(tuple(patterns), np.stack(columns, axis=1)), MATERIAL)
     return {v.effect: v for v in table}
 
 
@@ -85,6 +95,66 @@ def test_two_that_are_one_are_never_told_apart() -> None:
     for v in found.values():
         assert np.isfinite(v.seen)
         assert v.apart > 1e3  # sigma: rounding may leave a share of some 1e-9
+
+
+@pytest.mark.parametrize("left", [0.0, -1e-12])
+def test_where_a_rival_leaves_nothing_no_size_is_told_apart(left: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage, "_left", lambda A, i, j: left)
+    for v in by_hand(along(0, 1), along(0, -2), robot=along(1, 0)).values():
+        assert (v.share, v.apart, v.smallest[1]) == (0.0, np.inf, np.inf)
+        assert np.isfinite(v.seen)
+
+
+def test_what_a_design_lacks_is_said_of_what_it_blinds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage, "shortcomings", lambda bench: [("holds", {"time_delay"}), ("loads", {"tendon_friction", "contact"})])
+    found = by_hand(along(1, 0), along(0, 1), robot=along(1, 0))
+    assert {e: v.lacking for e, v in found.items()} == {"tendon_friction": ("loads",), "time_delay": ("holds",)}
+    assert np.isinf(found["tendon_friction"].seen)
+
+
+def test_what_moves_nothing_is_never_seen() -> None:
+    """As where a pattern has no equilibrium."""
+    found = by_hand(along(0, 0), along(0, 1), robot=along(1, 0))
+    assert (found["tendon_friction"].seen, found["tendon_friction"].rival) == (np.inf, "")
+    assert found["time_delay"].share == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("unit", [1e-5, 1e5])
+def test_the_share_is_the_same_in_whatever_units(unit: float) -> None:
+    """Held by a billionth of the rival's own pattern, of several sizes."""
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    found = by_hand(unit * along(0, 1, 0), unit * along(0, c, s), robot=along(1, 0, 0))
+    assert found["tendon_friction"].share == pytest.approx(0.25, rel=1e-5)
+    assert found["tendon_friction"].smallest[1] == pytest.approx(1.0 / unit, rel=1e-5)
+
+
+def test_of_several_rivals_the_closest_is_named() -> None:
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    found = by_hand(along(0, 1, 0), along(0, c, s), along(0, s, c), robot=along(1, 0, 0))
+    assert {e: v.rival for e, v in found.items()} == {
+        "tendon_friction": "time_delay",
+        "time_delay": "tendon_friction",
+        "tip_payload": "time_delay",
+    }
+    assert found["tip_payload"].share == pytest.approx(0.25)
+
+
+def test_of_several_parameters_all_are_imitated_and_the_plainest_is_told() -> None:
+    """Two of a tilt, 1 and 2 sigma a unit, along axes 1 and 2; friction half on the second and half on the third; of two starts,
+    one on axis 1 and one on axes 1 and 2, the second takes all of the tilt."""
+    columns = [along(0, 1, 0, 0), along(0, 0, 2, 0), along(0, 0, 1, 1)]
+    tilt, friction = pattern("base_tilt", ("about_x", "about_y"), 0, 1), pattern("tendon_friction", ("mu",), 2)
+    found = of_patterns(columns, along(1), tilt, friction)
+    assert found["base_tilt"].share == pytest.approx(0.6)  # 1 + 4 / 2 of 1 + 4
+    assert found["tendon_friction"].share == pytest.approx(0.5)
+    name, value, _ = found["base_tilt"].smallest
+    assert (name, value) == ("about_y", pytest.approx(0.25 / np.sqrt(0.6)))
+    frictions = pattern("tendon_friction", ("mu",), 0), pattern("tendon_friction", ("mu", "presliding"), 0, 1)
+    found = of_patterns(columns, along(1), tilt, pattern("time_delay", ("delay",), 2), *frictions)
+    assert found["base_tilt"].rival == "tendon_friction"
+    assert found["base_tilt"].apart > 1e3
+    assert found["tendon_friction"].smallest[0] == "presliding"
+    assert found["time_delay"].rival in ("base_tilt", "tendon_friction")
 
 
 # ---- designs ---------------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from twin.diagnose.objective import objective_of
 from twin.errors import DataError
 from twin.evaluate import rms
 from twin.measurements import Clouds, Recording, Trial, write
-from twin.measurements.patches import BANDS, PATCHES, cut, scatter, side
+from twin.measurements.patches import BANDS, FEWEST, NEIGHBOURS, PATCHES, cut, scatter, side
 from twin.robots import load
 from twin.soft import SoftBody
 from twin.soft.skin import GRAZING, Skin, stand
@@ -47,8 +47,14 @@ def test_the_camera_is_on_the_side_of_the_points() -> None:
 
 
 def test_points_all_around_are_of_no_side() -> None:
-    assert not side([frames(half(np.random.default_rng(0), 4000, spread=np.pi))]).any()
-    assert not side([]).any()
+    np.testing.assert_array_equal(side([frames(half(np.random.default_rng(0), 4000, spread=np.pi))]), np.zeros(3))
+    np.testing.assert_array_equal(side([]), np.zeros(3))
+
+
+@pytest.mark.parametrize(("spread", "one_sided"), [(2.0, True), (2.6, False)])
+def test_more_than_half_around_is_of_a_side_until_little_is_left_out(spread: float, one_sided: bool) -> None:
+    """The middle of an arc is sin(s) / s of the radius off the axis: 0.45 and 0.20, to 0.7 / sqrt(400) by 400 points."""
+    assert side([frames(half(np.random.default_rng(0), 4000, spread=spread))]).any() == one_sided
 
 
 @pytest.mark.parametrize("noise", [2e-4, 6e-4])
@@ -59,6 +65,21 @@ def test_the_scatter_of_points_about_a_curved_skin_is_found(noise: float) -> Non
     points = half(rng, 900)
     outwards = points * [1, 1, 0] / RADIUS
     assert scatter([frames(points + noise * rng.standard_normal((900, 1)) * outwards)]) == pytest.approx(noise, rel=0.1)
+
+
+def test_the_scatter_is_that_of_the_largest_frame_of_each_trial() -> None:
+    """A small noisy frame before and after it has no say; nor has a trial whose largest frame has too few points. All along the
+    normal, as above."""
+    rng, (noisy, clean) = np.random.default_rng(1), (3e-3, 4e-4)
+
+    def about(n: int, noise: float) -> np.ndarray:
+        points = half(rng, n)
+        return points + noise * rng.standard_normal((n, 1)) * points * [1, 1, 0] / RADIUS
+
+    day = [frames(about(300, noisy), about(900, clean), about(300, noisy)), frames(about(NEIGHBOURS, noisy))]
+    assert scatter(day) == pytest.approx(clean, rel=0.1)
+    assert np.isnan(scatter(day[1:]))
+    assert np.isfinite(scatter([frames(about(NEIGHBOURS + 1, noisy))]))
 
 
 def test_patches_are_bands_in_halves() -> None:
@@ -85,11 +106,23 @@ def test_too_few_points_say_nothing() -> None:
     assert not len(cut(None, np.array([1.0, 0.0, 0.0])).time)
 
 
+@pytest.mark.parametrize("missing", [0, 1])
+def test_a_patch_of_just_enough_points_says_where_it_is(missing: int) -> None:
+    """Six bands of two halves of `FEWEST` points; one fewer in the last."""
+    z = np.repeat(np.arange(1.0, BANDS + 1), 2 * FEWEST) * LENGTH / BANDS
+    y = np.tile(np.repeat([-RADIUS, RADIUS], FEWEST), BANDS)
+    points = np.column_stack([np.zeros(len(z)), y, z])[: len(z) - missing]
+    place = cut(frames(points), np.array([1.0, 0.0, 0.0])).place[0]
+    assert np.isnan(place).tolist() == [False] * (PATCHES - 1) + [bool(missing)]
+    np.testing.assert_allclose(place[: PATCHES - 1], RADIUS / np.sqrt(2.0))
+
+
 def test_a_frame_stands_on_the_row_next_to_it_and_outside_the_trial_on_none() -> None:
     points = half(np.random.default_rng(4), 2000)
     seen = cut(frames(points, points, points), np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0.0]))  # at 0, 1 and 2 s
     at = seen.at(np.array([0.1, 0.6, 1.2, 1.6]))
     assert np.isfinite(at).all(axis=1).tolist() == [False, False, True, False]
+    assert np.isfinite(seen.at(np.arange(3.0))).all(), "its first and last rows are in the trial"
 
 
 @pytest.fixture(scope="module")

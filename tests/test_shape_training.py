@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,8 +16,8 @@ from twin.errors import DataError, UnknownNameError
 from twin.factory.draw import LENGTH
 from twin.robots import load
 from twin.shape.estimator import Z90, Felt, estimators
-from twin.shape.features import STRAIN, recalled
-from twin.shape.folding import BACK, LAG, FoldingLesson
+from twin.shape.features import STRAIN, features, recalled
+from twin.shape.folding import BACK, LAG, MOVE, FoldingLesson, with_history
 from twin.shape.learned import Learned
 from twin.shape.lesson import Lesson, disturbed
 from twin.shape.lesson import load as samples
@@ -128,6 +129,71 @@ def test_a_history_is_felt_along_the_chain(shapes: Path, monkeypatch: pytest.Mon
     furthest = np.abs(s[pick] - lesson._way(pick, np.ones(len(pick)))).max(axis=0)  # a lagging strain lies among those passed
     assert (short <= LAG * furthest + 1e-8).all()
     assert np.quantile(short / furthest, 0.9) > 0.05 * LAG  # the way of a step, not of all three, is most of it
+
+
+def lively(lesson: Lesson) -> Any:
+    """A network with weights of which every layer and input matters."""
+    import torch
+
+    torch.manual_seed(3)
+    net = lesson.network()
+    with torch.no_grad():
+        for p in net.parameters():
+            p.mul_(2.0)
+    return net
+
+
+def felt_as_learned(shapes: Path, name: str) -> tuple[Any, Any, np.ndarray, Any, np.ndarray]:
+    """A lesson, its network, samples (b,) of one chain, the features by which the network is taught them, no sensor misread, and
+    where (b, P, 3) m the estimator of the same weights sees the points move that feels them one after the other."""
+    import torch
+
+    robot = load("finger")
+    data = samples(shapes, robot)
+    law = taught(name)
+    lesson = law.lesson(data)
+    net, pick = lively(lesson), np.arange(LENGTH, LENGTH + 6)
+    strain, displacement = data.strain[pick], 1e-3 * np.random.default_rng(0).normal(size=(len(pick), data.displacement.shape[1]))
+    follows = np.arange(len(pick)) > 0
+    seen = law(Twin.of(robot), lesson.arrays(net)).moved(Felt(strain, displacement, False, follows))  # type: ignore[attr-defined]
+    past = with_history(strain, recalled(strain, follows, BACK), displacement, False)
+    x = past if name == "folding" else features(strain, displacement, False)
+    return lesson, net, pick, torch.from_numpy(x.astype(np.float32)), seen
+
+
+def true_of(data: Any, weights: np.ndarray, pick: np.ndarray) -> np.ndarray:
+    return np.einsum("pn,bnc->bpc", weights, data.nodes[pick].reshape(len(pick), -1, 3))
+
+
+def test_what_is_taught_to_fold_is_what_folds(shapes: Path) -> None:
+    """The error that training lessens is that of the estimator with the same weights. To 1e-6 m in single precision, of folds of
+    some millimetres."""
+    import torch
+
+    lesson, net, pick, x, seen = felt_as_learned(shapes, "folding")
+    data, points = lesson.data, np.arange(0, len(lesson.data.weights), 7)
+    away = seen[:, points] - true_of(data, data.weights[points], pick)
+    assert np.ptp(seen, axis=(0, 1)).min() > 1e-3, "a fold that depends on neither would hide where it is made"
+    with torch.no_grad():
+        np.testing.assert_allclose(MOVE * lesson._away(net, x, pick, points).numpy(), away, atol=1e-6)
+        every = np.arange(0, len(data.weights), 5)
+        error = np.linalg.norm(seen[:, every] - true_of(data, data.weights[every], pick), axis=2).mean(axis=1)
+        np.testing.assert_allclose(lesson.missed(net, x, pick), error, atol=1e-6)
+
+
+def test_what_is_taught_by_clouds_is_what_is_decoded(shapes: Path) -> None:
+    """The distances that training lessens are those of the estimator's own skin from the true one, and back."""
+    import torch
+
+    lesson, net, pick, x, seen = felt_as_learned(shapes, "deepsoro")
+    data, skin = lesson.data, lesson.data.skin
+    some, cloud = np.arange(0, len(lesson.prototype), 7), np.arange(0, len(skin.rest), 11)
+    decoded = (data.points.rest + seen)[:, data.points.skin][:, some]
+    there = skin.rest[cloud] + true_of(data, skin.weights[cloud], pick)
+    apart = np.linalg.norm(decoded[:, :, None] - there[:, None], axis=3)
+    with torch.no_grad():
+        found = MOVE * lesson._nearest(net, x, pick, (some, cloud)).numpy()
+    np.testing.assert_allclose(found, np.concatenate([apart.min(axis=2), apart.min(axis=1)], axis=1), atol=1e-6)
 
 
 class Overlearned(Lesson):

@@ -19,6 +19,8 @@ class Group:
 
 LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks or parameters_have"
 CONTROL = "not tracked and not less_of and not foreseen and not knows_of and not examples and not thousand and not takes_up"
+PLACES = "place_in_words or a_tip_alone or three_markers or bend or have_no_say"
+IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
 
 
 def _stage(name: str, *tests: str) -> Group:
@@ -64,6 +66,16 @@ GROUPS = {
     "evidence": _stage("evidence"),
     "information": Group(("twin/information.py",), ("tests/test_information.py",)),
     "loops": _stage("loops", "tests/test_loops.py", "-k", "not day"),
+    "identifiability": _stage("identifiability", "tests/test_identifiability.py", "-k", IDENTIFIABILITY),
+    "ranking": _stage("ranking"),
+    "screen": _stage("screen"),
+    "patterns": _stage("patterns"),
+    "places": _stage("places", "tests/test_describe.py", "-k", PLACES),
+    "beyond": _stage("beyond"),
+    "experiment": _stage("experiment"),
+    "weigh": _stage("weigh", "tests/test_weigh.py", "tests/test_choose.py"),
+    "describe": _stage("describe", "tests/test_describe_stage.py"),
+    "budget": _stage("budget", "tests/test_search.py", "-k", "time_is_up"),
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
     "patches": Group(("twin/measurements/patches.py",), ("tests/test_patches.py", "-k", "not alone")),

@@ -74,7 +74,7 @@ def _halves(points: np.ndarray, across: np.ndarray) -> np.ndarray:
 def side(clouds: Sequence[Clouds]) -> np.ndarray:
     """The horizontal direction (3,) from the base towards the camera: to where the points next to the base are. Zero where these
     are all around it, and the clouds not of one side."""
-    points = np.concatenate([c.points for c in clouds]) if clouds else np.empty((0, 3))
+    points = np.concatenate([c.points for c in clouds]) if clouds else np.zeros((0, 3))
     if not len(points):
         return np.zeros(3)
     far = np.linalg.norm(points, axis=1)

@@ -1,0 +1,149 @@
+"""Refits of a fitted model, by hand: evidence from known numbers, fits that are looked up."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from twin.calibrate import Model
+from twin.diagnose import weigh as stage
+from twin.diagnose.budget import Budget
+from twin.diagnose.thresholds import ROUGHLY
+from twin.diagnose.weigh import Weighed, extended, fuller, refit_without, weigh
+from twin.effects import Start, catalogue, named
+from twin.errors import SolveError
+from twin.robots import load
+from twin.twin import Twin
+
+N = 1000
+ROBOT = load("continuum")
+CREEP = "backbone_creep"
+RICHER = catalogue()[CREEP].richer
+PLAIN = tuple(p.name for p in catalogue()[CREEP].declared(3) if p.name not in RICHER)
+
+
+def study(budget: Budget | None = None) -> Any:
+    bench = SimpleNamespace(n_tendon=3, robot=ROBOT)
+    evidence = SimpleNamespace(log_likelihood_gain=lambda z: (100.0 - float(z @ z), "smooth"))
+    return SimpleNamespace(
+        objective=SimpleNamespace(n=N), evidence=evidence, bench=bench, progress=lambda words: None, budget=budget or Budget()
+    )
+
+
+def calibrated(*effects: str) -> Model:
+    """With these effects in force, all their plain parameters free."""
+    model = Model.base(ROBOT, Twin.of(ROBOT))
+    for e in effects:
+        free = tuple(p.name for p in named(e).declared(3) if p.name not in named(e).richer)
+        model = model.with_effect(e, {}, free, 3)
+    return model
+
+
+def weighed(model: Model, score: float = 0.0) -> Any:
+    """J names every parameter by its column."""
+    J = np.tile(np.arange(float(len(model.free))), (2, 1))
+    return Weighed(SimpleNamespace(model=model, J=J, evaluation="here"), score, None)  # type: ignore[arg-type]
+
+
+class Fits:
+    """Stands in for `fit` and `weigh`: scores by the free parameters of an effect; keeps what it was asked."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, score: float = 0.0, fails: int = 0) -> None:
+        self.asked: list[tuple[Model, dict[str, Any]]] = []
+        self.score, self.fails = score, fails
+        monkeypatch.setattr(stage, "fit", self.fit)
+        monkeypatch.setattr(stage, "weigh", lambda study, model: weighed(model, self.score))
+
+    def fit(self, objective: Any, model: Model, **how: Any) -> Model:
+        self.asked.append((model, how))
+        if len(self.asked) <= self.fails:
+            raise SolveError("lost")
+        return model
+
+
+def test_a_score_is_twice_the_log_evidence_less_priors_and_the_price_of_what_the_data_fix() -> None:
+    """|z|^2 = 14, the priors' terms 3: 100 - 14 - 3 - 2.5 log n."""
+    fitted: Any = SimpleNamespace(z=np.array([1.0, 2.0, 3.0]), cost=17.0, effective_parameters=lambda: 2.5)
+    found = weigh(study(), fitted)
+    assert found.score == pytest.approx(100.0 - 17.0 - 2.5 * np.log(N))
+    assert (found.fit, found.discrepancy) == (fitted, "smooth")
+
+
+def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits, member = Fits(monkeypatch), weighed(calibrated("base_tilt"))
+    found = extended(study(), member, "tendon_friction", Start({"mu": 0.1}, ("mu",)), beat=7.0)
+    assert found is not None
+    assert found.effects == ("base_tilt", "tendon_friction")
+    ((model, how),) = fits.asked
+    assert model.twin.effects[-1]["mu"] == 0.1
+    assert [f.label for f in model.free[len(member.fit.model.free) :]] == ["tendon_friction.mu"]
+    assert how == {"near": "here", "J": member.fit.J, "tolerance": ROUGHLY, "beat": 7.0}
+    Fits(monkeypatch, fails=1)
+    assert extended(study(), member, "tendon_friction", Start({"mu": 0.1}, ("mu",))) is None
+
+
+def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    member, said = weighed(calibrated("base_tilt", CREEP, "tendon_friction"), score=10.0), []
+    told = study()
+    told.progress = said.append
+    for score, kept in ((22.0, False), (22.1, True)):
+        fits = Fits(monkeypatch, score)
+        found = fuller(told, member, ("base_tilt", CREEP), 12.0)
+        assert (found is not member) is kept
+        ((model, how),) = fits.asked
+        creep = next(e for e in model.twin.effects if e.id == CREEP)
+        assert {f.parameter.name for f in model.free if f.effect == CREEP} == {*PLAIN, *RICHER}
+        table = {p.name: p for p in catalogue()[CREEP].declared(3)}
+        for name in RICHER:  # amplitudes one step from OFF, times, which mean nothing while these are OFF, as they stand
+            assert creep[name] == table[name].value + (0.0 if name in creep.shape else table[name].step)
+        own = [i for i, f in enumerate(member.fit.model.free) if f.effect is None]
+        np.testing.assert_array_equal(how["J"], member.fit.J[:, own])
+    assert said == 2 * [f"fuller law of {CREEP}"]
+
+
+def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits, plain = Fits(monkeypatch, 1e9), weighed(calibrated(CREEP))
+    full = fuller(study(), plain, (CREEP,), 12.0)
+    assert len(fits.asked) == 1
+    assert fuller(study(), full, (CREEP,), 12.0) is full
+    late = study(Budget(-1.0))
+    assert fuller(late, plain, (CREEP,), 12.0) is plain
+    assert late.budget.untried == [f"the fuller law of {CREEP}"]
+    monkeypatch.setattr(catalogue()[CREEP], "richer_needs", frozenset({"wings"}))
+    assert fuller(study(), plain, (CREEP,), 12.0) is plain
+    assert len(fits.asked) == 1
+    monkeypatch.setattr(catalogue()[CREEP], "richer_needs", ROBOT.build().parts)
+    assert fuller(study(), plain, (CREEP,), 12.0) is not plain, "all the parts that there are"
+
+
+def test_a_fuller_law_that_cannot_be_solved_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = weighed(calibrated(CREEP))
+    Fits(monkeypatch, 1e9, fails=1)
+    assert fuller(study(), plain, (CREEP,), 12.0) is plain
+
+
+def test_less_one_effect_the_rest_is_fitted_again_from_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, best = weighed(calibrated()), weighed(calibrated("base_tilt", "tendon_friction"))
+    fits, told, said = Fits(monkeypatch), study(), []
+    told.progress = said.append
+    assert refit_without(told, base, best, "base_tilt").effects == ("tendon_friction",)
+    assert said == ["without base_tilt"]
+    ((_, how),) = fits.asked
+    left = [i for i, f in enumerate(best.fit.model.free) if f.effect != "base_tilt"]
+    np.testing.assert_array_equal(how["J"], best.fit.J[:, left])
+
+
+def test_without_equilibrium_it_is_fitted_from_the_calibrated_robot_and_at_last_is_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, best = weighed(calibrated()), weighed(calibrated("base_tilt", "tendon_friction"))
+    name = base.fit.model.free[0].parameter.name
+    base.fit.model.twin.values[name] = best.fit.model.twin.values.get(name, base.fit.model.free[0].parameter.value) * 1.01
+    fits = Fits(monkeypatch, fails=1)
+    found = refit_without(study(), base, best, "base_tilt")
+    assert found.effects == ("tendon_friction",)
+    assert found.fit.model.twin.values == base.fit.model.twin.values
+    np.testing.assert_array_equal(fits.asked[1][1]["J"], base.fit.J)
+    Fits(monkeypatch, fails=2)
+    assert refit_without(study(), base, best, "base_tilt") is base
