@@ -6,6 +6,7 @@ finger to finger.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -116,10 +117,11 @@ class HandStatics:
         return joined(self.body, paths)
 
 
-def stand(body: HandBody, problem: Problem) -> tuple[list[Started], mujoco.MjSpec]:
-    """The fingers at rest under the first command, and a model of all of them, to which more may be added after."""
+def stand(body: HandBody, problem: Problem, longest: float = math.inf) -> tuple[list[Started], mujoco.MjSpec]:
+    """The fingers at rest under the first command, and a model of all of them, to which more may be added after, with steps of
+    `longest` (s) at most."""
     started = [Started.of(finger, body.share(k, problem)) for k, finger in enumerate(body.fingers)]
-    step = min(step_for(finger) for finger in body.fingers)
+    step = min(longest, *(step_for(finger) for finger in body.fingers))
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.gravity = problem.loads.gravity
