@@ -12,16 +12,18 @@ from twin import read
 from twin.bench import prepare
 from twin.calibrate import fit
 from twin.diagnose.diagnosis import Settings
+from twin.diagnose.experiment import _foreseen
 from twin.diagnose.objective import objective_of
 from twin.errors import DataError
 from twin.evaluate import rms
 from twin.measurements import Clouds, Recording, Trial, write
 from twin.measurements.patches import BANDS, FEWEST, NEIGHBOURS, PATCHES, cut, scatter, side
+from twin.residual import Noise
 from twin.robots import load
 from twin.soft import SoftBody
 from twin.soft.skin import GRAZING, Skin, stand
 from twin.soft.statics import turned
-from twin.twin import Twin
+from twin.twin import Twin, alone, readings
 
 DAY = Path(__file__).parent / "data/finger_shape"  # of the bench's finite elements; its truth stands beside it
 PHI = np.radians(2.675434478296949)
@@ -225,3 +227,17 @@ def test_no_file_has_patches_as_a_channel(day: Recording, tmp_path: Path) -> Non
     toml.write_text(toml.read_text().replace('"sensor_1_resistance"', '"skin_1"').replace('"ohm"', '"mm"', 1))
     with pytest.raises(DataError, match="skin_1 is made from point clouds"):
         read(tmp_path / "set")
+
+
+def test_an_experiment_to_come_shows_the_tip_in_place_of_patches(day: Recording) -> None:
+    bench = prepare(day, load("finger"))
+    n = len(bench.outputs)
+    noise = Noise(np.linspace(1e-4, 2e-4, n), np.zeros(4), np.linspace(0.0, 0.5, n), "made")
+    ahead, then = _foreseen(bench, noise)
+    assert [o.channel.name for o in ahead.outputs] == [f"sensor_{i}_resistance" for i in (1, 2, 3, 4)] + ["tip_x", "tip_y", "tip_z"]
+    np.testing.assert_array_equal(then.sigma, [*noise.sigma[:4], *3 * [noise.sigma[-1]]])  # that of the worst patch
+    np.testing.assert_array_equal(then.rho, [*noise.rho[:4], 0.0, 0.0, 0.0])
+    short = replace(ahead.inputs[0], seen=None)
+    trace = alone(Twin.of("finger"), short)
+    np.testing.assert_array_equal(readings(ahead, trace.true)[:, 4:], trace.true.markers[:, -1])
+    assert _foreseen(ahead, then) == (ahead, then)
