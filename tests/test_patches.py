@@ -43,13 +43,14 @@ def frames(*points: np.ndarray) -> Clouds:
 
 @pytest.mark.parametrize("share", [0.5, 0.9])
 def test_the_camera_is_half_way_between_the_edges_of_what_it_sees(share: float) -> None:
-    """However unevenly the points lie: `share` of them on one half. The one in a hundred that is left out at either end takes 1.8
-    degrees of each half where both are alike; of nine to one a tenth of the thin half, 9 degrees, half of which moves the middle."""
+    """However unevenly the points lie: `share` of them on one half. The one in a hundred left out at either end takes 1.8 degrees
+    of each half where both are alike; of nine to one a tenth of the thin half's 80, 9 degrees, half of which moves the middle, and
+    those ends scatter by some 3. The mean would be 39 degrees off."""
     rng = np.random.default_rng(0)
     left = half(rng, round(4000 * share), AZIMUTH + 0.25 * np.pi, np.pi / 4)
     points = np.concatenate([left, half(rng, round(4000 * (1.0 - share)), AZIMUTH - 0.25 * np.pi, np.pi / 4)])
     found = side([frames(points)])
-    assert np.arctan2(found[1], found[0]) == pytest.approx(AZIMUTH, abs=np.radians(6.0 if share > 0.5 else 1.5))
+    assert np.arctan2(found[1], found[0]) == pytest.approx(AZIMUTH, abs=np.radians(9.0 if share > 0.5 else 1.5))
     assert np.linalg.norm(found) == pytest.approx(1.0)
 
 
