@@ -71,6 +71,7 @@ SI = {
     "sensor": "ohm",
     "angle": "rad",
     "torque": "N*m",
+    "skin": "m",
 }
 
 
@@ -83,4 +84,6 @@ def test_every_unit_shown_is_as_large_as_its_definition(group: str) -> None:
 
 def test_markers_stand_for_the_twin_wherever_there_are_any() -> None:
     assert headline(["tension", "marker"]) == "marker"
+    assert headline(["sensor", "skin"]) == "skin"
+    assert headline(["skin", "marker"]) == "marker"
     assert headline(["angle", "torque"]) == "angle"
