@@ -71,7 +71,7 @@ class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
 
     Reward: -|angle - wanted| (rad, the short way round), less the block's way from where it began (0.05 m). `info`: angle, wanted,
     error (rad), success (within `success`), touching (points of the hand in contact). An episode is truncated after 60 steps, three
-    seconds at some 0.6 times real time; and, with a reward of -10 and the cause in `info["lost"]`, where a state is not finite or
+    seconds at some 0.4 times real time; and, with a reward of -10 and the cause in `info["lost"]`, where a state is not finite or
     the block out of the fingers' reach.
     """
 
