@@ -83,9 +83,7 @@ def test_a_sweep_ends_before_the_camera_flickers() -> None:
         assert three_cable._steady(other) == row
 
 
-@pytest.mark.xfail(
-    strict=True, reason="missed since b5f9629 at the latest: the dead band beside the drives' law is no longer claimed"
-)
+@pytest.mark.xfail(strict=False, reason="missed: the dead band is claimed with some seeds only, since b5f9629 not with this one")
 def test_the_three_cable_robots_drives_and_dead_band_are_named_and_the_block_they_were_not_found_in_is_predicted(raw: Path) -> None:
     """The bar of the project: at most 70 % of the calibrated error on sweeps that the diagnosis has not been given."""
     recording, _ = three_cable.read(raw / "three-cable")
