@@ -15,11 +15,11 @@ from PIL import Image
 
 from tests.viewer_page import rubbing, sample
 from twin.body import Problem
-from twin.cli import View
 from twin.effects import Drive, Loads, Push, Route
 from twin.errors import DataError
 from twin.evaluate import evaluate
 from twin.figure import Range
+from twin.show_commands import View
 from twin.twin import Twin, simulate
 from twin.viewer import App
 from twin.viewer import app as app_module

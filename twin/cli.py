@@ -10,7 +10,7 @@ import os
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import tyro
 from rich.table import Table
@@ -18,17 +18,15 @@ from tyro.conf import Positional, arg
 
 from twin.errors import DataError, TwinError
 from twin.finger_commands import Align, Generate, Shape, Train
+from twin.show_commands import Rollout, View, loaded
 from twin.task_commands import Demonstrate, Imitate, Tasks
 from twin.terminal import command_line, cores, err, out, plain, working
 
 if TYPE_CHECKING:
     from twin.calibrate import Fit
-    from twin.measurements import Recording
     from twin.robots import Robot
-    from twin.twin import Twin
 
 FAR = 2.0  # prior standard deviations: one in twenty fitted parameters of a robot as described lies further away
-SAMPLE = "*/samples/friday"
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class Diagnose:
         from twin import report
         from twin.diagnose import Settings, diagnose
 
-        recording, twin = _load(self.set, self.twin)
+        recording, twin = loaded(self.set, self.twin)
         if self.out.exists() and not self.out.is_dir():
             raise DataError(f"{self.out} is a file; give a folder for the report with --out")
         settings = Settings(self.seed, self.jobs, _seconds(self.budget))
@@ -114,104 +112,6 @@ class Simulate:
 
 
 @dataclass(frozen=True)
-class Rollout:
-    """Roll a twin out under given or drawn controls: MuJoCo steps, or static equilibria for a robot without dynamics.
-
-    Writes a measurement set, which can be diagnosed again. The same seed gives the same set, whatever the number of workers.
-    """
-
-    twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, a robot's name or the path to its folder")]]
-    out: Annotated[Path, arg(help="new folder for the rolled-out set")]
-    controls: Annotated[
-        Path | None, arg(help="what drives: the folder of a measurement set, or a CSV in SI (time, tendon_1_tension, ...)")
-    ] = None
-    random: Annotated[int | None, arg(help="instead: how many rollouts of drawn controls")] = None
-    seed: Annotated[int, arg(help="draws the controls and the noise")] = 0
-    seconds: Annotated[float, arg(help="length of a drawn rollout")] = 10.0
-    rate: Annotated[float, arg(help="samples a second of a drawn rollout")] = 50.0
-    drive: Annotated[Literal["tension", "displacement"], arg(help="what drawn controls say of each tendon")] = "tension"
-    pull: Annotated[float | None, arg(help="the most drawn, N or m; default: what bends the robot by some one radian")] = None
-    noise: Annotated[float, arg(help="one standard deviation of noise on the markers, m")] = 0.0
-    dynamic: Annotated[bool | None, arg(help="MuJoCo steps or static equilibria; default: steps where the robot has them")] = None
-    jobs: Annotated[int, arg(help="worker threads")] = cores()
-
-    def run(self) -> None:
-        from twin.measurements import write
-        from twin.rollout import rollout
-        from twin.storage import read_twin, robot_reference
-
-        twin = read_twin(self.twin)
-        controls = self._controls(twin)
-        with working(f"rolling out {controls.title}") as progress:
-            noisy = {"noise": self.noise, "seed": self.seed}
-            made = rollout(twin, controls, dynamic=self.dynamic, jobs=self.jobs, progress=progress, **noisy)
-            write(replace(made.recording, robot=robot_reference(twin.robot, self.out)), self.out)
-        for one in made.ended:
-            out.print(f"ended early: {one.why}", highlight=False, markup=False)
-        out.print(f"{len(made.recording.trials)} rollouts ({made.recording.source}): {self.out}", highlight=False, markup=False)
-
-    def _controls(self, twin: Twin) -> Recording:
-        from twin.effects import Drive
-        from twin.measurements import read
-        from twin.rollout import Drawing, drawn, from_set, from_table
-
-        if (self.controls is None) == (self.random is None):
-            raise DataError("say what drives the rollouts: either --controls FILE or --random N")
-        if self.controls is None:
-            return drawn(twin, self.random or 0, self.seed, Drawing(self.seconds, self.rate, Drive(self.drive), self.pull))
-        if self.controls.is_dir():
-            return from_set(twin, read(self.controls, least_trials=1))
-        return from_table(twin, self.controls)
-
-
-@dataclass(frozen=True)
-class View:
-    """Look at a robot in a browser: under sliders, or as it moved in a measurement set, beside what was measured."""
-
-    what: Positional[
-        Annotated[
-            tuple[str, ...],
-            arg(help="a robot, twin.toml or report's folder, or two side by side; a measurement set; default: the bundled sample"),
-        ]
-    ] = ()
-    port: Annotated[int, arg(help="where to serve on 127.0.0.1; the next one that is free if it is taken")] = 8080
-    film: Annotated[Path | None, arg(help="write a GIF of the set's replay here, drawn by Chromium unseen, and end")] = None
-    trial: Annotated[str | None, arg(help="which trial the film is of; default: the first")] = None
-    speed: Annotated[float, arg(help="trial seconds a second, of the film")] = 1.0
-
-    def run(self) -> None:
-        from twin.viewer import serve, take_film
-
-        twins, recording = self._shown()
-        if self.film is None:
-            with working(f"drawing {twins[0][1].robot.name}"):
-                pass
-            serve(twins, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
-            return
-        if recording is None or not self.speed > 0.0:
-            raise DataError("a film is of a replay, at a speed above 0: give a measurement set as well")
-        if not self.film.absolute().parent.is_dir():
-            raise DataError(f"{self.film.absolute().parent} is no folder; make it, or give another file with --film")
-        with working("taking a film") as progress:
-            take_film(twins, recording, self.trial, self.speed, self.film, progress)
-        out.print(f"wrote {self.film}", highlight=False, markup=False)
-
-    def _shown(self) -> tuple[list[tuple[str, Twin]], Recording | None]:
-        """The twins by name, and the set to replay with them."""
-        from twin.storage import read_twin
-
-        sets = [w for w in self.what if (Path(w) / "measurements.toml").is_file()]
-        named = [w for w in self.what if w not in sets]
-        if len(sets) > 1 or len(named) > 2:
-            raise DataError(f"{len(named)} twins and {len(sets)} sets were given; at most two twins and one set are shown")
-        if not sets and named:
-            return [(Path(w).name, read_twin(w)) for w in named], None
-        recording, first = _load(Path(sets[0]) if sets else None, named[0] if named else None)
-        names = [Path(w).name for w in named] or [first.robot.name]
-        return list(zip(names, [first, *(read_twin(w) for w in named[1:])], strict=True)), recording
-
-
-@dataclass(frozen=True)
 class Calibrate:
     """Fit the robot's own uncertain parameters to a set, without seeking effects. Writes a twin.toml."""
 
@@ -234,7 +134,7 @@ class Calibrate:
             raise DataError(f"{self.out} is there already; give another file with --out, or write over it with --force")
         if not self.out.absolute().parent.is_dir():
             raise DataError(f"{self.out.absolute().parent} is no folder; make it, or give another file with --out")
-        recording, twin = _load(self.set, self.twin)
+        recording, twin = loaded(self.set, self.twin)
         settings = Settings(seed=self.seed, jobs=self.jobs)
         with working(f"calibrating on {recording.title}"):
             fitted, sealed, notices = calibration(recording, twin, settings)
@@ -332,21 +232,6 @@ def _seconds(budget: str | None) -> float | None:
     if not found > 0.0:
         raise DataError(f"--budget {budget}: no time to try anything in; give more than zero, such as 60s")
     return found
-
-
-def _load(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
-    """The recording (the bundled sample if no folder is given) and the twin to hold against it."""
-    from twin.measurements import read
-    from twin.robots import load
-    from twin.robots.robot import models_folder
-    from twin.storage import read_twin
-    from twin.twin import Twin
-
-    if folder is None:
-        folder = next(models_folder().glob(SAMPLE))
-        out.print("no measurement set given: diagnosing the bundled sample (a simulated bench day, see its `source`)")
-    recording = read(folder)
-    return recording, read_twin(twin) if twin else Twin.of(load(recording.robot, recording.folder))
 
 
 def _fitted_table(fitted: Fit) -> Table:

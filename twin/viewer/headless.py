@@ -64,4 +64,6 @@ def _taken(app: App, out: Path, progress: Callable[[str], None]) -> None:
         progress(app.words.content)
     if not made:
         raise DataError(app.words.content.strip("*"))
-    out.write_bytes(made[0])
+    part = out.with_name(out.name + ".part")
+    part.write_bytes(made[0])
+    part.replace(out)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
 from twin.bench import ROOM, Inputs
 from twin.effects import Drive, Loads
+from twin.equilibrium import Equilibrium
 from twin.equilibrium.figure import ChainFigure
 from twin.figure import Frames
 from twin.kinematics import HeatedRobot
@@ -53,7 +52,8 @@ class Heated:
 
     def __init__(self, twin: Twin) -> None:
         """Raises DataError for a robot without springs."""
-        self._twin, self._figure = twin, cast(ChainFigure, twin.figure())
+        body = twin.robot.chain(twin.body())
+        self._twin, self._figure = twin, ChainFigure(body, Equilibrium(body))
         self._robot: HeatedRobot | None = None
         self._loads: Loads | None = None
         self._current = np.zeros(twin.robot.n_tendon)
