@@ -16,7 +16,7 @@ from tools.comparisons import cable_tool as comparison
 from tools.comparisons import three_cable as sweeps
 from tools.importers import cable_tool, tentacle, three_cable
 from twin.bench import prepare
-from twin.diagnose import diagnose
+from twin.diagnose import Diagnosis, diagnose
 from twin.learn import Remainder
 from twin.measurements import Trial, read, write
 from twin.robots import load
@@ -25,7 +25,7 @@ from twin.twin import Twin
 RAW = Path(os.environ.get("TWIN_MEASURED", Path(__file__).resolve().parents[1] / "measured"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def raw() -> Path:
     if not RAW.is_dir():
         warnings.warn(
@@ -83,20 +83,31 @@ def test_a_sweep_ends_before_the_camera_flickers() -> None:
         assert three_cable._steady(other) == row
 
 
-@pytest.mark.xfail(strict=False, reason="missed: the dead band is claimed with some seeds only, since b5f9629 not with this one")
-def test_the_three_cable_robots_drives_and_dead_band_are_named_and_the_block_they_were_not_found_in_is_predicted(raw: Path) -> None:
+@pytest.fixture(scope="module")
+def half_a_block(raw: Path) -> Diagnosis:
+    """The three-cable robot diagnosed on half of its first block."""
+    recording, _ = three_cable.read(raw / "three-cable")
+    fitted, _, _ = sweeps.halves(recording, 1)
+    return diagnose(recording.select(fitted), Twin.of(load("three_cable")), sweeps.SETTINGS)
+
+
+def test_the_three_cable_robots_drives_are_named_and_the_block_they_were_not_found_in_is_predicted(
+    raw: Path, half_a_block: Diagnosis
+) -> None:
     """The bar of the project: at most 70 % of the calibrated error on sweeps that the diagnosis has not been given."""
     recording, _ = three_cable.read(raw / "three-cable")
-    bench = prepare(recording, load("three_cable"))
-    fitted, beside, other = sweeps.halves(recording, 1)
-    found = diagnose(recording.select(fitted), Twin.of(load("three_cable")), sweeps.SETTINGS)
+    bench, found = prepare(recording, load("three_cable")), half_a_block
     assert found.verdict == "partly_explained"
-    assert [c.effect for c in found.claims] == ["transmission_error", "tendon_backlash"]
-    gap = found.claims[1].parameters["gap"]
-    # m of cable: half the gap is what the raw sweeps wait for, 0.08 to 0.1 mm; a factor of two, for the drives' law shares in it
-    assert 0.05e-3 < 0.5 * (gap.value or 0.0) < 0.2e-3
-    for rows in (beside, other):
+    assert found.claims[0].effect == "transmission_error"
+    for rows in sweeps.halves(recording, 1)[1:]:
         assert sweeps.tip_error(found.twin, bench, rows) < 0.7 * sweeps.tip_error(found.calibrated, bench, rows)
+
+
+@pytest.mark.xfail(strict=False, reason="missed: the dead band is claimed with some seeds only, since b5f9629 not with this one")
+def test_the_three_cable_robots_dead_band_is_named(half_a_block: Diagnosis) -> None:
+    claims = {c.effect: c.parameters for c in half_a_block.claims}
+    # m of cable: half the gap is what the raw sweeps wait for, 0.08 to 0.1 mm; a factor of two, for the drives' law shares in it
+    assert 0.05e-3 < 0.5 * (claims["tendon_backlash"]["gap"].value or 0.0) < 0.2e-3
 
 
 def test_runs_of_the_cable_tool_have_the_measured_loads_and_loops(raw: Path) -> None:
