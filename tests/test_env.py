@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from twin.effects import named
+from twin.effects import Drive, named
 from twin.env import KINDS
 from twin.env.continuum import ContinuumReach, ContinuumTrack
 from twin.env.domain import Spread, draw, read_spread
@@ -44,9 +44,12 @@ def diagnosed(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", sorted(KINDS))
-def test_gymnasiums_checker_finds_nothing(name: str) -> None:
-    env = gymnasium.make(f"twin/{name}").unwrapped
+DRIVEN = [("ContinuumReach-v0", {"drive": "displacement"}), ("ContinuumTrack-v0", {"drive": "current"})]
+
+
+@pytest.mark.parametrize(("name", "options"), [*((name, {}) for name in sorted(KINDS)), *DRIVEN])
+def test_gymnasiums_checker_finds_nothing(name: str, options: dict[str, str]) -> None:
+    env = gymnasium.make(f"twin/{name}", **options).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # Its advice on observations without bounds does not fit a state that has none.
@@ -96,6 +99,53 @@ def test_the_environment_moves_as_the_twin_predicts() -> None:
     assert np.ptp(seen[:, 0]) > 0.02
 
 
+@pytest.mark.parametrize("dynamic", [True, False])
+@pytest.mark.parametrize(("drive", "interval"), [(Drive.DISPLACEMENT, 0.05), (Drive.CURRENT, 1.0)])
+def test_lengths_and_currents_move_it_as_the_twin_predicts(drive: Drive, interval: float, dynamic: bool) -> None:
+    """Friction and a lag in force, step by step against the whole trial; a current holds from when it is commanded."""
+    effects = tuple(named(n)(v) for n, v in (("tendon_friction", {"mu": 0.25}), ("actuator_lag", {"time": 0.6 * interval})))
+    twin = replace(Twin.of("continuum"), effects=effects)
+    by_length = drive is Drive.DISPLACEMENT
+    plant = Plant(twin, interval, dynamic=dynamic, drive=drive)
+    told = np.minimum(np.arange(1, 31) / (20 if by_length else 4), 1.0)[:, None]
+    told = told * (8e-3 * np.array([1.0, -0.5, -0.5]) if by_length else 1.15 * np.array([1.0, 0.7, 0.0]))
+    seen = np.array([plant.sensed().markers[-1], *(plant.step(c).markers[-1] for c in told)])
+    command = np.vstack([0.0 * told[:1], told] if by_length else [told, told[-1:]])
+    names = [f"tendon_{i}_displacement" if by_length else f"sma_{i}_current" for i in (1, 2, 3)]
+    channels = [Channel(n, "input", "m" if by_length else "A") for n in names] + [Channel(f"tip_{a}", "output", "m") for a in "xyz"]
+    values = {c.name: command[:, k] if k < 3 else np.zeros(31) for k, c in enumerate(channels)}
+    whole = Recording("continuum", "", "", None, tuple(channels), (Trial("a", np.arange(31) * interval, values),))
+    predicted = twin.predict(whole, dynamic=dynamic).trials[0]
+    # As above where MuJoCo steps; at rest the same solve, sample by sample.
+    assert np.abs(seen - np.column_stack([predicted.values[f"tip_{a}"] for a in "xyz"])).max() < (1e-6 if dynamic else 1e-9)
+    assert np.ptp(seen[:, 0]) > 0.005
+
+
+def test_springs_reach_the_goals_that_are_drawn_for_them() -> None:
+    """The furthest towards tendon 1, under the most current through its spring; one beyond it is out of reach."""
+    env = ContinuumReach("continuum", drive="current", dynamic=False)
+    env.reset(seed=1)
+    env._path = env._tips(np.array([env._reach]), np.zeros(1))
+    for _ in range(200):  # 100 s; all others stay cold
+        info = env.step(np.array([1.0, 0.0, 0.0]))[-1]
+    # Within reach, and not by much: of a goal's pull and a spring's the last has two cold ones beside it, which bend it on.
+    assert 1.0 < info["tip"][0] / env.goal[0] < 1.1
+    assert env.command == pytest.approx([env.full, 0.0, 0.0])
+    beyond = env._tips(np.array([1.3 * env._reach]), np.zeros(1))[0]
+    assert np.linalg.norm(info["tip"] - beyond) > 5e-3
+
+
+def test_a_bend_by_displacements_goes_no_further_than_the_most_and_tightens_nothing() -> None:
+    env = ContinuumReach("continuum", drive="displacement", dynamic=False, observe="sensors")
+    env.reset(seed=1)
+    for _ in range(60):
+        seen, *_ = env.step(np.ones(2))
+    assert np.linalg.norm(env.command) == pytest.approx(env.options.most * env.pull.displacement)
+    slack = seen[:3] < 1e-3  # full pulls; of three tendons those on the far side are let go
+    assert slack.any()
+    assert seen[:3].max() < 2.0
+
+
 def test_a_reachable_goal_is_reached_by_its_own_tensions() -> None:
     env = ContinuumReach("continuum")
     env.reset(seed=1)
@@ -103,7 +153,7 @@ def test_a_reachable_goal_is_reached_by_its_own_tensions() -> None:
     env._path = goals
     wanted = 0.8 * env.pull.tension
     for _ in range(100):
-        rate = np.clip((np.array([wanted, 0, 0]) - env.command) / (env.pull.tension * env.options.interval), -1, 1)
+        rate = np.clip((np.array([wanted, 0, 0]) - env.command) / (env.pull.tension * env.interval), -1, 1)
         _, reward, terminated, truncated, info = env.step(rate)
     assert not terminated
     assert not truncated
@@ -118,6 +168,8 @@ def test_bad_options_are_told_with_the_known_ones() -> None:
     for name in ("two_link", "finger"):
         with pytest.raises(DataError, match="no backbone"):
             gymnasium.make("twin/ContinuumReach-v0", twin=name)
+    with pytest.raises(UnknownNameError, match=r"drive.*voltage.*current, displacement, tension"):
+        gymnasium.make("twin/ContinuumReach-v0", drive="voltage")
     env = ContinuumReach("continuum", ranges={"tendon_frction.mu": (0.0, 0.3)})
     with pytest.raises(UnknownNameError, match=r"tendon_friction\.mu"):
         env.reset(seed=0)

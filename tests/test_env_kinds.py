@@ -89,14 +89,14 @@ def test_bad_options_are_refused(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_its_tables_name_every_index_of_what_it_says(name: str) -> None:
-    """The docstring says how long an observation is, with n = 3 tendons, p = 2 servos a finger, s = 4 cords, m = 11 markers and
-    f = 3 fingers as large as it is, and its tables stand in twin/env/README.md row by row."""
+    """The docstring says how long an observation is, with n = 3 tendons, k = 3 actions, p = 2 servos a finger, s = 4 cords,
+    m = 11 markers and f = 3 fingers as large as it is, and its tables stand in twin/env/README.md row by row."""
     env, full = gymnasium.make(f"twin/{name}").unwrapped, made(name)
     text = inspect.getdoc(ContinuumReach if name == "ContinuumTrack-v0" else type(env)) or ""
     said, size, actions = {
         "FingerShape-v0": ("(s + 2p + 3m,)", 4 + 2 * 2 + 3 * 11, 2),
         "HandReorient-v0": ("(f s + f p + 4,)", 3 * 4 + 3 * 2 + 4, 6),
-    }.get(name, ("(3n + 6,)", 3 * 3 + 6, 3))
+    }.get(name, ("(2n + k + 6,)", 2 * 3 + 3 + 6, 3))
     assert f"Observation, Box(-inf, inf, {said})" in text
     assert env.observation_space.shape == (size,) == env.reset(seed=0)[0].shape
     assert env.action_space.shape == (actions,)

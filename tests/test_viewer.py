@@ -19,6 +19,7 @@ from twin.effects import Drive, Loads, Push, Route
 from twin.errors import DataError
 from twin.evaluate import evaluate
 from twin.figure import Range
+from twin.kinematics import warmest_current
 from twin.show_commands import View
 from twin.twin import Twin, simulate
 from twin.viewer import App
@@ -26,7 +27,7 @@ from twin.viewer import app as app_module
 from twin.viewer import replay as replay_module
 from twin.viewer.colours import bar, colours
 from twin.viewer.film import Film
-from twin.viewer.live import Heated, Live, most_current
+from twin.viewer.live import Heated, Live
 from twin.viewer.replay import KEPT, Replay
 
 G = np.array([0.0, 0.0, 9.81])
@@ -197,7 +198,7 @@ def test_springs_are_drawn_as_long_as_they_are_and_stay_warm_under_another_load(
     def lengths(shown: Any) -> np.ndarray:
         return np.ptp(shown.coil[0, ..., 2].reshape(3, -1), axis=1)
 
-    pulled = live.rest(np.array([most_current(Twin.of("continuum"))[0], 0.0, 0.0]), Loads(G))
+    pulled = live.rest(np.array([warmest_current(Twin.of("continuum"))[0], 0.0, 0.0]), Loads(G))
     assert not live.changing
     shortened = lengths(rest) - lengths(pulled)
     # The tendon on the inside goes in by r theta, those at 120 degrees out by half of it.

@@ -64,7 +64,7 @@ class BenchReach(ContinuumReach):
         self._robot, self._described = robot, full_pull(Twin.of("continuum"))
 
     def _drawn(self) -> Plant:
-        return cast(Plant, BenchPlant(self._robot, self.options.interval))
+        return cast(Plant, BenchPlant(self._robot, self.interval))
 
     def _tips(self, bend: np.ndarray, angle: np.ndarray) -> np.ndarray:
         F = self._described

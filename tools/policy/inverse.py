@@ -36,7 +36,7 @@ class InverseKinematics:
         if "tip" in seen:
             self._shift += 0.5 * (robot.shape().tip - seen["tip"] * env.length - self._shift)
         wanted = inverse(robot, goal + self._shift, limit=o.most * env.pull.tension).tension
-        most = env.pull.tension * o.rate * o.interval
+        most = env.pull.tension * o.rate * env.interval
         step = np.clip((wanted - command) / most, -1.0, 1.0)
         robot.pull(command + step * most)
         return step

@@ -28,7 +28,7 @@ def chosen(kind: type[Chosen], given: Mapping[str, Any], render_mode: str | None
         raise UnknownNameError("observe", str(observe), OBSERVED)
     for name in ("interval", "rate", "most"):
         value = getattr(made, name, 1.0)
-        if not (np.isfinite(value) and value > 0.0):
+        if value is not None and not (np.isfinite(value) and value > 0.0):
             raise DataError(f"option {name} = {value!r}; a number above zero is needed")
     return made
 

@@ -46,7 +46,7 @@ class Physics(control.Physics):
 
     def __init__(self, env: ContinuumReach, seed: int | None) -> None:
         self.env, self._seed = env, seed
-        self._control, self._taken, self.seen = np.zeros(env.n), 0, np.zeros(0, np.float32)
+        self._control, self._taken, self.seen = np.zeros(env.action_space.shape or (0,)), 0, np.zeros(0, np.float32)
         self.reward, self.lost = 0.0, False
 
     def reset(self) -> None:
@@ -69,7 +69,7 @@ class Physics(control.Physics):
         return self._taken * self.timestep()
 
     def timestep(self) -> float:
-        return self.env.options.interval
+        return self.env.interval
 
 
 class Task(control.Task):
@@ -82,7 +82,7 @@ class Task(control.Task):
         physics.set_control(action)
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
-        return specs.BoundedArray((physics.env.n,), np.float32, -1.0, 1.0, "rate")
+        return specs.BoundedArray(physics.env.action_space.shape, np.float32, -1.0, 1.0, "rate")
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:
         sizes = physics.env.parts

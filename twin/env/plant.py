@@ -1,4 +1,4 @@
-"""A backbone stepped in time under commanded tensions, for whoever decides the next command when the last answer is seen.
+"""A backbone stepped in time under commands, for whoever decides the next command when the last answer is seen.
 
 By MuJoCo's steps, or from one static equilibrium to the next: a robot moved slowly is then known ten times sooner.
 """
@@ -40,45 +40,52 @@ class Resting:
         self._statics, self._problem = dynamics.statics, problem
         self._time, self._command = np.zeros(0), np.zeros((0, problem.command.shape[1]))
 
-    def run(self, time: np.ndarray, command: np.ndarray) -> tuple[Seen, int, str]:
-        """As `Moving.run`."""
-        more = slice(min(1, len(self._time)), None)  # where it stands is known
-        self._time, self._command = np.append(self._time, time[more]), np.vstack([self._command, command[more]])
-        n, rows = len(self._time), slice(-len(time), None)
-        stiffness = np.full(n, 1.0 if self._problem.stiffness is None else self._problem.stiffness[0])
-        path = self._statics.solve(replace(self._problem, time=self._time, command=self._command, stiffness=stiffness))
+    def run(self, time: np.ndarray, command: np.ndarray, ambient: np.ndarray) -> tuple[Seen, int, str]:
+        """As `Moving.run`, in a room at `ROOM`."""
+        known = max(0, len(self._time) - 1)  # it stands at the last, from where a current holds that is told now
+        self._time, self._command = np.append(self._time[:known], time), np.vstack([self._command[:known], command])
+        n, rows, problem = len(self._time), slice(-len(time), None), self._problem
+        stiffness = np.full(n, 1.0 if problem.stiffness is None else problem.stiffness[0])
+        heating = None if problem.heating is None else replace(problem.heating, ambient=np.full(n, ROOM))
+        path = self._statics.solve(replace(problem, time=self._time, command=self._command, stiffness=stiffness, heating=heating))
         found = bool(path.started) and bool(path.status[rows].all())
-        pulls = ", ".join(f"{T:.4g}" for T in command[-1])
+        unit, factor = problem.drives[0].shown
+        pulls = ", ".join(f"{factor * c:.4g}" for c in command[-1])
         seen = Seen(path.markers[rows], path.path[rows], path.tension[rows], path.others["temperature"][rows], path.q[rows])
-        return seen, len(time) if found else 0, "" if found else f"no equilibrium under tensions {pulls} N at t = {time[-1]:.4g} s"
+        return seen, len(time) if found else 0, "" if found else f"no equilibrium under {pulls} {unit} at t = {time[-1]:.4g} s"
 
 
 class Plant:
-    """A body with tendons, driven by commanded load-cell readings at equal intervals. One instance serves one thread."""
+    """A body whose tendons are all driven alike at equal intervals, by tensions as load cells read them, displacements or currents
+    through springs. One instance serves one thread."""
 
-    def __init__(self, twin: Twin, interval: float, payload: float = 0.0, dynamic: bool = True) -> None:
-        """At rest, slack, under its own gravity and `payload` (kg). Raises DataError for a robot without a backbone, SolveError
-        where the load has no equilibrium."""
+    def __init__(
+        self, twin: Twin, interval: float, payload: float = 0.0, dynamic: bool = True, drive: Drive = Drive.TENSION
+    ) -> None:
+        """At rest, slack or its springs cold, under its own gravity and `payload` (kg). Raises DataError for a robot without a
+        backbone, or without springs for currents to heat, SolveError where the load has no equilibrium."""
         self.twin, self.interval, self.body = twin, interval, twin.robot.chain(twin.body())
         laws, n = twin.laws, twin.robot.n_tendon
         dynamics = Dynamics(self.body)
         loads, stiffness = laws.surround(Loads(twin.robot.gravity, payload)), laws.stiffness(np.full(1, ROOM), np.zeros(1))
-        self.moving = (Moving if dynamic else Resting)(
-            dynamics, Problem(np.zeros(1), np.zeros((1, n)), loads, laws.route, creep=laws.creep, stiffness=stiffness)
+        heating = twin.heating(np.full(1, ROOM)) if drive is Drive.CURRENT else None
+        problem = Problem(
+            np.zeros(1), np.zeros((1, n)), loads, laws.route, (drive,) * n, laws.creep, stiffness=stiffness, heating=heating
         )
+        self.moving = (Moving if dynamic else Resting)(dynamics, problem)
         self._straight, self._stretch = dynamics.straight_path, laws.route.stretch
-        self._wires = Wires(laws, Drive.TENSION, n)
+        self._wires = Wires(laws, drive, n)
         base = self._wires.driven(0.0, np.zeros(n))
-        seen, samples, lost = self.moving.run(np.zeros(1), base[None])
+        seen, samples, lost = self.moving.run(np.zeros(1), base[None], np.full(1, ROOM))
         if samples < 1:
             raise SolveError(lost)
         self._note(seen, 0)
 
     def step(self, command: np.ndarray) -> Sensed:
-        """One interval on, tensions going straight to what `command` (n_tendon,) N makes of them. Raises SolveError where the
-        motion is lost."""
+        """One interval on, tensions or displacements going straight to what `command` (n_tendon,) N or m makes of them, currents
+        (A) as it makes them all the time. Raises SolveError where the motion is lost."""
         self._wires.driven(self._wires.time[-1] + self.interval, command)
-        seen, samples, lost = self.moving.run(np.array(self._wires.time[-2:]), np.array(self._wires.base[-2:]))
+        seen, samples, lost = self.moving.run(np.array(self._wires.time[-2:]), np.array(self._wires.base[-2:]), np.full(2, ROOM))
         if samples < 2:
             raise SolveError(lost)
         self._note(seen, 1)

@@ -16,7 +16,10 @@ from twin.laws import Laws
 
 
 class Wires:
-    """Between whoever commands tendons, all in one way, and a body. Keeps what was, from the first instant on."""
+    """Between whoever commands tendons, all in one way, and a body. Keeps what was, from the first instant on.
+
+    Tensions and displacements go straight from one command to the next; a current holds from when it is commanded.
+    """
 
     def __init__(self, laws: Laws, drive: Drive, n_tendon: int) -> None:
         self._laws, self.drives = laws, (drive,) * n_tendon
@@ -28,13 +31,18 @@ class Wires:
         self._seen: list[tuple[np.ndarray, np.ndarray, np.ndarray, Mapping[str, np.ndarray]]] = []
 
     def driven(self, time: float, told: np.ndarray) -> np.ndarray:
-        """(n_tendon,) N or m, what the tendons get of what is commanded from now on at `time` (s)."""
+        """(n_tendon,) N, m or A, what the tendons get at `time` (s) of what is commanded until then."""
+        holds = self.drives[0] is Drive.CURRENT and bool(self.time)
+        told = np.array(told, float)
+        if holds:  # since the time before
+            self._told[-1] = told
         self.time.append(time)
-        self._told.append(np.array(told, float))
-        base = self._told[-1]
+        self._told.append(told)
+        last = 2 if holds else 1
+        base = np.array(self._told[-last:])
         if self._acts:
-            base = self._laws.drive(self._laws.command(self._signals(self._told, slice(0, None)))).command[-1]
-        self.base.append(np.maximum(base, 0.0) if self.drives[0] is Drive.TENSION else base)
+            base = self._laws.drive(self._laws.command(self._signals(self._told, slice(0, None)))).command[-last:]
+        self.base[len(self.time) - last :] = np.maximum(base, 0.0) if self.drives[0] is Drive.TENSION else base
         return self.base[-1]
 
     def note(
@@ -56,8 +64,11 @@ class Wires:
         return self._laws.sense(true) if self._senses else true
 
     def _signals(self, command: list[np.ndarray], rows: slice) -> Signals:
-        """Of some samples, (n_tendon,) N or m each as what drives."""
+        """Of some samples, (n_tendon,) N, m or A each as what drives."""
         now, driving = np.array(self.time[rows]), np.array(command[rows])
-        nothing, n = np.zeros_like(driving), len(driving)
-        tension, displacement = (driving, nothing) if self.drives[0] is Drive.TENSION else (nothing, driving)
-        return Signals(now, now, tension, displacement, np.zeros((n, 0, 3)), np.full(n, ROOM), self.drives, nothing)
+        n = len(driving)
+        of = {kind: driving if kind is self.drives[0] else np.zeros_like(driving) for kind in Drive}
+        return Signals(
+            now, now, of[Drive.TENSION], of[Drive.DISPLACEMENT], np.zeros((n, 0, 3)), np.full(n, ROOM), self.drives,
+            of[Drive.CURRENT],
+        )  # fmt: skip

@@ -5,8 +5,8 @@ heated.py      the same pulled by SMA springs, stepped in time
 inverse.py     the tensions for a wanted tip, by sectors or in general
 """
 
-from twin.kinematics.heated import HeatedRobot
+from twin.kinematics.heated import HeatedRobot, warmest_current
 from twin.kinematics.inverse import Reach, inverse
 from twin.kinematics.robot import LoadedRobot, Shape
 
-__all__ = ["HeatedRobot", "LoadedRobot", "Reach", "Shape", "inverse"]
+__all__ = ["HeatedRobot", "LoadedRobot", "Reach", "Shape", "inverse", "warmest_current"]

@@ -17,8 +17,19 @@ from twin.equilibrium.lengths import Held, Sought, reach, remember
 from twin.equilibrium.newton import no_factors, place
 from twin.errors import SolveError
 from twin.kinematics.robot import LoadedRobot
-from twin.springs.heat import heated
+from twin.springs.heat import heated, loss
 from twin.twin import Twin
+
+BEYOND = 45.0  # K that the warmest spring may rest above its phase change without stress: its tension has had that then
+
+
+def warmest_current(twin: Twin) -> tuple[float, float]:
+    """The current (A) under which the robot's springs, as long as on the straight robot, rest as warm as they may (K), and that:
+    h (T - T_a) = R I^2. Raises DataError for a robot without springs."""
+    spring = twin.heating(np.full(1, ROOM)).spring
+    warmest = float(spring.austenite_finish.min()) + BEYOND
+    h = loss(spring.records, 0, warmest - ROOM, float(spring.initial_elongation[0]), ROOM)
+    return float(np.sqrt(h * (warmest - ROOM) / spring.resistance[0])), warmest
 
 
 class HeatedRobot(LoadedRobot):

@@ -11,9 +11,9 @@ import viser
 from twin.effects import Drive, Loads, Push
 from twin.errors import DataError
 from twin.figure import Figure
+from twin.kinematics import warmest_current
 from twin.rollout import full_pull
 from twin.twin import Twin
-from twin.viewer.live import most_current
 
 MOST = 1.5  # full pulls at a slider's end
 MOST_PUSH = 0.2  # N: bends the rod and the finger by centimetres
@@ -51,7 +51,7 @@ class Controls:
         full, first = full_pull(twin), self.ways[0]
         most = {Drive.TENSION: round(MOST * full.tension, 1), Drive.DISPLACEMENT: round(MOST * 1e3 * full.displacement, 1)}
         if Drive.CURRENT in self.ways:
-            amperes, self.warmest = most_current(twin)
+            amperes, self.warmest = warmest_current(twin)
             most[Drive.CURRENT] = round(amperes, 2)
         # One motor can take up only what others let out.
         least = {d: -most[d] if d is Drive.DISPLACEMENT else 0.0 for d in most}

@@ -10,7 +10,6 @@ from twin.equilibrium import Equilibrium
 from twin.equilibrium.figure import ChainFigure
 from twin.figure import Frames
 from twin.kinematics import HeatedRobot
-from twin.springs.heat import loss
 from twin.twin import Twin, alone
 
 TURNS = 24  # back to which friction is followed
@@ -18,7 +17,6 @@ STEP = 0.1  # s between equilibria while springs heat, which takes them tens of 
 ROUNDING = 1e-9  # s
 RESTING = 0.01  # K/s: at rest
 LONGEST = 900.0  # s within which springs come to rest
-BEYOND = 45.0  # K that the warmest spring may rest above its phase change without stress: its tension has had that then
 
 
 class Live:
@@ -93,15 +91,6 @@ class Heated:
         """(n_tendon,) K of the springs."""
         assert self._robot is not None
         return self._robot.warm
-
-
-def most_current(twin: Twin) -> tuple[float, float]:
-    """The current (A) under which the robot's springs, as long as on the straight robot, rest at a temperature (K), and that:
-    h (T - T_a) = R I^2. Raises DataError for a robot without springs."""
-    spring = twin.heating(np.full(1, ROOM)).spring
-    warmest = float(spring.austenite_finish.min()) + BEYOND
-    h = loss(spring.records, 0, warmest - ROOM, float(spring.initial_elongation[0]), ROOM)
-    return float(np.sqrt(h * (warmest - ROOM) / spring.resistance[0])), warmest
 
 
 def _same(a: Loads, b: Loads) -> bool:
