@@ -28,6 +28,7 @@ from twin.viewer import replay as replay_module
 from twin.viewer.colours import bar, colours
 from twin.viewer.film import Film
 from twin.viewer.live import Heated, Live
+from twin.viewer.loop import Loop, svg
 from twin.viewer.replay import KEPT, Replay
 
 G = np.array([0.0, 0.0, 9.81])
@@ -322,3 +323,36 @@ def test_what_cannot_be_shown_is_said(words: dict[str, object], told: str) -> No
     said = View(**words)  # type: ignore[arg-type]
     with pytest.raises(DataError, match=told):
         said.run()
+
+
+def test_a_loop_shows_what_friction_keeps_back() -> None:
+    """The tip follows a play of 1 mm that the prediction has not: half of it behind as the pull rises, half before as it falls."""
+    pull = np.concatenate([np.linspace(0.0, 2.0, 50), np.linspace(2.0, 0.0, 50)])
+    where = 0.01 * pull
+    played = where - 5e-4 * np.where(np.arange(100) < 50, 1.0, -1.0)
+    tip = lambda x: np.column_stack([0.0 * x, -x, 0.1 + 0.0 * x])  # noqa: E731
+    measured = tip(played)
+    measured[[0, 7]] = np.nan
+    loop = Loop("tension of tendon 1, N", pull, measured, [tip(where), tip(played)])
+    missed, none = loop.missed()
+    assert np.isnan(missed[[0, 7]]).all()
+    assert np.nanmax(np.abs(missed[1:50] + 0.5)) < 1e-9  # mm, counted as the pull rises, though y falls
+    assert missed[50:] == pytest.approx(0.5)
+    assert np.nanmax(np.abs(none)) < 1e-9
+    drawn = svg(loop, ("#111111", "#222222"), 20)
+    assert drawn.count("<polyline") == drawn.count("<circle") == 2
+    assert "nan" not in drawn
+    assert svg(loop, ("#111111",), 7).count("<circle") == 0  # not seen then
+    assert svg(Loop("", np.ones(100), measured, [tip(where)]), ("#111111",), 0) == ""
+
+
+def test_a_replays_loop_is_of_the_tendon_that_moves_it() -> None:
+    replay = Replay(sample(), rubbing())
+    for k, label in enumerate(replay.labels):
+        words, pull = replay.pull(k)
+        assert words.startswith("tension of tendon ")
+        assert words.endswith(", N")
+        raw = next(t for t in sample().trials if t.name.startswith(label)).values
+        most = max((np.ptp(raw[f"tendon_{i}_tension"]), i) for i in (1, 2, 3))[1]
+        assert words == f"tension of tendon {most}, N"
+        assert np.array_equal(pull, raw[f"tendon_{most}_tension"])

@@ -93,6 +93,12 @@ def test_scrubber_effect_switch_picture_and_film(look: Look, monkeypatch: pytest
         assert page.changed(before)
         assert page.until(lambda: "t = 5." in app.words.content)  # the last sample before 6 s: they come every half second
         assert app.words.content != words
+        loop = page.page.locator("svg polyline")
+        assert page.until(lambda: loop.count() == 2)  # as described and as shown
+        mark, drawn = page.page.locator("svg circle").first, app.scrubber.loop.content
+        assert mark.is_visible()
+        page.put("time, s", "12")
+        assert page.until(lambda: app.scrubber.loop.content != drawn)
         before, words = page.scene(), app.words.content
         page.page.get_by_role("checkbox", checked=True).first.click()  # the effect's: nothing plays
         assert page.until(lambda: "no effect" in app.words.content)

@@ -229,7 +229,9 @@ class App:
         before = [side.before(k) for side in self.sides]
         if asked or time.monotonic() - self._plotted > PLOTTING:
             self._plotted = time.monotonic()
-            self.scrubber.draw(self._tracks if len(self.sides) > 1 else [*before, *self._tracks], i)
+            replay = self.sides[0].replay
+            assert replay is not None
+            self.scrubber.draw(replay, self._tracks if len(self.sides) > 1 else [*before, *self._tracks], i)
         lines = [f"t = {self._tracks[0].time[i]:.2f} s"]
         for side, track, described in zip(self.sides, self._tracks, before, strict=True):
             now, whole, was = (1e3 * e for e in (track.error[i], track.rms, described.rms))

@@ -50,6 +50,13 @@ class Replay:
         """(n, m, 3) m, NaN where missing."""
         return np.stack([self._bench.measured[trial][:, columns] for columns in self._columns.values()], axis=1)
 
+    def pull(self, trial: int) -> tuple[str, np.ndarray]:
+        """What pulls the tendon that is moved furthest, in words, and how far (n,) in their unit."""
+        command, drives = self._bench.inputs[trial].command, self._bench.drives
+        t = int(np.argmax(np.ptp(command, axis=0) / self._bench.reading))
+        unit, factor = drives[t].shown
+        return f"{drives[t]} of tendon {t + 1}, {unit}", factor * command[:, t]
+
     def track(self, twin: Twin, trial: int) -> Track:
         """A trial as the twin predicts it. Raises SolveError where it has no answer."""
         if (twin, trial) not in self._kept:

@@ -1,4 +1,4 @@
-"""The controls of a replay: which trial, when, how fast; the error over time."""
+"""The controls of a replay: which trial, when, how fast; the error over time, and the loop of pulling and letting go."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 import viser
 import viser.uplot
 
-from twin.viewer.replay import Track
+from twin.viewer.loop import Loop, svg
+from twin.viewer.replay import Replay, Track
 
 LINES = ("#999999", "#1f77b4", "#9467bd")
 NOW = {"label": "now", "stroke": "#d62728"}
@@ -32,6 +33,7 @@ class Scrubber:
             (np.zeros(2),) * len(series), tuple(viser.uplot.Series(**line) for line in series),  # type: ignore[typeddict-item]
             title="marker error, mm, over time, s", scales={"x": viser.uplot.Scale(time=False)}, height=200,
         )  # fmt: skip
+        self.loop = gui.add_html("")
         for handle in (self.trial, self.time, self.arrows):
             changed(handle)
 
@@ -47,9 +49,11 @@ class Scrubber:
             self.time.value = t
         return t
 
-    def draw(self, tracks: Sequence[Track], i: int) -> None:
-        """The errors of tracks on the same samples, of which i is the present one: a needle there, as the plot takes no missing
-        numbers."""
+    def draw(self, replay: Replay, tracks: Sequence[Track], i: int) -> None:
+        """The errors and loops of tracks on the same samples, of which i is the present one: a needle among the errors, as that
+        plot takes no missing numbers."""
+        tips = [t.markers[:, -1] for t in tracks]
+        self.loop.content = svg(Loop(*replay.pull(self.chosen), replay.measured(self.chosen)[:, -1], tips), LINES, i)
         present = np.where(np.arange(len(tracks[-1].time)) == i, tracks[-1].error, 0.0)
         self.plot.data = (tracks[0].time, *(1e3 * np.nan_to_num(e) for e in (*(t.error for t in tracks), present)))
 
