@@ -194,17 +194,21 @@ def test_randomisation_draws_what_the_diagnosis_does_not_know(diagnosed: Path) -
     assert own.std["backbone.youngs_modulus"] == pytest.approx(4.66e9)
 
 
-def test_a_frame_shows_the_robot_moving() -> None:
-    env = gymnasium.make("twin/ContinuumReach-v0", render_mode="rgb_array")
+@pytest.mark.parametrize(("name", "steps"), [("ContinuumReach-v0", 20), ("FingerShape-v0", 8), ("HandReorient-v0", 4)])
+def test_a_frame_shows_the_robot_moving(name: str, steps: int) -> None:
+    env = gymnasium.make(f"twin/{name}", render_mode="rgb_array")
     env.reset(seed=0)
     try:
         before = env.render()
     except TwinError as lacking:
         pytest.skip(str(lacking))
-    for _ in range(20):
-        env.step(np.array([1.0, -1.0, -1.0], np.float32))
+    bend = np.where(np.arange(env.action_space.shape[0]) == 0, 1.0, -1.0).astype(np.float32)  # type: ignore[index]
+    for _ in range(steps):
+        env.step(bend)
     after = env.render()
     env.close()
+    green = before[..., 1].astype(int) - before[..., [0, 2]].max(axis=2)
+    assert (green > 20).sum() > 20  # where it should go is marked
     assert before.shape == (480, 640, 3)
     assert before.std() > 5.0  # grey levels: an empty picture of the sky has less
     changed = np.abs(after.astype(int) - before).max(axis=2) > 40

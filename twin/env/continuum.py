@@ -16,7 +16,7 @@ from twin.dynamics import Moving
 from twin.effects import Drive, Loads
 from twin.env.checks import Actions, chosen
 from twin.env.domain import Spread, draw, read_spread
-from twin.env.picture import Picture
+from twin.env.picture import Mark, Picture
 from twin.env.plant import Plant, Sensed
 from twin.errors import DataError, SolveError, UnknownNameError
 from twin.kinematics import HeatedRobot, warmest_current
@@ -163,8 +163,8 @@ class ContinuumReach(gymnasium.Env[np.ndarray, np.ndarray]):
         """(480, 640, 3) bytes with `render_mode="rgb_array"`. Raises TwinError where this machine cannot draw."""
         if self.render_mode is None:
             return None
-        self._picture = self._picture or Picture(self.plant.body, self.length)
-        return self._picture.draw(self.plant.q, self.goal)
+        self._picture = self._picture or Picture(self.plant.body.spec, self.length)
+        return self._picture.draw(self.plant.q, [Mark(self.goal, 0.025 * self.length)])
 
     def close(self) -> None:
         if self._picture is not None:

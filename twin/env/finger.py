@@ -15,8 +15,10 @@ from twin.body import Problem
 from twin.effects import Drive, Loads
 from twin.env.checks import Actions, chosen
 from twin.env.domain import Spread, draw, read_spread
+from twin.env.picture import HERE, Mark, Picture
 from twin.env.soft_plant import Felt, FingerPlant
 from twin.errors import DataError, SolveError
+from twin.soft.statics import turned
 from twin.storage import read_twin
 from twin.twin import Twin
 
@@ -69,7 +71,7 @@ class FingerShape(gymnasium.Env[np.ndarray, np.ndarray]):
     is lost.
     """
 
-    metadata = {"render_modes": [], "render_fps": 25}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
 
     def __init__(self, twin: str | Path | Twin = "finger", render_mode: str | None = None, **options: Any) -> None:
         """Raises UnknownNameError for an option there is not, DataError for a robot that is no finger with pairs of tendons."""
@@ -82,7 +84,7 @@ class FingerShape(gymnasium.Env[np.ndarray, np.ndarray]):
         if body.n_tendon % 2:
             raise DataError(f"robot {self.described.robot.name!r} has {body.n_tendon} tendons; servos need pairs of them")
         self.n, self.length = body.n_tendon // 2, body.cone.length
-        self._actions = Actions(self.n)
+        self._actions, self._picture = Actions(self.n), None
         n_marker, s = len(self.plant.markers), len(body.cord_paths)
         size = s + 2 * self.n + 3 * n_marker + (3 * n_marker + body.n_tendon if self.options.observe == "full" else 0)
         self.action_space = spaces.Box(-1.0, 1.0, (self.n,), np.float32)
@@ -113,6 +115,22 @@ class FingerShape(gymnasium.Env[np.ndarray, np.ndarray]):
             return self._observed(self.plant.felt()), -10.0, False, True, {**self._info(), "lost": str(fault)}
         info = self._info()
         return self._observed(felt), -info["distance"] / (0.05 * self.length), False, False, info
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """(480, 640, 3) bytes with `render_mode="rgb_array"`: markers red, where they are wanted green. Raises TwinError where this
+        machine cannot draw."""
+        if self.render_mode is None:
+            return None
+        self._picture = self._picture or Picture(self.plant.spec, self.length, self.described.robot.gravity[2] > 0.0)
+        turn = turned(self.plant.body.turn)  # the model stands in the finger's own frame
+        marks = [Mark(at @ turn, 0.012 * self.length) for at in self.wanted]
+        marks += [Mark(at @ turn, 0.012 * self.length, HERE) for at in self.plant.markers]
+        return self._picture.draw(self.plant.moving.data.qpos, marks)
+
+    def close(self) -> None:
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
 
     def _drawn(self) -> np.ndarray:
         """(p,) m of servos, evenly from the ball between the least and the most bend."""

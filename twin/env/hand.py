@@ -13,6 +13,7 @@ from gymnasium import spaces
 
 from twin.env.checks import Actions, chosen
 from twin.env.domain import Spread, draw, read_spread
+from twin.env.picture import GOAL, HERE, Mark, Picture
 from twin.env.soft_plant import HandPlant
 from twin.errors import SolveError
 from twin.soft.scene import Sight, Thing
@@ -75,7 +76,7 @@ class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
     the block out of the fingers' reach.
     """
 
-    metadata = {"render_modes": [], "render_fps": 20}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
     def __init__(self, twin: str | Path | Twin = "hand", render_mode: str | None = None, **options: Any) -> None:
         """Raises UnknownNameError for an option there is not, DataError for a robot that is no hand."""
@@ -86,7 +87,7 @@ class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
         self._drawn, self.plant = self._seen_of(self.described, self.options.mass[0], self.options.friction[0])
         sight = self.plant.scene.see()
         self.n, n_sensor = sight.servos.size, sight.resistance.size
-        self._actions = Actions(self.n)
+        self._actions, self._picture = Actions(self.n), None
         size = n_sensor + self.n + 4 + (13 + sight.tension.size if self.options.observe == "full" else 0)
         self.action_space = spaces.Box(-1.0, 1.0, (self.n,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
@@ -123,6 +124,25 @@ class HandReorient(gymnasium.Env[np.ndarray, np.ndarray]):
         if np.linalg.norm(aside) > 1.0:
             return self._observed(), -10.0, False, True, {**info, "lost": "the block is out of the fingers' reach"}
         return self._observed(), -info["error"] - float(np.linalg.norm(aside)), False, False, info
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """(480, 640, 3) bytes with `render_mode="rgb_array"`: a red arrow where the block points to, a green one where it should.
+        Raises TwinError where this machine cannot draw."""
+        if self.render_mode is None:
+            return None
+        scene, place = self.plant.scene, self._sight.place[0]
+        self._picture = self._picture or Picture(scene.spec, TABLE.place[2], self.described.robot.gravity[2] > 0.0)
+        above, reach = place - [0.0, 0.0, 0.03], 1.6 * self.options.size
+        marks = [
+            Mark(above, 1e-3, colour, above + reach * np.array([np.cos(angle), np.sin(angle), 0.0]))
+            for angle, colour in ((yaw(self._sight), HERE), (self.wanted, GOAL))
+        ]
+        return self._picture.draw(scene.data.qpos, marks)
+
+    def close(self) -> None:
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
 
     def _seen_of(self, twin: Twin, mass: float, friction: float) -> tuple[tuple[Any, ...], HandPlant]:
         """A hand over its block, and what it was made of."""

@@ -105,7 +105,7 @@ class Scene:
         started, spec = stand(body, rest, LONGEST)
         for thing in things:
             thing.add(spec)
-        self.moving = moving(started, spec)
+        self.spec, self.moving = spec, moving(started, spec)
         self.model, self.data = self.moving.model, self.moving.data
         self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # one iteration a step; CG leaves 0.3 N of jitter in the tendons
         self.model.opt.cone, self.model.opt.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, STICKS
