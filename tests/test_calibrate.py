@@ -219,6 +219,16 @@ def test_a_law_at_the_end_of_its_range_is_said(case: tuple[int, Recording, Fit])
     assert any("backbone.youngs_modulus" in words for words in unlikely(ended(found, "backbone.youngs_modulus")))
 
 
+def test_errors_go_together_as_the_closed_form_says() -> None:
+    """Of two parameters the correlation is -b / sqrt(a c), [[a, b], [b, c]] = J'J; a third that nothing tells is left out."""
+    free = tuple(Free(None, replace(p, std=None)) for p in load("continuum").nuisance[:3])
+    model, J = Model(Twin.of(load("continuum")), free), np.zeros((3, 3))
+    J[:, 0], J[:, 1] = [3.0, 0.0, 1.0], [1.0, 2.0, 1.0]
+    labels, together = Fit(Evaluation(model, [], [], np.zeros(3)), J, 0.0).correlation()
+    assert labels == tuple(f.label for f in free[:2])
+    assert together == pytest.approx(np.array([[1.0, -4.0 / 60.0**0.5], [-4.0 / 60.0**0.5, 1.0]]))
+
+
 def test_standard_errors_widen_where_the_residual_is_larger_than_its_noise() -> None:
     """With residuals three times as large as the noise they were divided by, three times the errors of ordinary least squares; with
     smaller ones no less than the noise makes."""

@@ -36,6 +36,10 @@ id = "tendon_friction"
 parameters = { mu = { value = 0.21, std = 0.02, unit = "1" } }
 """
 
+TOGETHER = """{"effects": [], "correlation": {
+    "parameters": ["disks.mass", "tendon_friction.mu", "backbone.youngs_modulus"],
+    "matrix": [[1.0, 0.2, 0.0], [0.2, 1.0, -0.9], [0.0, -0.9, 1.0]]}}"""
+
 
 @pytest.fixture
 def diagnosed(tmp_path: Path) -> Path:
@@ -186,6 +190,12 @@ def test_randomisation_draws_what_the_diagnosis_does_not_know(diagnosed: Path) -
         # 400 normal draws: the mean within 4 std/20, the standard deviation within 4/sqrt(800) = 14 %.
         assert np.mean(got) == pytest.approx(mean, abs=0.2 * std)
         assert np.std(got) == pytest.approx(std, rel=0.15)
+    (diagnosed.parent / "report.json").write_text(TOGETHER)
+    spread = read_spread(diagnosed, twin)
+    drawn = [draw(twin, spread, {}, rng) for _ in range(400)]
+    pairs = np.array([[t.values["backbone.youngs_modulus"], t.effects[0]["mu"]] for t in drawn])
+    assert np.corrcoef(pairs.T)[0, 1] == pytest.approx(-0.9, abs=0.04)  # 4 (1 - 0.81) / 20
+    assert pairs.std(axis=0) == pytest.approx([0.5e9, 0.02], rel=0.15)
     doubtful = [bool(draw(twin, Spread(probability={"tendon_friction": 0.7}), {}, rng).effects) for _ in range(400)]
     assert np.mean(doubtful) == pytest.approx(0.7, abs=0.1)  # 4 sqrt(0.21 / 400)
     joined = draw(twin, Spread(), {"tip_payload.mass": (0.001, 0.002)}, rng)

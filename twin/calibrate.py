@@ -198,6 +198,14 @@ class Fit:
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information())), 0.0) * inflation)
         return spread * np.array([f.parameter.step for f in self.model.free])
 
+    def correlation(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """Labels of the free parameters that the data or priors tell, and how their errors go together, (p, p): the inverse
+        information, scaled to a unit diagonal."""
+        covariance, told = np.linalg.pinv(self.information()), ~untold(self.information())
+        size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        labels = tuple(f.label for f, t in zip(self.model.free, told, strict=True) if t)
+        return labels, (covariance / np.outer(size, size))[np.ix_(told, told)]
+
     def effective_parameters(self) -> float:
         """How many parameters the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
         data = self.J.T @ self.J

@@ -87,6 +87,7 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         below_materiality=(small,),
         parameters={"backbone.youngs_modulus": Fitted(7.6e10, 2e8, "Pa"), "disks.mass": Fitted(5.02e-3, 1.4e-4, "kg")},
         unfixed=("disks.mass",),
+        correlation=(("backbone.youngs_modulus", "tendon_friction.mu"), np.array([[1.0, -0.8], [-0.8, 1.0]])),
         errors=Errors(
             nominal=dict.fromkeys(groups, 1.06e-3),
             calibrated=dict.fromkeys(groups, 7.8e-4),

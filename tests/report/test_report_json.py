@@ -46,6 +46,10 @@ def check(report: dict) -> None:
         assert {"id", "error", "probability"} <= set(c)
         assert c["error"] is None or is_number(c["error"])
         assert 0 <= c["probability"] <= 1
+    together = report["correlation"]
+    assert len(together["matrix"]) == len(together["parameters"])
+    assert all(len(row) == len(together["parameters"]) for row in together["matrix"])
+    assert all(-1.0 <= x <= 1.0 for row in together["matrix"] for x in row)
     error = report["error"]
     assert error["split"] == "held-out trials"
     assert error["trials"]

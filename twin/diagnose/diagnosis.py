@@ -78,6 +78,7 @@ class Diagnosis:
     below_materiality: tuple[Claim, ...]
     parameters: dict[str, Fitted]
     unfixed: tuple[str, ...]
+    correlation: tuple[tuple[str, ...], np.ndarray]  # of the errors of what was fitted, by its labels
     errors: Errors
     noise: Noise
     structure_before: float  # sigma

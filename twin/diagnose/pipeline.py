@@ -111,6 +111,7 @@ def _reported(
         ),
         parameters=final.fit.fitted(None),
         unfixed=tuple(final.fit.unfixed()),
+        correlation=final.fit.correlation(),
         errors=opened.errors(settings.seed),
         noise=study.objective.whitener.noise,
         structure_before=base.discrepancy.size,

@@ -1,6 +1,7 @@
-"""Twins drawn from what is not known of a robot: standard errors of its diagnosis, doubtful effects, and plain ranges.
+"""Twins drawn from what is not known of a robot: the errors of its diagnosis, doubtful effects, and plain ranges.
 
-twin.toml holds standard errors, no covariance: parameters are drawn one by one, each normal about its value and cut at its bounds.
+Parameters are drawn together, normal about their values with the standard errors of twin.toml and the correlations of the report
+beside it (one by one where there is no report), and cut at their bounds.
 """
 
 from __future__ import annotations
@@ -25,11 +26,21 @@ from twin.units import unit_scale
 
 @dataclass(frozen=True)
 class Spread:
-    """One standard deviation (SI) of what is not known, by "parameter" of the robot or "effect.parameter"; and of each effect how
-    probable it is."""
+    """One standard deviation (SI) of what is not known, by "parameter" of the robot or "effect.parameter", and how errors go
+    together, by pairs of these; and of each effect how probable it is."""
 
     std: Mapping[str, float] = field(default_factory=dict)
     probability: Mapping[str, float] = field(default_factory=dict)
+    correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    def drawn(self, rng: np.random.Generator) -> dict[str, float]:
+        """How far off each is (SI)."""
+        names = sorted(self.std)
+        together = np.array([[1.0 if a == b else self.correlation.get((a, b), 0.0) for b in names] for a in names])
+        values, vectors = np.linalg.eigh(together.reshape(len(names), len(names)))
+        # What is rounded in a report may leave a direction slightly below zero.
+        z = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(names)))
+        return {n: self.std[n] * float(x) for n, x in zip(names, z, strict=True)}
 
 
 def read_spread(source: str | Path, twin: Twin) -> Spread:
@@ -46,9 +57,17 @@ def read_spread(source: str | Path, twin: Twin) -> Spread:
             laws = {p.name: p.unit for e in twin.effects if e.id == entry["id"] for p in e.declared(e.n_tendon)}
             std |= _stds(entry.get("parameters", {}), laws, f"{entry['id']}.")
     report = path.with_name("report.json")
-    claims = json.loads(report.read_text("utf-8")).get("effects", []) if is_file(report) else []
+    said = json.loads(report.read_text("utf-8")) if is_file(report) else {}
     known = {e.id for e in twin.effects}
-    return Spread(std, {c["id"]: float(c["probability"]) for c in claims if c.get("probability") is not None and c["id"] in known})
+    probability = {
+        c["id"]: float(c["probability"]) for c in said.get("effects", []) if c.get("probability") is not None and c["id"] in known
+    }
+    together = said.get("correlation", {"parameters": [], "matrix": []})
+    names = together["parameters"]
+    correlation = {
+        (a, b): float(x) for a, row in zip(names, together["matrix"], strict=True) for b, x in zip(names, row, strict=True)
+    }
+    return Spread(std, probability, correlation)
 
 
 def _stds(table: Mapping[str, Any], units: Mapping[str, str], prefix: str) -> dict[str, float]:
@@ -61,9 +80,9 @@ def draw(twin: Twin, spread: Spread, ranges: Mapping[str, tuple[float, float]], 
 
     Raises UnknownNameError for a name that is no parameter.
     """
-    own = {p.name: p for p in twin.robot.parameters}
+    own, off = {p.name: p for p in twin.robot.parameters}, spread.drawn(rng)
     values = {**{n: own[n].value for n in spread.std if n in own}, **twin.values}
-    values = {n: _drawn(own[n], v, spread.std.get(n), ranges.get(n), rng) for n, v in sorted(values.items())}
+    values = {n: _drawn(own[n], v, off.get(n), ranges.get(n), rng) for n, v in sorted(values.items())}
     values |= {n: _drawn(own[n], own[n].value, None, r, rng) for n, r in sorted(ranges.items()) if n in own and n not in values}
     effects = {e.id: e for e in twin.effects if rng.random() < spread.probability.get(e.id, 1.0)}
     for name in sorted(ranges):
@@ -75,7 +94,7 @@ def draw(twin: Twin, spread: Spread, ranges: Mapping[str, tuple[float, float]], 
         effects.setdefault(effect, catalogue()[effect]({}, twin.robot.n_tendon))
         if parameter not in effects[effect].values:
             raise UnknownNameError("parameter to draw", name, [f"{effect}.{n}" for n in effects[effect].values])
-    return replace(twin, values=values, effects=tuple(_redrawn(e, spread, ranges, rng) for _, e in sorted(effects.items())))
+    return replace(twin, values=values, effects=tuple(_redrawn(e, off, ranges, rng) for _, e in sorted(effects.items())))
 
 
 def _of(effect: str, twin: Twin) -> tuple[Parameter, ...]:
@@ -83,21 +102,21 @@ def _of(effect: str, twin: Twin) -> tuple[Parameter, ...]:
 
 
 def _redrawn(
-    effect: Effect, spread: Spread, ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator
+    effect: Effect, off: Mapping[str, float], ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator
 ) -> Effect:  # fmt: skip
     values = {
-        p.name: _drawn(p, effect[p.name], spread.std.get(f"{effect.id}.{p.name}"), ranges.get(f"{effect.id}.{p.name}"), rng)
+        p.name: _drawn(p, effect[p.name], off.get(f"{effect.id}.{p.name}"), ranges.get(f"{effect.id}.{p.name}"), rng)
         for p in effect.declared(effect.n_tendon)
     }
     return type(effect)(values, effect.n_tendon)
 
 
 def _drawn(
-    p: Parameter, value: float, std: float | None, span: tuple[float, float] | None, rng: np.random.Generator
+    p: Parameter, value: float, off: float | None, span: tuple[float, float] | None, rng: np.random.Generator
 ) -> float:  # fmt: skip
     if span is not None:
         low, high = span
         if not p.low <= low <= high <= p.high:
             raise DataError(f"range [{low:g}, {high:g}] of {p.name}: allowed is within [{p.low:g}, {p.high:g}] {p.unit}")
         return float(rng.uniform(low, high))
-    return value if std is None else float(np.clip(rng.normal(value, std), p.low, p.high))
+    return value if off is None else float(np.clip(value + off, p.low, p.high))

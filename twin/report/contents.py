@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.identifiability import Visibility
@@ -54,6 +56,7 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
         ],
         "parameters": _parameters(d.parameters),
         "unfixed": list(d.unfixed),
+        "correlation": _correlation(*d.correlation),
         "noise": _noise(d),
         "notices": list(d.notices),
         "source": d.bench.recording.source,
@@ -89,6 +92,11 @@ def _visibility(v: Visibility) -> dict[str, Any]:
         "smallest": {"parameter": name, "value": finite(value), "unit": unit},
         "lacking": list(v.lacking),
     }
+
+
+def _correlation(names: Sequence[str], of: np.ndarray) -> dict[str, Any]:
+    """How the errors of fitted parameters go together, rows and columns as named."""
+    return {"parameters": list(names), "matrix": [[finite(float(x)) for x in row] for row in of]}
 
 
 def _parameters(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:
