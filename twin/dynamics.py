@@ -246,7 +246,7 @@ class Moving:
         n, nt = command.shape
         tension, path, temperature = np.full((3, n, nt), np.nan)
         seen = Seen(np.full((n, self._n_marker, 3), np.nan), path, tension, temperature, np.full((n, self.model.nv), np.nan))
-        command = np.where(self._pulled, np.maximum(command, 0.0), command)
+        command = np.ascontiguousarray(np.where(self._pulled, np.maximum(command, 0.0), command))
         motion = self._motion._replace(
             time=np.array(time, float), command=command, ambient=np.zeros(n) if ambient is None else np.array(ambient, float)
         )

@@ -120,9 +120,11 @@ class Equilibrium:
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
         heating = problem.heating
+        # In one order in memory: the loop is compiled anew for another, which takes half a minute.
+        command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))
         return Driving(
             time=np.array(problem.time, float),
-            command=np.where(by_length, problem.command, np.maximum(problem.command, 0.0)),
+            command=command,
             by_length=by_length,
             by_spring=by_spring,
             straight=self.straight_path,
