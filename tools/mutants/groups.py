@@ -20,6 +20,7 @@ class Group:
 LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks or parameters_have"
 CONTROL = "not tracked and not less_of and not foreseen and not knows_of and not examples and not thousand and not takes_up"
 PLACES = "place_in_words or a_tip_alone or three_markers or bend or have_no_say"
+WORDS = "told or said or nearest or wave or a_step_is"
 IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
 
 
@@ -75,6 +76,13 @@ GROUPS = {
     "experiment": _stage("experiment"),
     "weigh": _stage("weigh", "tests/test_weigh.py", "tests/test_choose.py"),
     "describe": _stage("describe", "tests/test_describe_stage.py"),
+    "words": _stage("words", "tests/test_stages.py", "tests/test_describe.py", "-k", WORDS),
+    "objective": _stage("objective", "tests/test_stages.py"),
+    "pipeline": _stage("pipeline", "tests/test_stages.py", "tests/test_pipeline.py"),
+    "thresholds": _stage("thresholds"),
+    "between": Group(
+        tuple(f"twin/diagnose/{name}.py" for name in ("look", "doubts", "conclusion", "study")), ("tests/test_stages.py",)
+    ),
     "budget": _stage("budget", "tests/test_search.py", "-k", "time_is_up"),
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
@@ -96,6 +104,14 @@ GROUPS = {
     "control": Group(("twin/control/*.py",), ("tests/test_control.py", "tests/test_shape_control.py", "-k", CONTROL)),
     "tasks": Group(("twin/tasks/*.py",), ("tests/test_tasks.py", "-k", "judged or nothing or lists")),
     "kinematics": Group(("twin/kinematics/*.py",), ("tests/test_kinematics.py",)),
+    "antagonists": Group(("twin/equilibrium/antagonists.py",), ("tests/test_transmission.py", "-k", "not diagnosis")),
+    "compiled": Group(
+        tuple(f"twin/equilibrium/{name}.py" for name in ("linear", "elastic", "hyperelastic")),
+        ("tests/test_compiled_parts.py", "tests/test_balance.py"),
+    ),
+    "chain": Group(
+        ("twin/equilibrium/__init__.py",), ("tests/test_balance.py", "tests/test_equilibrium.py", "tests/test_lengths.py")
+    ),
     "equilibrium": Group(
         ("twin/equilibrium/*.py",), ("tests/test_balance.py", "tests/test_equilibrium.py", "tests/test_lengths.py")
     ),
