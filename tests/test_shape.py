@@ -101,3 +101,36 @@ def test_the_error_bar_is_made_of_doubts_and_load_cells() -> None:
     np.testing.assert_allclose(bar(0.05, 1e-9), cells, rtol=1e-3, atol=2e-7)  # m: curvature of 0.01 N; solves within 1e-7 rad
     np.testing.assert_allclose(bar(1e-9, 0.005), doubts, atol=5e-7)
     np.testing.assert_allclose(bar(0.05, 0.005), np.hypot(cells, doubts), rtol=1e-3, atol=5e-7)
+
+
+def test_the_filter_finds_the_payload_that_made_its_readings() -> None:
+    """10 +- 10 g believed, 24 g there: 1.4 standard deviations, so that its robots are given what it finds on the way."""
+    twin, loads = Twin(load("continuum")), Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
+    built = LoadedRobot(twin, replace(loads, payload=0.024))
+    sense = TensionShape(twin, loads, {"payload": 0.01})
+    pulls = np.array([[1.6, 0.5, 0.1], [2.0, 0.3, 0.2], [0.4, 1.8, 0.2], [0.3, 0.4, 2.2]])
+    for tension in pulls:
+        true = built.pull(tension)
+        found = sense.update(tension, true.displacement)
+    assert found.found["payload"][0] == pytest.approx(0.024, abs=3e-4)  # 54 um of a tendon's travel is worth 0.5 g
+    np.testing.assert_allclose(found.markers, true.markers, atol=3e-4)
+    assert sense.robot.loads.payload + 0.0 == 0.01, "as given"
+    assert sense.centre[0] == pytest.approx(0.024, abs=0.25 * 0.01), "and carried by the robots"
+    lead = sense.sisters[0].shape().markers - sense.robot.shape().markers
+    heavier = LoadedRobot(twin, replace(loads, payload=sense.centre[0] + 0.01))
+    plain = LoadedRobot(twin, replace(loads, payload=sense.centre[0]))
+    for tension in pulls:
+        told = heavier.pull(tension).markers - plain.pull(tension).markers
+    np.testing.assert_allclose(lead, told, atol=2e-6)  # two solves within 1e-7 rad; no friction to remember the way
+
+
+def test_without_a_doubt_it_is_the_robot_itself() -> None:
+    """And the error bar that of its load cells, displacements or none."""
+    twin, loads = Twin(load("continuum")), Loads(np.array([0.0, -9.81, 0.0]))
+    tension, sense = np.array([1.6, 0.5, 0.1]), TensionShape(twin, loads, {})
+    told = LoadedRobot(twin, loads).pull(tension)
+    for displacement in (None, told.displacement + 1e-3):
+        seen = sense.update(tension, displacement)
+        np.testing.assert_allclose(seen.markers, told.markers, atol=1e-9)
+        assert seen.std.max() > 1e-6
+        assert seen.found == {}

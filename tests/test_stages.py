@@ -26,6 +26,7 @@ from twin.diagnose.thresholds import DOUBTFUL, FEW, SHOWN
 from twin.diagnose.words import components, mixed, since, structure, undecided, unlike, worst_channel
 from twin.effects import Drive
 from twin.errors import DataError, SolveError
+from twin.evaluate import TYPICAL
 from twin.quantities import Parameter
 
 
@@ -81,6 +82,10 @@ def test_a_line_is_said_beside_the_smooth_part_or_alone(plan: Bench) -> None:
 
 
 def test_a_step_is_told_with_its_minutes_into_the_session(plan: Bench) -> None:
+    early = plan.inputs[0].clock - 600.0 * (
+        np.arange(len(plan.inputs[0].clock)) == 0
+    )  # ten minutes to the first trial's second row
+    plan = replace(plan, inputs=(replace(plan.inputs[0], clock=early), *plan.inputs[1:]))
     every = list(range(len(plan.inputs)))
     which = np.repeat(np.arange(len(every)), [len(i.time) for i in plan.inputs])
     z = 0.1 * np.random.default_rng(0).normal(size=(plan.n_sample, len(plan.outputs)))
@@ -94,6 +99,17 @@ def test_a_step_is_told_with_its_minutes_into_the_session(plan: Bench) -> None:
     assert since(plan, every, z + 5.0 * (which >= 2)[:, None]) == "", "of 999 orders some begin with the same two"
     assert since(plan, every, z + 5.0 * (which >= 1)[:, None]) == "", "one trial alone is that trial's"
     assert since(plan, every, z) == ""
+
+
+def test_a_drift_between_a_morning_and_an_afternoon_is_no_step(plan: Bench) -> None:
+    """What grows with the clock through two bunches of trials, hours apart, looks like a step in their order."""
+    n = len(plan.inputs)
+    clocks = [i.clock + (3e5 if k >= n // 2 else 0.0) for k, i in enumerate(plan.inputs)]
+    apart = replace(plan, inputs=tuple(replace(i, clock=c) for i, c in zip(plan.inputs, clocks, strict=True)))
+    rows = np.concatenate(clocks)[:, None] / 3e5 * np.full(len(plan.outputs), 9.0)
+    assert since(apart, range(n), rows) == ""
+    step = 9.0 * (np.repeat(np.arange(n), [len(i.time) for i in plan.inputs]) >= n // 2 - 2)[:, None]
+    assert since(apart, range(n), step + np.zeros(len(plan.outputs))) != "", "a step before the pause is one"
 
 
 def test_two_robots_and_what_does_not_hold_elsewhere_are_told_in_words(plan: Bench) -> None:
@@ -208,6 +224,36 @@ def test_the_sensitivity_of_a_linear_robot_is_its_matrix(drive: Drive, plan: Ben
     assert near == [{0: "near"}] * 3
     sensitivity(bench, trials, twin, flat)  # type: ignore[arg-type]
     assert near[3:] == [{}] * 3
+
+
+def test_the_noise_is_read_from_a_first_rough_fit(plan: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fit weighs by declared noise, and by what such sensors typically have where none is declared."""
+    made: list[Any] = []
+    bench = few(plan, 3)
+    named = [replace(o, channel=replace(o.channel, noise=1e-3)) if n == 0 else o for n, o in enumerate(bench.outputs)]
+    bench = replace(bench, outputs=tuple(named))
+
+    def objective_by_hand(bench: Bench, trials: Any, whitener: Any, jobs: int) -> Any:
+        made.append((list(trials), whitener, jobs))
+        return SimpleNamespace(predict=lambda twin, traces: ("traces", f"predicted by {twin} near {traces}"))
+
+    start = SimpleNamespace(model=SimpleNamespace(twin="rough"), evaluation=SimpleNamespace(traces="those", raw="left"))
+    monkeypatch.setattr(objective, "Objective", objective_by_hand)
+    monkeypatch.setattr(objective, "Model", SimpleNamespace(base=lambda robot, twin: "base"))
+    monkeypatch.setattr(objective, "Whitener", lambda noise, measured, G, command: (noise, G, len(measured), len(command)))
+    monkeypatch.setattr(objective, "fit", lambda of, model, tolerance: start)
+    monkeypatch.setattr(
+        objective, "sensitivity", lambda bench, trials, twin, predicted, near: (list(trials), twin, predicted, near)
+    )
+    monkeypatch.setattr(objective, "estimate_noise", lambda bench, trials, raw, G: ((raw, G), ["a note"]))
+    model, _, notes = objective.objective_of(bench, SimpleNamespace(robot=None), [0, 2], Settings(jobs=1))  # type: ignore[arg-type]
+    assert (model, notes) == (start.model, ["a note"])
+    (trials, (rough, none, n, _), jobs), (_, (noise, G, *_), _) = made
+    assert (trials, n, jobs) == ([0, 2], 2, 1)
+    np.testing.assert_array_equal(rough.sigma, [1e-3, *[TYPICAL["marker"]] * 23])
+    assert not any(g.any() for g in none)
+    assert G == ([0, 2], "rough", "predicted by rough near those", "those")
+    assert noise == ("left", G)
 
 
 # ---- look -------------------------------------------------------------------------------------------------------------------
@@ -333,3 +379,32 @@ def test_every_trial_is_shown_by_the_twin_that_had_to_predict_it(monkeypatch: py
         "calibrated": ["base sees 0", "base opened 1", "base sees 2", "base opened 3"],
         "after": ["creep sees 0", "tilt opened 1", "creep sees 2", "tilt opened 3"],
     }
+
+
+def test_a_calibration_is_judged_on_trials_it_has_not_seen(plan: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of the others opened, 2 mm off in x; its standard errors are those at the answer."""
+    day, asked = few(plan, 6), {}
+    off = np.array([2e-3 if o.axis == 0 else 0.0 for o in day.outputs])
+    fitted = SimpleNamespace(model=SimpleNamespace(twin="calibrated"))
+
+    def fit(objective: Any, start: Any, refresh: bool) -> Any:
+        asked["fit"] = objective, start, refresh
+        return fitted
+
+    def clean(bench: Bench, nominal: Any) -> Any:
+        asked.setdefault("seen", []).append([k for k, y in enumerate(bench.measured) if np.isfinite(y).any()])
+        return bench, ["a spike"]
+
+    monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: day)
+    monkeypatch.setattr(pipeline, "predicted", lambda twin, bench, trials: [bench.measured[k] - off for k in trials])
+    monkeypatch.setattr(pipeline, "without_spikes", clean)
+    monkeypatch.setattr(pipeline, "objective_of", lambda bench, twin, trials, settings: ("start", "objective", []))
+    monkeypatch.setattr(pipeline, "fit", fit)
+    found, error, notices = pipeline.calibration(None, SimpleNamespace(robot=None))  # type: ignore[arg-type]
+    assert found is fitted
+    assert asked["fit"] == ("objective", "start", True)
+    open_, sealed = asked["seen"]
+    assert sorted(open_ + sealed) == list(range(6))
+    assert len(sealed) == 2
+    assert error == "2.000 mm"
+    assert notices == (*day.notices, "a spike")

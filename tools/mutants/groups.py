@@ -79,7 +79,7 @@ GROUPS = {
     "words": _stage("words", "tests/test_stages.py", "tests/test_describe.py", "-k", WORDS),
     "objective": _stage("objective", "tests/test_stages.py"),
     "pipeline": _stage("pipeline", "tests/test_stages.py", "tests/test_pipeline.py"),
-    "thresholds": _stage("thresholds"),
+    "thresholds": _stage("thresholds", "tests/test_thresholds.py", "tests/test_describe.py", "-k", f"row or number or {PLACES}"),
     "between": Group(
         tuple(f"twin/diagnose/{name}.py" for name in ("look", "doubts", "conclusion", "study")), ("tests/test_stages.py",)
     ),
@@ -87,7 +87,7 @@ GROUPS = {
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
     "patches": Group(("twin/measurements/patches.py",), ("tests/test_patches.py", "-k", "not alone")),
-    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", "error_bar or nothing")),
+    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", "made_of or nothing or made_its or grows")),
     "align": Group(
         ("twin/shape/align*.py", "twin/shape/cloud_fit.py", "twin/shape/sensor_fit.py"),
         ("tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "alignment or aligned or clouds"),
@@ -100,7 +100,10 @@ GROUPS = {
         ("twin/shape/*.py", "twin/soft/skin.py"),
         ("tests/test_shape_parts.py", "tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "not align"),
     ),
-    "tip": Group(("twin/control/tip.py",), ("tests/test_control.py", "-k", "surface or tracked or knows_of")),
+    "tip": Group(
+        ("twin/control/tip.py",),
+        ("tests/test_control.py", "-k", "surface or tracked or knows_of or tip_of_an_arc or off_by_is_taken"),
+    ),
     "control": Group(("twin/control/*.py",), ("tests/test_control.py", "tests/test_shape_control.py", "-k", CONTROL)),
     "tasks": Group(("twin/tasks/*.py",), ("tests/test_tasks.py", "-k", "judged or nothing or lists")),
     "kinematics": Group(("twin/kinematics/*.py",), ("tests/test_kinematics.py",)),
