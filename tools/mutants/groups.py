@@ -20,7 +20,7 @@ class Group:
 LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks or parameters_have"
 CONTROL = "not tracked and not less_of and not foreseen and not knows_of and not examples and not thousand and not takes_up"
 PLACES = "place_in_words or a_tip_alone or three_markers or bend or have_no_say"
-WORDS = "told or said or nearest or wave or a_step_is"
+WORDS = "told or said or nearest or wave or a_step_is or drift_between"
 IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
 
 

@@ -46,7 +46,8 @@ def inputs(case: Case) -> Iterator[Suspicion]:
         for k in few:
             along = other[k][:, columns] - case.predicted[k][:, columns]
             r = np.nan_to_num(case.bench.measured[k][:, columns] - case.predicted[k][:, columns])
-            share = (r * along).sum(axis=1) / (along**2).sum(axis=1)
+            size = (along**2).sum(axis=1)
+            share = np.divide((r * along).sum(axis=1), size, out=np.zeros(len(r)), where=size > 0.0)
             whole.append(r)
             rest.append(r - share[:, None] * along)
         if rms(np.concatenate(rest)) < EXPLAINED * rms(np.concatenate(whole)):
