@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from tests.conftest import Day
 from twin.bench import Bench, prepare
@@ -17,6 +18,7 @@ from twin.errors import TwinError
 from twin.kinematics import LoadedRobot
 from twin.robots import load
 from twin.shape import TensionShape
+from twin.shape.tensions import UNMODELLED
 from twin.twin import Twin
 
 
@@ -122,6 +124,26 @@ def test_the_filter_finds_the_payload_that_made_its_readings() -> None:
     for tension in pulls:
         told = heavier.pull(tension).markers - plain.pull(tension).markers
     np.testing.assert_allclose(lead, told, atol=2e-6)  # two solves within 1e-7 rad; no friction to remember the way
+
+
+@pytest.mark.parametrize("there", [0.022, 0.03])
+def test_between_belief_and_reading_the_filter_finds_the_likeliest_payload(there: float) -> None:
+    """By displacements good for a millimetre, of which 10 g are worth about as much: the least of the sum of both squares."""
+    twin, loads = Twin(load("continuum")), Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
+    tension, noise = np.array([1.6, 0.5, 0.1]), float(np.hypot(1e-3, UNMODELLED))
+
+    def shown(payload: float) -> np.ndarray:
+        return LoadedRobot(twin, replace(loads, payload=payload)).pull(tension).displacement
+
+    measured = shown(there)
+
+    def unlikely(x: float) -> float:
+        return x**2 + float((((measured - shown(0.01 + 0.01 * x)) / noise) ** 2).sum())
+
+    best = minimize_scalar(unlikely, bounds=(-1.0, 3.0), method="bounded", options={"xatol": 1e-4}).x
+    assert 0.2 < abs(best) < 0.9 * abs(there - 0.01) / 0.01, "neither alone decides"
+    found = TensionShape(twin, loads, {"payload": 0.01}, displacement_noise=1e-3).update(tension, measured).found["payload"][0]
+    assert found == pytest.approx(0.01 + 0.01 * best, abs=8e-4)  # kg: slopes are taken over a standard deviation, 10 g
 
 
 def test_without_a_doubt_it_is_the_robot_itself() -> None:

@@ -87,7 +87,7 @@ GROUPS = {
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
     "patches": Group(("twin/measurements/patches.py",), ("tests/test_patches.py", "-k", "not alone")),
-    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", "made_of or nothing or made_its or grows")),
+    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", "made_of or nothing or made_its or grows or likeliest")),
     "align": Group(
         ("twin/shape/align*.py", "twin/shape/cloud_fit.py", "twin/shape/sensor_fit.py"),
         ("tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "alignment or aligned or clouds"),
