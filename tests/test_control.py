@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +13,13 @@ from tools.examples import circle, heat
 from tools.tracking import KNOWN, LENGTH, RADIUS, Bench, Run, attempt, controller, track, unknown
 from twin.bench import ROOM
 from twin.control import PI, RBF, Guard, PlainLoop, TensionLoop
+from twin.control import tip as tip_module
 from twin.control.guard import loop_temperatures
 from twin.control.paths import on_surface, paths
 from twin.control.tension import passive
-from twin.control.tip import bent
-from twin.effects import named
+from twin.control.tip import TipController, bent
+from twin.effects import Loads, named
+from twin.kinematics import LoadedRobot
 from twin.robots import load
 from twin.springs import pull
 from twin.springs.force import piece
@@ -300,6 +303,36 @@ def test_it_knows_of_the_robot_what_its_sensors_say() -> None:
         np.testing.assert_array_equal(again.step(wanted, tension, displacement, 0.05), voltage)
     assert len(seen) > 100
     assert unknown() != KNOWN
+
+
+@pytest.mark.parametrize("bend", [(0.0, 0.0), (3e-7, -5e-7), (2e-6, 1e-6), (0.4, -0.3), (0.0, 1.2)])
+def test_the_tip_of_an_arc_is_its_integral(bend: tuple[float, float]) -> None:
+    """Of a rod of 0.12 m, from the base up: its direction turns evenly towards the bend."""
+    theta, s = float(np.hypot(*bend)), (np.arange(2000) + 0.5) / 2000
+    aside = np.array(bend) / max(theta, 1e-300)
+    along = np.column_stack([np.sin(theta * s)[:, None] * aside, np.cos(theta * s)])
+    np.testing.assert_allclose(bent(np.array(bend), 0.12), 0.12 * along.mean(axis=0), rtol=1e-6, atol=1e-15)
+
+
+@pytest.mark.parametrize("reset", [None, 4.0])
+def test_what_the_model_is_off_by_is_taken_from_where_it_is_sent(reset: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """tip* = wanted later + v + (tip of the model - tip estimated); without shape feedback the model is believed."""
+    aims: list[np.ndarray] = []
+    robot = TipController(KNOWN, Loads(np.array([0.0, 0.0, 9.81])), SimpleNamespace(step=lambda target, *seen: target), reset=reset)  # type: ignore[arg-type]
+    monkeypatch.setattr(
+        tip_module, "inverse", lambda robot, aim, **limits: aims.append(aim) or SimpleNamespace(tension=limits["resting"])
+    )
+    tension = np.array([2.0, 1.9, 1.9])
+    told = LoadedRobot(KNOWN, Loads(np.array([0.0, 0.0, 9.81]))).pull(tension)
+    further = told.displacement + robot.robot.levers[0] @ np.array([0.05, 0.0])  # bent by 0.05 rad more towards +x than it knows
+    wanted, later = np.array([0.01, 0.0, 0.11]), np.array([0.012, 0.001, 0.11])
+    robot.step(wanted, tension, further, 0.05, ahead=later)
+    robot.age = np.inf
+    robot.step(wanted, tension, further, 0.05)
+    off = 0.0 if reset is None else 0.5 * 0.12 * 0.05  # m: half the length times the bend
+    for aim, sent in zip(aims, (later, wanted), strict=True):
+        assert (aim - sent - robot.sum)[0] == pytest.approx(-off, abs=0.15 * 0.003)  # a bend of 0.05 rad on top of some 0.1
+    assert (robot.tip - told.tip)[0] == pytest.approx(off, abs=0.15 * 0.003)
 
 
 def test_the_examples_write_their_pages(tmp_path: Path) -> None:

@@ -258,6 +258,9 @@ REFUSED = {
     "half a piece": ({"pieces": 1.5}, {}, (), ["pieces", "1.5"]),
     "a strip described as a wire": ({"section": "other"}, {}, (), ["youngs_modulus", "section", "missing: backbone.bending_x"]),
     "turns of one disk": ({}, {"holes__turn": ([[1.0], [2.0], [3.0]], "deg")}, (), ["holes.turn", "1 numbers", "list of 8"]),
+    "turns that all tendons share": (
+        {}, {"holes__turn": (TURN[0].tolist(), "deg")}, (), ["holes.turn", "list of 3", "each a list of one a disk"],
+    ),
     "turns of two tendons": ({}, {"holes__turn": (TURN[:2].tolist(), "deg")}, (), ["holes.turn", "list of 3"]),
     "turns without unit": ({}, {"holes__turn": (TURN.tolist(), "1")}, (), ["holes.turn", "deg"]),
     "a hole in the wire": ({}, {"holes__outward": ((OUTWARD * 3).tolist(), "mm")}, (), ["tendon 1 at disk 8", "-1.6 mm", "0.4 mm"]),

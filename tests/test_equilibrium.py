@@ -136,13 +136,15 @@ def test_a_tip_force_bends_it_as_a_cantilever() -> None:
     np.testing.assert_allclose(tip, [0, force * LENGTH**3 / (3 * EI), LENGTH], rtol=0, atol=1.5e-7)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("height", [0.5, 1.0])
-def test_a_push_on_a_disk_bends_it_as_a_cantilever(height: float) -> None:
+def test_a_push_on_a_disk_bends_it_as_a_cantilever(height: float, axis: int) -> None:
     force, a = 1e-4, height * LENGTH
-    loads = Loads(NOWHERE, push=Push(np.array([0.0, force, 0.0]), height))
+    loads = Loads(NOWHERE, push=Push(force * np.eye(3)[axis], height))
     tip = tips(solver().solve(Problem(np.zeros(1), np.zeros((1, 3)), loads, tolerance=EXACT)))[0]
     # m, under the tip force's tolerance: F a^2 (3 L - a) / (6 EI), 37 um at the tip
-    np.testing.assert_allclose(tip, [0.0, force * a**2 * (3.0 * LENGTH - a) / (6.0 * EI), LENGTH], rtol=0, atol=1.5e-7)
+    away = force * a**2 * (3.0 * LENGTH - a) / (6.0 * EI)
+    np.testing.assert_allclose(tip, away * np.eye(3)[axis] + [0.0, 0.0, LENGTH], rtol=0, atol=1.5e-7)
 
 
 def test_a_push_on_the_tip_s_disk_is_a_force_at_the_tip() -> None:

@@ -15,6 +15,7 @@ from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.errors import TwinError
 from twin.kinematics import HeatedRobot, LoadedRobot, inverse
+from twin.kinematics.inverse import _enclosed
 from twin.robots import load
 from twin.twin import Twin
 
@@ -221,6 +222,49 @@ def test_a_soft_robot_is_one_of_a_softer_material() -> None:
     tip = warm.shape().tip
     for robot in (warm, other):
         robot.rest()
+    resting = np.array([0.3, 0.4, 0.6])
+    further = warm.pull(np.array([0.9, 2.0, 0.6])).tip
+    warm.rest()
+    some = [inverse(robot, further, resting=resting).tension for robot in (warm, other)]
+    for found in some:
+        assert found == pytest.approx([0.9, 2.0, 0.6], abs=0.02)  # one answer: the third tendon keeps what it rests at
     answers = [inverse(robot, tip) for robot in (warm, other)]
     np.testing.assert_allclose(answers[0].tension, answers[1].tension, atol=2e-3)  # N: 1e-5 m where 1 N moves centimetres
     assert answers[0].tension == pytest.approx([0.5, 2.0, 0.0], abs=0.05)
+
+
+def test_a_straight_tendons_lever_is_its_holes_place() -> None:
+    """By which it shortens and by which it moves the tip; and one newton per EI / (L r) of bend."""
+    robot = LoadedRobot(PLAIN, HANGING)
+    v = {p.name: p.value for p in load("continuum").parameters}
+    angle = np.array([v[f"tendons.angle_{t}"] for t in (1, 2, 3)])
+    hole = v["tendons.radius"] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for lever in robot.levers:
+        np.testing.assert_allclose(lever, hole, atol=1e-12)
+    np.testing.assert_allclose(robot.directions, angle, atol=1e-6)
+    bending = v["backbone.youngs_modulus"] * np.pi * v["backbone.radius"] ** 4 / 4
+    assert robot.pull_per_bend == pytest.approx(bending / (robot.length * v["tendons.radius"]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "direction", "inside"),
+    [
+        (0, 120, 30, 30),
+        (0, 120, 100, 20),
+        (0, 120, 150, -30),
+        (0, 120, -20, -20),
+        (300, 60, 350, 50),
+        (300, 60, 100, -40),
+        (240, 0, 250, 10),
+    ],
+)
+def test_how_far_inside_a_sector_a_direction_lies(a: float, b: float, direction: float, inside: float) -> None:
+    """In degrees; also of sectors that pass zero."""
+    assert np.degrees(_enclosed(*np.radians([a, b, direction]))) == pytest.approx(inside)
+
+
+def test_a_heated_robot_is_shown_as_a_trial_of_one_sample() -> None:
+    robot = HeatedRobot(PLAIN, HANGING)
+    path = robot.path()
+    assert [len(x) for x in (path.status, path.q, path.tension, path.markers, path.path, path.others["temperature"])] == [1] * 6
+    np.testing.assert_array_equal(path.markers[0][:8], robot.shape().markers[:8])

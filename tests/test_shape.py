@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from tests.conftest import Day
 from twin.bench import Bench, prepare
@@ -17,6 +18,7 @@ from twin.errors import TwinError
 from twin.kinematics import LoadedRobot
 from twin.robots import load
 from twin.shape import TensionShape
+from twin.shape.tensions import UNMODELLED
 from twin.twin import Twin
 
 
@@ -101,3 +103,56 @@ def test_the_error_bar_is_made_of_doubts_and_load_cells() -> None:
     np.testing.assert_allclose(bar(0.05, 1e-9), cells, rtol=1e-3, atol=2e-7)  # m: curvature of 0.01 N; solves within 1e-7 rad
     np.testing.assert_allclose(bar(1e-9, 0.005), doubts, atol=5e-7)
     np.testing.assert_allclose(bar(0.05, 0.005), np.hypot(cells, doubts), rtol=1e-3, atol=5e-7)
+
+
+def test_the_filter_finds_the_payload_that_made_its_readings() -> None:
+    """10 +- 10 g believed, 24 g there: 1.4 standard deviations, so that its robots are given what it finds on the way."""
+    twin, loads = Twin(load("continuum")), Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
+    built = LoadedRobot(twin, replace(loads, payload=0.024))
+    sense = TensionShape(twin, loads, {"payload": 0.01})
+    pulls = np.array([[1.6, 0.5, 0.1], [2.0, 0.3, 0.2], [0.4, 1.8, 0.2], [0.3, 0.4, 2.2]])
+    for tension in pulls:
+        true = built.pull(tension)
+        found = sense.update(tension, true.displacement)
+    assert found.found["payload"][0] == pytest.approx(0.024, abs=3e-4)  # 54 um of a tendon's travel is worth 0.5 g
+    np.testing.assert_allclose(found.markers, true.markers, atol=3e-4)
+    assert sense.robot.loads.payload + 0.0 == 0.01, "as given"
+    assert sense.centre[0] == pytest.approx(0.024, abs=0.25 * 0.01), "and carried by the robots"
+    lead = sense.sisters[0].shape().markers - sense.robot.shape().markers
+    heavier = LoadedRobot(twin, replace(loads, payload=sense.centre[0] + 0.01))
+    plain = LoadedRobot(twin, replace(loads, payload=sense.centre[0]))
+    for tension in pulls:
+        told = heavier.pull(tension).markers - plain.pull(tension).markers
+    np.testing.assert_allclose(lead, told, atol=2e-6)  # two solves within 1e-7 rad; no friction to remember the way
+
+
+@pytest.mark.parametrize("there", [0.022, 0.03])
+def test_between_belief_and_reading_the_filter_finds_the_likeliest_payload(there: float) -> None:
+    """By displacements good for a millimetre, of which 10 g are worth about as much: the least of the sum of both squares."""
+    twin, loads = Twin(load("continuum")), Loads(np.array([0.0, -9.81, 0.0]), payload=0.01)
+    tension, noise = np.array([1.6, 0.5, 0.1]), float(np.hypot(1e-3, UNMODELLED))
+
+    def shown(payload: float) -> np.ndarray:
+        return LoadedRobot(twin, replace(loads, payload=payload)).pull(tension).displacement
+
+    measured = shown(there)
+
+    def unlikely(x: float) -> float:
+        return x**2 + float((((measured - shown(0.01 + 0.01 * x)) / noise) ** 2).sum())
+
+    best = minimize_scalar(unlikely, bounds=(-1.0, 3.0), method="bounded", options={"xatol": 1e-4}).x
+    assert 0.2 < abs(best) < 0.9 * abs(there - 0.01) / 0.01, "neither alone decides"
+    found = TensionShape(twin, loads, {"payload": 0.01}, displacement_noise=1e-3).update(tension, measured).found["payload"][0]
+    assert found == pytest.approx(0.01 + 0.01 * best, abs=8e-4)  # kg: slopes are taken over a standard deviation, 10 g
+
+
+def test_without_a_doubt_it_is_the_robot_itself() -> None:
+    """And the error bar that of its load cells, displacements or none."""
+    twin, loads = Twin(load("continuum")), Loads(np.array([0.0, -9.81, 0.0]))
+    tension, sense = np.array([1.6, 0.5, 0.1]), TensionShape(twin, loads, {})
+    told = LoadedRobot(twin, loads).pull(tension)
+    for displacement in (None, told.displacement + 1e-3):
+        seen = sense.update(tension, displacement)
+        np.testing.assert_allclose(seen.markers, told.markers, atol=1e-9)
+        assert seen.std.max() > 1e-6
+        assert seen.found == {}

@@ -17,7 +17,7 @@ from twin.errors import DataError, TwinError
 from twin.measurements import Recording, read
 from twin.robots import load
 from twin.shape.align import Aligned, align
-from twin.shape.align_report import bands_of, write_alignment
+from twin.shape.align_report import bands_of, lines, write_alignment
 from twin.shape.constant_curvature import ConstantCurvature
 from twin.shape.drift import steadied
 from twin.shape.estimator import Z90, Estimator, Felt, estimator, estimators
@@ -41,7 +41,11 @@ def day() -> Recording:
 
 @pytest.fixture(scope="module")
 def aligned(day: Recording) -> Aligned:
-    return align(day, Twin.of(load("finger")))
+    told: list[str] = []
+    found = align(day, Twin.of(load("finger")), told.append)
+    steps = ("turning the finger onto its clouds", "sweep 1", "sweep 2", "bands under the hand")  # some seconds each
+    assert [s in t for s, t in zip(steps, told, strict=True)] == [True] * 4
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +87,13 @@ def test_alignment_is_read_back(aligned: Aligned, tmp_path: Path) -> None:
     assert read_twin(tmp_path / "al").values == pytest.approx(dict(aligned.twin.values))
     assert json.loads((tmp_path / "al/alignment.json").read_text())["cloud_frames"] == aligned.frames
     assert bands_of(str(tmp_path / "al")) == aligned.bands
+    text = lines(aligned)
+    assert (
+        f" {1e3 * aligned.before:.3f} mm (root mean square) from the visible skin before, {1e3 * aligned.after:.3f} mm after"
+        in text[1 + len(aligned.fitted)]
+    )
+    angle = aligned.fitted["mounting.angle"]
+    assert text[1].split()[:4] == ["mounting.angle", f"{np.degrees(angle.value):.4g}", "+-", f"{np.degrees(angle.std or 0.0):.2g}"]
     assert (aligned.bands.by.keys(), aligned.bands.hands) == (estimators().keys(), ("hand, force unknown",))
 
 

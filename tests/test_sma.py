@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -352,3 +353,21 @@ def test_a_current_driven_set_is_simulated_from_the_command_line(tmp_path: Path)
             # A tenth more than the instrument's: the readings that drive the twin are noisy too. Tensions feel those most.
             most = (2.0 if channel.kind == "tendon_tension" else 1.2) * (channel.noise or 0.0)
             assert np.sqrt(np.nanmean(error**2)) < most, channel.name
+
+
+@pytest.mark.parametrize("name", ["sma_cooling", "sma_hysteresis"])
+def test_fits_of_springs_begin_on_both_sides_of_their_description(name: str) -> None:
+    """Of what springs share: about as far below as above, or a fit that may go either way only ever looks one way."""
+    law = named(name)
+    off = {p.name: p.value for p in law.parameters}
+    heated = SimpleNamespace(by_current=np.ones((1, 3), bool))
+    away: dict[str, list[float]] = {}
+    for start in law.starts([heated], 1):  # type: ignore[list-item]
+        for parameter, value in start.values.items():
+            away.setdefault(parameter, []).append(value - off[parameter])
+    assert away
+    for parameter, sides in away.items():
+        above, below = max(sides), -min(sides)
+        assert above > 0.0 < below, parameter
+        assert 1.0 / 1.5 < above / below < 1.5, parameter
+    assert not list(law.starts([SimpleNamespace(by_current=np.zeros((1, 3), bool))], 1))  # type: ignore[list-item]

@@ -53,7 +53,7 @@ Each number is an entry `"name" = {{ value = ..., unit = "...", source = "..." }
 
 | key | meaning |
 |---|---|
-| `value` | a number; or a list with one number for each (disk, tendon, ...), from base to tip |
+| `value` | a list with one number for each (disk, tendon, ...), fitted one by one; or one for all, fitted as one |
 | `unit` | the unit of `value`, `std`, `low` and `high` |
 | `source` | where the number comes from |
 | `std` | one standard deviation of what a built robot may differ by; such numbers are fitted to data. Left out: exact |

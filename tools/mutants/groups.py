@@ -17,9 +17,11 @@ class Group:
         return any(fnmatch(file, pattern) for pattern in self.modules)
 
 
-LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks or parameters_have"
+LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks or parameters_have or begin_on_both"
 CONTROL = "not tracked and not less_of and not foreseen and not knows_of and not examples and not thousand and not takes_up"
 PLACES = "place_in_words or a_tip_alone or three_markers or bend or have_no_say"
+WORDS = "told or said or nearest or wave or a_step_is or drift_between"
+TENSIONS = "made_of or nothing or made_its or grows or likeliest"
 IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
 
 
@@ -35,6 +37,7 @@ GROUPS = {
             "tests/test_conformance.py",
             "tests/test_effects.py",
             "tests/test_transmission_error.py",
+            "tests/test_sma.py",
             "-k",
             LAWS,
         ),
@@ -75,11 +78,18 @@ GROUPS = {
     "experiment": _stage("experiment"),
     "weigh": _stage("weigh", "tests/test_weigh.py", "tests/test_choose.py"),
     "describe": _stage("describe", "tests/test_describe_stage.py"),
+    "words": _stage("words", "tests/test_stages.py", "tests/test_describe.py", "-k", WORDS),
+    "objective": _stage("objective", "tests/test_stages.py"),
+    "pipeline": _stage("pipeline", "tests/test_stages.py", "tests/test_pipeline.py"),
+    "thresholds": _stage("thresholds", "tests/test_thresholds.py", "tests/test_describe.py", "-k", f"row or number or {PLACES}"),
+    "between": Group(
+        tuple(f"twin/diagnose/{name}.py" for name in ("look", "doubts", "conclusion", "study")), ("tests/test_stages.py",)
+    ),
     "budget": _stage("budget", "tests/test_search.py", "-k", "time_is_up"),
     "seal": _stage("seal"),
     "rigs": _stage("rigs", "tests/test_rigs.py", "-k", "second_robot or fifth or all_possible"),
     "patches": Group(("twin/measurements/patches.py",), ("tests/test_patches.py", "-k", "not alone")),
-    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", "error_bar or nothing")),
+    "tensions": Group(("twin/shape/tensions.py",), ("tests/test_shape.py", "-k", TENSIONS)),
     "align": Group(
         ("twin/shape/align*.py", "twin/shape/cloud_fit.py", "twin/shape/sensor_fit.py"),
         ("tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "alignment or aligned or clouds"),
@@ -92,10 +102,21 @@ GROUPS = {
         ("twin/shape/*.py", "twin/soft/skin.py"),
         ("tests/test_shape_parts.py", "tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "not align"),
     ),
-    "tip": Group(("twin/control/tip.py",), ("tests/test_control.py", "-k", "surface or tracked or knows_of")),
+    "tip": Group(
+        ("twin/control/tip.py",),
+        ("tests/test_control.py", "-k", "surface or tracked or knows_of or tip_of_an_arc or off_by_is_taken"),
+    ),
     "control": Group(("twin/control/*.py",), ("tests/test_control.py", "tests/test_shape_control.py", "-k", CONTROL)),
     "tasks": Group(("twin/tasks/*.py",), ("tests/test_tasks.py", "-k", "judged or nothing or lists")),
     "kinematics": Group(("twin/kinematics/*.py",), ("tests/test_kinematics.py",)),
+    "antagonists": Group(("twin/equilibrium/antagonists.py",), ("tests/test_transmission.py", "-k", "not diagnosis")),
+    "compiled": Group(
+        tuple(f"twin/equilibrium/{name}.py" for name in ("linear", "elastic", "hyperelastic")),
+        ("tests/test_compiled_parts.py", "tests/test_balance.py"),
+    ),
+    "chain": Group(
+        ("twin/equilibrium/__init__.py",), ("tests/test_balance.py", "tests/test_equilibrium.py", "tests/test_lengths.py")
+    ),
     "equilibrium": Group(
         ("twin/equilibrium/*.py",), ("tests/test_balance.py", "tests/test_equilibrium.py", "tests/test_lengths.py")
     ),

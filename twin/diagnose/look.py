@@ -11,6 +11,7 @@ from twin.diagnose.diagnosis import Settings
 from twin.diagnose.split import split
 from twin.diagnose.study import Progress, silent
 from twin.diagnose.suspicions import Suspicion, suspicions
+from twin.diagnose.suspicions.case import beginnings
 from twin.diagnose.thresholds import FEW
 from twin.errors import SolveError
 from twin.twin import Twin, readings, report, simulate, unstable_starts
@@ -33,6 +34,7 @@ def looked_at(bench: Bench, twin: Twin, settings: Settings, progress: Progress =
     sealed = split(bench, settings.seed)[1] if len(bench.inputs) >= FEW else []
     progress("nominal prediction")
     try:
+        simulate(twin, beginnings(bench))
         traces = simulate(twin, bench)
     except SolveError as error:
         found = suspicions(bench, twin, sealed, None)

@@ -88,6 +88,10 @@ OTHER_ROBOT = _row(
 ROUNDING = _row("ROUNDING", 1.0, "s", "a start written in whole seconds is no overlap", "derivation: one unit")
 COARSE = _row("COARSE", 100.0, "s", "between readings: a tenth of a second in ms", "derivation: 1000 x 0.1 s")
 DAY_LONG = _row("DAY_LONG", 7200.0, "s", "a trial of more than two hours is rare, of seven seconds in ms usual", "judgement")
+SESSION = _row(
+    "SESSION", 259200.0, "s", "three days: a session of more than four minutes in ms is longer, one of slow trials is not",
+    "derivation: 1000 x 259 s",
+)  # fmt: skip
 HASTY = _row("HASTY", 0.2, "s", "no tendon-driven robot is moved and read in less", "derivation: a mode of 5 Hz")
 HUNDREDS = _row(
     "HUNDREDS", 30.0, "ratio", "between this and its inverse no unit is off by a thousand", "derivation: the root of 1000"
@@ -102,6 +106,7 @@ EXPLAINED = _row("EXPLAINED", 0.5, "of an error", "as FITS: what one pattern mus
 NOISY = _row(
     "NOISY", 30.0, "ratio", "of scatter to declared noise: heavy tails and an error of the model make a factor of three", CLEAN
 )  # fmt: skip
+MISSED = _row("MISSED", 0.2, "of the motion", "that a robot as described gets wrong of one as built, as FITS has it", CLEAN)
 QUIET = _row("QUIET", 30.0, "ratio", "of declared noise to scatter: a slow error may be ten times the scatter", "judgement")
 DROWNED = _row("DROWNED", 10.0, "ratio", "of declared noise to all that the description leaves", "judgement: a factor of 1000")
 WORKABLE = (

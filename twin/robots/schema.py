@@ -167,7 +167,8 @@ def _flat(value: object, shape: tuple[str, ...], counts: Mapping[str, int]) -> l
     needed = counts.get(kind)
     if not isinstance(value, list) or (len(value) < 2 if needed is None else len(value) != needed):
         came = f"{len(value)} numbers" if isinstance(value, list) else shown(value)
-        raise DataError(f"value is {came}; a list of {needed or 'two or more'} is needed, one a {kind}")
+        each = f"one a {kind}" if len(shape) == 1 else f"one a {kind}, each a list of one a {' of one a '.join(shape[1:])}"
+        raise DataError(f"value is {came}; a list of {needed or 'two or more'} is needed, {each}")
     deeper = (_flat(each, shape[1:], counts) for each in value)
     return list(itertools.chain.from_iterable([((k, *i), v) for i, v in found] for k, found in enumerate(deeper, 1)))
 

@@ -60,7 +60,8 @@ def robot_text(name: str, robot: Robot) -> str:
     head = [
         f"# {name}: replace every number by your robot's, and say in `source` where it comes from.",
         "# `std` marks what a built robot may differ in (one standard deviation, same unit): those are fitted to data.",
-        "# `low` and `high` are hard bounds. A list has one number for each; where one number may stand for all, write it alone.",
+        "# `low` and `high` are hard bounds. A list has one number for each, fitted one by one; a number alone, where it may stand",
+        "# for all, is fitted as one: of disks that are built unlike each other what is left then passes for a missing effect.",
         "#", *(f"#  {line}".rstrip() for line in schema.picture.splitlines()),
         *toml_lines({"format": FORMAT, "family": robot.family, "title": f"{name}, described by its builder"}), "", "[structure]",
     ]  # fmt: skip

@@ -72,7 +72,7 @@ class TensionShape:
         if displacement is not None:
             self._learn(np.asarray(displacement, float))
         shape, leads = self.robot.shape(), [sister.shape() for sister in self.sisters]
-        Y = np.array([s.markers - shape.markers for s in leads]).reshape(len(leads), -1)
+        Y = np.array([s.markers - shape.markers for s in leads]).reshape(len(leads), shape.markers.size)
         G = self.robot.gradient().reshape(len(tension), -1)
         variance = np.einsum("ki,kl,li->i", Y, self.P, Y) + self.tension_noise**2 * (G**2).sum(axis=0)
         markers = shape.markers + (self.x @ Y).reshape(shape.markers.shape)
@@ -86,7 +86,8 @@ class TensionShape:
         x, P = self.x, self.P + FORGET * np.eye(len(self.P))
         for _ in range(ROUNDS):
             predicted = self.robot.shape().displacement
-            D = np.array([s.shape().displacement - predicted for s in self.sisters]).T[seen]
+            leads = [s.shape().displacement - predicted for s in self.sisters]
+            D = np.array(leads).reshape(len(leads), len(predicted)).T[seen]
             S = D @ P @ D.T + self.noise**2 * np.eye(len(D))
             K = np.linalg.solve(S, D @ P).T
             self.x = x + K @ ((measured - predicted)[seen] - D @ x)

@@ -36,7 +36,7 @@ TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
 LAST: tuple[Kind, ...] = (
     units.commands,
     described.parameters,
-)  # thousandfold loads take long to solve: where nothing else explains
+)  # thousandfold loads: where nothing else explains, or the robot as described has no equilibrium
 UNREADABLE = tuple(units.KINDS.values())  # readings in a wrong unit say nothing of loads
 
 
@@ -48,11 +48,20 @@ def suspicions(bench: Bench, twin: Twin, sealed: Sequence[int], nominal: Sequenc
     """
     case = Case(blind(bench, sealed), twin, nominal)
     found = [s for kind in SEEN for s in kind(case)]
-    if not any(s.kind in UNREADABLE and s.group == case.group for s in found):
-        found += [s for kind in TRIED for s in kind(case.thinned())]
+
+    def explained() -> bool:
+        return any(s.group == case.group for s in found)
+
+    def tried(kinds: Sequence[Kind]) -> list[Suspicion]:
+        return [s for kind in kinds for s in kind(case.thinned())]
+
+    if nominal is not None and not any(s.kind in UNREADABLE and s.group == case.group for s in found):
+        found += tried(TRIED)
     for kind in LAST:
-        if not any(s.group == case.group for s in found):
-            found += kind(case.thinned())
+        if not explained():
+            found += tried([kind])
+    if nominal is None and not explained():  # what has no equilibrium is sooner off by a thousand than turned or exchanged
+        found += tried(TRIED)
     return tuple(s for s in found if s.left <= AS_GOOD * min(o.left for o in found if o.group == s.group))
 
 
