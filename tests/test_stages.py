@@ -18,6 +18,7 @@ from twin.diagnose.conclusion import Conclusion
 from twin.diagnose.doubts import strained, unlikely
 from twin.diagnose.evidence import COMPONENTS, Discrepancy
 from twin.diagnose.look import looked_at
+from twin.diagnose.loops import loops
 from twin.diagnose.null import Thresholds
 from twin.diagnose.objective import sensitivity
 from twin.diagnose.rigs import Rigs
@@ -275,6 +276,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(plan: Benc
         assert found.nominal == tuple(f"readings of {i.name}" for i in day.inputs)
         assert found.bench.notices == (*day.notices, f"{day.inputs[1].name}: unstable start, its shape is one of several")
         assert found.suspicions == ("odd",)
+        assert found.loops.each == tuple(loop for loop in loops(day).each if loop.trial not in found.sealed)
     assert told == ["nominal prediction", "what the files may mean otherwise"] * 2
 
 
@@ -328,7 +330,7 @@ def test_fewer_than_six_trials_are_each_sealed_in_turn_and_share_the_time(plan: 
     assert parts == [(f"without [{k}]", [k]) for k in range(5)]
     assert few_trials.told[1] == "5 trials, each sealed in turn and the others diagnosed, 2 of 5: at work"
     assert few_trials.told[-1] == "all 5 trials: at work"
-    assert few_trials.heard == [("odd",)]
+    assert [looked.suspicions for looked in few_trials.heard] == [("odd",)]
     few_trials.run(None)
     assert few_trials.asked[-1] == ([], None)
 

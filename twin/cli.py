@@ -57,7 +57,7 @@ class Diagnose:
             raise DataError(f"{self.out} is a file; give a folder for the report with --out")
         settings = Settings(self.seed, self.jobs, _seconds(self.budget))
         with working(f"diagnosing {recording.title}") as progress:
-            diagnosis = diagnose(recording, twin, settings, progress, lambda s: out.print(report.suspected(s)) if s else None)
+            diagnosis = diagnose(recording, twin, settings, progress, lambda seen: out.print(report.beforehand(seen)))
             progress("writing the report")
             report.write(diagnosis, self.out, report.provenance(recording, settings, command_line()))
         out.print(report.console(diagnosis))

@@ -97,7 +97,7 @@ def test_two_effects_share_a_sentence():
 
 
 def test_a_loop_is_told_in_millimetres_with_its_sign_and_noise():
-    words = loop_words(diagnosis())
+    words = loop_words(diagnosis().loops)
     assert "release and pull differ by 2.00 mm (disk_8, 2 trials, noise 0.01 mm); the robot lags" in words
     assert "look alike" not in words
     assert advice(diagnosis()) is None
@@ -106,17 +106,17 @@ def test_a_loop_is_told_in_millimetres_with_its_sign_and_noise():
 def test_a_loop_that_time_could_make_asks_for_another_order():
     once = Loops("marker", "disk_8", (Loop(0, -2e-3, 2e-5, 40, None), Loop(1, -1e-3, 2e-5, 40, None)))
     d = diagnosis("noise", loops=once)
-    assert "differ by \N{MINUS SIGN}1.50 mm" in loop_words(d)
-    assert "the robot leads" in loop_words(d)
-    assert "friction, creep and drift look alike here" in loop_words(d)
+    assert "differ by \N{MINUS SIGN}1.50 mm" in loop_words(d.loops)
+    assert "the robot leads" in loop_words(d.loops)
+    assert "friction, creep and drift look alike here" in loop_words(d.loops)
     assert (advice(d) or "").startswith("run circle_0 again with its pull interrupted")
 
 
 def test_a_loop_of_noise_is_none():
     still = Loops("marker", "disk_8", (Loop(0, 3e-5, 2e-5, 40, None),))
-    assert "differ by no more than noise (0.03 mm" in loop_words(diagnosis(loops=still))
+    assert "differ by no more than noise (0.03 mm" in loop_words(still)
     assert advice(diagnosis(loops=still)) is None
-    assert "cannot be compared" in loop_words(diagnosis(loops=Loops("marker", "disk_8", ())))
+    assert "cannot be compared" in loop_words(Loops("marker", "disk_8", ()))
 
 
 def test_numbers_follow_their_error():

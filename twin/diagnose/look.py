@@ -8,7 +8,8 @@ import numpy as np
 
 from twin.bench import Bench
 from twin.diagnose.diagnosis import Settings
-from twin.diagnose.split import split
+from twin.diagnose.loops import Loops, loops
+from twin.diagnose.split import blind, split
 from twin.diagnose.study import Progress, silent
 from twin.diagnose.suspicions import Suspicion, suspicions
 from twin.diagnose.suspicions.case import beginnings
@@ -20,12 +21,13 @@ from twin.twin import Twin, readings, report, simulate, unstable_starts
 @dataclass(frozen=True)
 class Looked:
     """The bench with notices of unstable starts, the sealed trials (none of fewer than `FEW`), the prediction (n_k, n_output) of
-    the twin as described, and the suspicions."""
+    the twin as described, the suspicions, and the loops of pulling and releasing in the trials that are not sealed."""
 
     bench: Bench
     sealed: tuple[int, ...]
     nominal: tuple[np.ndarray, ...]
     suspicions: tuple[Suspicion, ...]
+    loops: Loops
 
 
 def looked_at(bench: Bench, twin: Twin, settings: Settings, progress: Progress = silent) -> Looked:
@@ -43,4 +45,4 @@ def looked_at(bench: Bench, twin: Twin, settings: Settings, progress: Progress =
     unstable = tuple(f"{name}: unstable start, its shape is one of several" for name in unstable_starts(bench, traces))
     progress("what the files may mean otherwise")
     found = suspicions(bench, twin, sealed, nominal)
-    return Looked(replace(bench, notices=(*bench.notices, *unstable)), tuple(sealed), nominal, found)
+    return Looked(replace(bench, notices=(*bench.notices, *unstable)), tuple(sealed), nominal, found, loops(blind(bench, sealed)))

@@ -29,18 +29,17 @@ from twin.diagnose.search import search
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind, split
 from twin.diagnose.study import Progress, silent
-from twin.diagnose.suspicions import Suspicion
 from twin.diagnose.thresholds import FEW
 from twin.errors import DataError
 from twin.evaluate import UNIT, headline, rms
 from twin.measurements import Recording
 from twin.twin import Twin
 
-Hear = Callable[[Sequence[Suspicion]], None]
+Hear = Callable[[Looked], None]
 
 
-def unheard(found: Sequence[Suspicion]) -> None:
-    """Nobody listens; the suspicions stand in the diagnosis."""
+def unheard(looked: Looked) -> None:
+    """Nobody listens; all of it stands in the diagnosis."""
 
 
 def diagnose(
@@ -48,7 +47,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose a recording against a twin. Raises TwinError for data that cannot be used.
 
-    What the files may mean otherwise is told to `hear` before anything is fitted; no number depends on it.
+    What was seen before anything is fitted is told to `hear`: what the files may mean otherwise, and loops; no number depends on
+    it.
 
     About a quarter of the trials is sealed; of fewer than `FEW` trials each in turn, the claims coming from all of them.
     """
@@ -58,7 +58,7 @@ def diagnose(
     if n < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one sealed")
     looked = looked_at(bench, twin, settings, progress)
-    hear(looked.suspicions)
+    hear(looked)
     bench, nominal = looked.bench, looked.nominal
     if n >= FEW:
         found = conclude(bench, twin, looked.sealed, nominal, settings, progress)

@@ -12,10 +12,10 @@ numbers.py      values with units and errors, as people read them
 plots.py        the house style of the figures
 """
 
-from twin.report.console import console, suspected
+from twin.report.console import beforehand, console
 from twin.report.contents import contents
 from twin.report.provenance import provenance
 from twin.report.sentence import sentence
 from twin.report.write import write
 
-__all__ = ["console", "contents", "provenance", "sentence", "suspected", "write"]
+__all__ = ["beforehand", "console", "contents", "provenance", "sentence", "write"]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from twin.diagnose import Diagnosis, Suspicion
+from twin.diagnose import Diagnosis, Looked
 from twin.evaluate import KIND
 from twin.report.contents import experiment_words
 from twin.report.loops import loop_words
@@ -47,7 +45,7 @@ def console(diagnosis: Diagnosis) -> RenderableType:
             values = "\n".join(f"{n} = {plus_minus(f)}" for n, f in claim.parameters.items())
             effects.add_row(str(row["name"]), Text(values), str(row["probability"]), str(row["error"]))
         parts += [Text("effects in force", style="dim"), effects, Text("")]
-    parts += [Text(loop_words(d)), Text("")]
+    parts += [Text(loop_words(d.loops)), Text("")]
     if d.verdict in ("partly_explained", "unexplained"):
         parts.append(Text(d.description))
     if (words := experiment_words(d)) is not None:
@@ -60,10 +58,14 @@ def console(diagnosis: Diagnosis) -> RenderableType:
     return Group(*parts)
 
 
-def suspected(found: Sequence[Suspicion]) -> RenderableType:
-    """What the files may mean otherwise, each with the change that would remove it."""
-    said = [Text.assemble((f"{s.kind}: ", "bold"), f"{s.words}.\n  Change that would remove it: {s.change}.") for s in found]
-    return Group(Text("What the files may mean otherwise (nothing is repaired):", style="yellow"), *said, Text(""))
+def beforehand(looked: Looked) -> RenderableType:
+    """What was seen before any fit: what the files may mean otherwise, each with the change that would remove it, and loops."""
+    said: list[Text] = []
+    if looked.suspicions:
+        said = [Text("What the files may mean otherwise (nothing is repaired):", style="yellow")]
+        for s in looked.suspicions:
+            said.append(Text.assemble((f"{s.kind}: ", "bold"), f"{s.words}.\n  Change that would remove it: {s.change}."))
+    return Group(*said, Text.assemble(("Before any fit: ", "bold"), loop_words(looked.loops)), Text(""))
 
 
 def _table() -> Table:

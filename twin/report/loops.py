@@ -11,9 +11,8 @@ from twin.report.numbers import SHOWN, finite, number
 from twin.report.sentence import labels
 
 
-def loop_words(diagnosis: Diagnosis) -> str:
+def loop_words(found: Loops) -> str:
     """Whether pull and release differ, which way, and whether time could do the same."""
-    found = diagnosis.loops
     if not found.each:
         return "Loops: no trial comes back over its own commands, so pull and release cannot be compared."
     unit, factor = SHOWN[found.group]

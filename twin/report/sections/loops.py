@@ -24,4 +24,6 @@ def section(story: Story) -> Section:
         }
         for name, loop in zip(names, d.loops.each, strict=True)
     ]
-    return Section("loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": loop_words(d), "strains": strains.plot(d)})
+    return Section(
+        "loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": loop_words(d.loops), "strains": strains.plot(d)}
+    )
