@@ -107,7 +107,6 @@ class Scene:
             thing.add(spec)
         self.moving = moving(started, spec)
         self.model, self.data = self.moving.model, self.moving.data
-        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # one iteration a step; CG leaves 0.3 N of jitter in the tendons
         self.model.opt.cone, self.model.opt.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, STICKS
         joints = [self.model.joint(t.name) for t in things if not t.fixed]
         self._at = np.array([j.qposadr[0] + np.arange(7) for j in joints], int).reshape(-1, 7)
