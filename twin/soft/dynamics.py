@@ -137,11 +137,11 @@ class Moving:
             mujoco.mj_integratePos(self.model, self.data.qpos, self.data.qvel, self.step)
             self.data.time += self.step
         if how != DONE:
-            what = WRONG[how]
-            pull = ", ".join(f"{T:.3g}" for T in self.limbs[which].tension)
+            concerned = slice(None) if which < 0 else slice(which, which + 1)
+            pull = ", ".join(f"{T:.3g}" for limb in self.limbs[concerned] for T in limb.tension)
             raise SolveError(
-                f"{self.names[which]} is lost at t = {self.data.time:.4g} s: {what}, under tensions {pull} N; smoother or smaller "
-                "commands, or a shorter step, may keep it"
+                f"{', '.join(self.names[concerned])} is lost at t = {self.data.time:.4g} s: {WRONG[how]}, under tensions {pull} N; "
+                "smoother or smaller commands, or a shorter step, may keep it"
             )
         warned = self._warnings()
         if (warned > self._warned).any():
@@ -198,7 +198,7 @@ class SoftDynamics:
         Where the motion is lost `ended` says how; samples from there on are NaN.
         """
         started = Started.of(self.body, problem)
-        spec = flex(started.body, started.parts, step_for(self.body))
+        spec = flex(started.body, step_for(self.body))
         spec.option.gravity = problem.loads.gravity @ turned(self.body.turn)
         moving = Moving.of(spec, [started], [""], ["the finger"])
         return followed(moving, problem.time, np.array(problem.command, float)[:, None])[0]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiled import inner
+from twin.compiled import inner, jit
 from twin.soft.lattice import NODES, Lattice, shape_functions
 from twin.soft.newton import Parts
 from twin.soft.silicone import Cells, Tangent, stiffness
@@ -131,6 +131,13 @@ def factor(at):
             row, a, b, c = U[i], x[i], y[i], z[i]
             for j in range(i, end):
                 row[j] -= a * x[j] + b * y[j] + c * z[j]
+
+
+@jit
+def weighed(at, cells, u):
+    """The metric's factor at nodal displacements u (n_node, 3), into `at.upper`."""
+    assemble(at, cells, u)
+    factor(at)
 
 
 @inner

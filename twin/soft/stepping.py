@@ -19,7 +19,7 @@ import numpy as np
 from twin.compiled import inner, jit
 from twin.soft.cables import follow
 from twin.soft.contact import Law, balance
-from twin.soft.metric import Metric, assemble, back, factor, halfway
+from twin.soft.metric import Metric, back, halfway, weighed
 from twin.soft.newton import Parts, Room
 from twin.soft.silicone import LEAST, forces
 
@@ -79,7 +79,7 @@ class Touch(NamedTuple):
 @jit
 def advance(limbs, engine, touch, start, end, share):
     """All speeds a step on; commands are `share` of the way from `start` to `end` (limb, t). Returns how
-    it ended, and with which limb."""
+    it ended, and with which limb, -1 for no one."""
     tendons = 0
     for k in range(len(limbs)):
         tendons += limbs[k].held.sum()
@@ -99,19 +99,20 @@ def advance(limbs, engine, touch, start, end, share):
             pull(limb, t, command, first, h, law, e, f, moved)
             first += limb.held[t]
         fill(limb, k, engine, touch, tendons, own, moved)
-        assemble(limb.metric, limb.parts.cells, limb.room.whole)
-        factor(limb.metric)
+        weighed(limb.metric, limb.parts.cells, limb.room.whole)
         halfway(limb.metric, moved)
-        both = np.dot(moved[:, 1:].T, moved)
+        if not np.isfinite(moved.sum()):
+            return LOST, k
+        both = np.dot(moved.T, moved)
         for i in range(own.size):
-            e[own[i]] += both[i, 0]
+            e[own[i]] += both[1 + i, 0]
             for j in range(own.size):
-                W[own[i], own[j]] += both[i, 1 + j]
+                W[own[i], own[j]] += both[1 + i, 1 + j]
         columns.append(moved)
         rows.append(own)
     contacts(touch, h, tendons, W, e, law)
-    if not balance(law, h * W, e, f):
-        return UNBALANCED, 0
+    if n > 0 and not balance(law, h * W, e, f):
+        return UNBALANCED, -1
     first = 0
     for k in range(len(limbs)):
         own, v = rows[k + 1], columns[k + 1][:, 0].copy()
