@@ -131,7 +131,8 @@ class Moving:
         """
         for step in range(n):
             mujoco.mj_step1(self.model, self.data)
-            how, which = advance(self.limbs, self._engine, self._touch(), start, end, (step + 1.0) / n)
+            share = (step + 1.0) / n
+            how, which = advance(self.limbs, self._engine, self._touch(), (1.0 - share) * start + share * end)
             if how != DONE:
                 break
             mujoco.mj_integratePos(self.model, self.data.qpos, self.data.qvel, self.step)

@@ -12,6 +12,8 @@ follow the travel from step to step.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -76,54 +78,76 @@ class Touch(NamedTuple):
     impratio: float
 
 
-@jit
-def advance(limbs, engine, touch, start, end, share):
-    """All speeds a step on; commands are `share` of the way from `start` to `end` (limb, t). Returns how
-    it ended, and with which limb, -1 for no one."""
-    tendons = 0
-    for k in range(len(limbs)):
-        tendons += limbs[k].held.sum()
-    n, h = tendons + touch.gap.size, engine.step
-    law = Law(np.zeros(n), tendons, touch.friction)
-    W, e, f = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    carry(engine, touch, tendons, W, e)
-    columns, rows, first = [np.empty((0, 0))], [np.empty(0, np.int64)], 0
-    for k in range(len(limbs)):
-        limb = limbs[k]
-        if not shape(limb, engine.qpos):
-            return INVERTED, k
-        own = concerned(limb, k, engine, touch, first, tendons)
-        moved = np.zeros((limb.dof.size, 1 + own.size))
-        for t in range(limb.held.size):
-            command = (1.0 - share) * start[k, t] + share * end[k, t]
-            pull(limb, t, command, first, h, law, e, f, moved)
-            first += limb.held[t]
-        fill(limb, k, engine, touch, tendons, own, moved)
-        weighed(limb.metric, limb.parts.cells, limb.room.whole)
-        halfway(limb.metric, moved)
-        if not np.isfinite(moved.sum()):
-            return LOST, k
-        both = np.dot(moved.T, moved)
-        for i in range(own.size):
-            e[own[i]] += both[1 + i, 0]
-            for j in range(own.size):
-                W[own[i], own[j]] += both[1 + i, 1 + j]
-        columns.append(moved)
-        rows.append(own)
-    contacts(touch, h, tendons, W, e, law)
-    if n > 0 and not balance(law, h * W, e, f):
+class Rows(NamedTuple):
+    """The tendons that are held, then the contacts, three rows each: what resists them, W (n, n) 1/kg; their lags e (n,) m/s without
+    force; their forces f (n,) N; and their law."""
+
+    W: np.ndarray
+    e: np.ndarray
+    f: np.ndarray
+    law: Law
+
+
+class Felt(NamedTuple):
+    """What one body makes of a step: how it ended; the rows (m,) it feels; and, by U'^-1 of its metric, its momentum at the step's end
+    without them and how they move with its nodes, (nq, 1 + m)."""
+
+    how: int
+    rows: np.ndarray
+    moved: np.ndarray
+
+
+def advance(limbs: Sequence[Limb], engine: Engine, touch: Touch, command: np.ndarray) -> tuple[int, int]:
+    """All speeds a step on, under the commands (limb, t), N or m. Returns how that ended, and for which limb, -1 for no one."""
+    held = [int(limb.held.sum()) for limb in limbs]
+    tendons, n = sum(held), sum(held) + len(touch.gap)
+    rows = Rows(np.zeros((n, n)), np.zeros(n), np.zeros(n), Law(np.zeros(n), tendons, touch.friction))
+    felt, first = [], [0, *accumulate(held)]
+    for k, limb in enumerate(limbs):
+        felt.append(Felt(*feel(limb, k, engine, touch, command[k], first[k], rows)))
+        if felt[k].how != DONE:
+            return felt[k].how, k
+    if not settle(engine, touch, rows):
         return UNBALANCED, -1
-    first = 0
-    for k in range(len(limbs)):
-        own, v = rows[k + 1], columns[k + 1][:, 0].copy()
-        for i in range(own.size):
-            v += h * f[own[i]] * columns[k + 1][:, 1 + i]
-        back(limbs[k].metric, v)
-        if not after(limbs[k], engine, v, f, first):
+    for k, limb in enumerate(limbs):
+        if not after(limb, engine, felt[k], rows.f, first[k]):
             return LOST, k
-        first += limbs[k].held.sum()
-    carried(engine, touch, tendons, f)
     return DONE, -1
+
+
+@jit
+def feel(limb, k, engine, touch, command, first, rows):
+    """What limb k makes of a step, its tendons' rows from `first` on; its share in the rows."""
+    tendons, own = rows.law.tendons, concerned(limb, k, engine, touch, first, rows.law.tendons)
+    moved = np.zeros((limb.dof.size, 1 + own.size))
+    if not shape(limb, engine.qpos):
+        return INVERTED, own, moved
+    row = first
+    for t in range(limb.held.size):
+        pull(limb, t, command[t], row, 1 + row - first, engine.step, rows, moved)
+        row += limb.held[t]
+    fill(limb, k, engine, touch, tendons, own, moved)
+    weighed(limb.metric, limb.parts.cells, limb.room.whole)
+    halfway(limb.metric, moved)
+    both = np.dot(moved.T, moved)
+    if not np.isfinite(both.sum()):
+        return LOST, own, moved
+    for i in range(own.size):
+        rows.e[own[i]] += both[1 + i, 0]
+        for j in range(own.size):
+            rows.W[own[i], own[j]] += both[1 + i, 1 + j]
+    return DONE, own, moved
+
+
+@jit
+def settle(engine, touch, rows):
+    """The rows' forces, and the things' speeds at the step's end. False where forces are not found."""
+    carry(engine, touch, rows)
+    contacts(touch, engine.step, rows)
+    if rows.f.size > 0 and not balance(rows.law, engine.step * rows.W, rows.e, rows.f):
+        return False
+    carried(engine, touch, rows)
+    return True
 
 
 @jit
@@ -155,24 +179,21 @@ def concerned(limb, k, engine, touch, first, tendons):
 
 
 @inner
-def pull(limb, t, command, row, h, law, e, f, moved):
+def pull(limb, t, command, row, column, h, rows, moved):
     """Tendon t under its command (N or m): a force that is given, or the row of a spring and how it moves with the nodes."""
     pulled, nq = limb.room.pulled, limb.dof.size
     limb.slip[t] = pulled.slip[t]
     limb.beyond[t] = pulled.beyond[t]
-    if not limb.held[t]:
+    if limb.held[t]:
+        rows.law.D[row] = limb.stiffness[t] * h
+        rows.e[row] -= (pulled.length[t] - limb.hanging[t] + command) / h
+        rows.f[row] = limb.tension[t]
+        for a in range(nq):
+            moved[a, column] = -pulled.pull[t, a]
+    else:
         limb.tension[t] = max(0.0, command)
         for a in range(nq):
             limb.room.f[a] += limb.tension[t] * pulled.pull[t, a]
-        return
-    law.D[row] = limb.stiffness[t] * h
-    e[row] -= (pulled.length[t] - limb.hanging[t] + command) / h
-    f[row] = limb.tension[t]
-    column = 1
-    for s in range(t):
-        column += limb.held[s]
-    for a in range(nq):
-        moved[a, column] = -pulled.pull[t, a]
 
 
 @inner
@@ -192,39 +213,53 @@ def fill(limb, k, engine, touch, tendons, own, moved):
 
 
 @inner
-def carry(engine, touch, tendons, W, e):
-    """Things' own share in how contacts move: into W (n, n) and, for the speeds at the step's end without contact, e (n,)."""
-    moved = np.zeros((W.shape[0], engine.things))
+def carry(engine, touch, rows):
+    """Things' own share in how contacts move: in what resists them and in their speeds at the step's end without contact."""
+    tendons, moved = rows.law.tendons, np.zeros((rows.e.size, engine.things))
     for r in range(touch.gap.size):
         for i in range(touch.start[r], touch.start[r] + touch.count[r]):
             d = touch.column[i]
             if engine.limb[d] < 0:
-                e[tendons + r] += touch.value[i] * (engine.qvel[d] - engine.step * engine.bias[d] / engine.mass[d])
+                free = engine.qvel[d] - engine.step * engine.bias[d] / engine.mass[d]
+                rows.e[tendons + r] += touch.value[i] * free
                 moved[tendons + r, engine.place[d]] = touch.value[i] / np.sqrt(engine.mass[d])
-    W += np.dot(moved, moved.T)
+    rows.W[:] += np.dot(moved, moved.T)
 
 
 @inner
-def contacts(touch, h, tendons, W, e, law):
+def contacts(touch, h, rows):
     """The contacts' D, and their lags from their speeds."""
-    for c in range(touch.friction.size):
-        for i in range(3):
-            r = 3 * c + i
-            damping, impedance = touch.spring[r, 1], touch.spring[r, 2]
-            spring = touch.spring[r, 0] * impedance
-            hard = 1.0 / h + damping + h * spring
-            e[tendons + r] -= (touch.speed[r] / h - spring * touch.gap[r]) / hard
-            if i == 0:
-                own = tendons + r
-                law.D[own] = hard * impedance / ((1.0 - impedance) * W[own, own])
-            else:
-                law.D[tendons + r] = touch.impratio * law.D[tendons + 3 * c]
+    tendons, D = rows.law.tendons, rows.law.D
+    for r in range(touch.gap.size):
+        damping, impedance = touch.spring[r, 1], touch.spring[r, 2]
+        spring, own, normal = touch.spring[r, 0] * impedance, tendons + r, tendons + r - r % 3
+        hard = 1.0 / h + damping + h * spring
+        rows.e[own] -= (touch.speed[r] / h - spring * touch.gap[r]) / hard
+        D[own] = touch.impratio * D[normal] if r % 3 else hard * impedance / ((1.0 - impedance) * rows.W[own, own])
 
 
 @inner
-def after(limb, engine, v, f, row):
+def carried(engine, touch, rows):
+    """The things' speeds at the step's end."""
+    for d in range(engine.mass.size):
+        if engine.limb[d] < 0:
+            engine.qvel[d] -= engine.step * engine.bias[d] / engine.mass[d]
+    for r in range(touch.gap.size):
+        for i in range(touch.start[r], touch.start[r] + touch.count[r]):
+            d = touch.column[i]
+            if engine.limb[d] < 0:
+                engine.qvel[d] += engine.step * touch.value[i] * rows.f[rows.law.tendons + r] / engine.mass[d]
+
+
+@jit
+def after(limb, engine, felt, f, row):
     """The nodes' speeds, and the tensions of held tendons. False where a node has no finite place or speed."""
-    for a in range(limb.dof.size):
+    v = felt.moved[:, 0].copy()
+    for i in range(felt.rows.size):
+        for a in range(v.size):
+            v[a] += engine.step * f[felt.rows[i]] * felt.moved[a, 1 + i]
+    back(limb.metric, v)
+    for a in range(v.size):
         d = limb.dof[a]
         if not (abs(v[a]) < FASTEST and abs(engine.qpos[d]) < FASTEST):
             return False
@@ -234,16 +269,3 @@ def after(limb, engine, v, f, row):
             limb.tension[t] = f[row]
             row += 1
     return True
-
-
-@inner
-def carried(engine, touch, tendons, f):
-    """The things' speeds at the step's end."""
-    for d in range(engine.mass.size):
-        if engine.limb[d] < 0:
-            engine.qvel[d] -= engine.step * engine.bias[d] / engine.mass[d]
-    for r in range(touch.gap.size):
-        for i in range(touch.start[r], touch.start[r] + touch.count[r]):
-            d = touch.column[i]
-            if engine.limb[d] < 0:
-                engine.qvel[d] += engine.step * touch.value[i] * f[tendons + r] / engine.mass[d]
