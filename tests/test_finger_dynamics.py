@@ -74,7 +74,7 @@ def test_the_metric_is_mass_and_damping_in_a_frame_that_turns() -> None:
     parts, n = parts_of(body), 3 * body.lattice.n_free
     mass, turn = np.repeat(body.density * body.lattice.volume, 3), Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
     x, small = body.lattice.nodes, 1e-7 * np.random.default_rng(0).normal(size=n).reshape(-1, 3)
-    own = metric(body.lattice, parts, mass, 2e-5, 1.0)
+    own = metric(body.lattice, parts, mass, 2e-5)
     moved = (x + np.vstack([np.zeros((9, 3)), small])) @ turn.T - x
     weighed(own, parts.cells, moved)
     U = np.triu(own.upper, 1) + np.diag(1.0 / np.diag(own.upper))

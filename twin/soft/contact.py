@@ -1,14 +1,14 @@
 """Forces of tendons and contacts at a step's end, all at once: springs and dampers that only push, with Coulomb's friction.
 
-Row i moves at a speed w = w0 + h W f at the end of the step, under the forces f (n,) of all; W (1/kg) is the inverse of the mass that
-the rows feel. Its spring and damper, at the step's end, give a force from its speed's lag e behind the one without force:
+Row i moves at a speed w = w0 + h W f at the end of the step, under the forces f (n,) of all; W (1/kg) is the inverse of the mass
+that the rows feel. Its spring and damper, at the step's end, give a force -D e, e the lag of w behind the speed without force:
 
     tendon:   f = stiffness max(0, stretch - h w) = max(0, -D e),   e = w - stretch / h,   D = stiffness h
     contact:  f = -((w - w_before) / h + b w + k (gap + h w)) / R,  along the normal, where above zero,   R = (1 - d) / d W_nn
 
-with MuJoCo's stiffness k, damping b and impedance d of a contact, and its elliptic cone: across, f is at most mu of the normal's, and
-R is `impratio` times smaller. W_nn is MuJoCo's diagonal of the inverse mass, here exact. The forces are the minimum of a convex
-function, found by Newton's method with an exact line search.
+with MuJoCo's stiffness k, damping b and impedance d of a contact, and its elliptic cone: across, where k is zero, f is at most mu
+of the normal's, and R is `impratio` times smaller. W_nn, which MuJoCo estimates from the masses, is exact here. The forces are the
+minimum of a convex function, found by Newton's method with an exact line search.
 
 Source: MuJoCo's documentation, Computation, "Constraint model"; Todorov (2014), convex and analytically-invertible dynamics.
 """

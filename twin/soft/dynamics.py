@@ -29,8 +29,7 @@ LONGEST, SHORTEST, PER_DAMPING = (
     0.4,
 )  # s, s, 1: a step is that share of the silicone's damping coefficient, within these
 STIFFNESS = 2e5  # N/m, of a held tendon that does not stretch: 10 um at 2 N
-POISSON = 0.47  # at most: MuJoCo's solve of what is less compressible takes twice as long; it moves the tip by 0.03 mm
-BULK = 0.5
+POISSON = 0.47  # at most: with 0.49 the finger comes to rest 0.1 mm from statics among rubbing tendons, not 0.02
 WRONG = {
     INVERTED: "a cell of its silicone has turned inside out",
     LOST: f"a node has no finite speed below {FASTEST:g} m/s",
@@ -78,7 +77,7 @@ class Started:
         problem, trial, state, body = self.problem, self.trial, self.trial.state, self.body
         held = problem.which(Drive.DISPLACEMENT)
         stiffness = np.full(len(held), 1.0 / (problem.route.stretch + 1.0 / STIFFNESS))
-        damps = metric(body.lattice, self.parts, mass, step * max(body.damping, step), BULK)
+        damps = metric(body.lattice, self.parts, mass, step * max(body.damping, step))
         return Limb(
             self.parts, room_for(self.parts, len(problem.creep.amplitude) > 0), damps, dof, held, stiffness, trial.hanging,
             state.slip, state.beyond, state.tension, self.statics.pressed(problem.loads).ravel(), float(problem.route.mu),
@@ -95,7 +94,9 @@ class Moving:
     def __init__(self, model: mujoco.MjModel, started: Sequence[Started], dof: Sequence[np.ndarray], names: Sequence[str]) -> None:
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= off.mjDSBL_AUTORESET  # a state that is lost must be seen as such
-        model.opt.disableflags |= off.mjDSBL_SPRING | off.mjDSBL_DAMPER | off.mjDSBL_REFSAFE | off.mjDSBL_ISLAND  # all in stepping.py
+        model.opt.disableflags |= (
+            off.mjDSBL_SPRING | off.mjDSBL_DAMPER | off.mjDSBL_REFSAFE | off.mjDSBL_ISLAND
+        )  # all in stepping.py
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
         self.model, self.data, self.names, self.started = model, mujoco.MjData(model), tuple(names), tuple(started)
         mujoco.mj_setConst(model, self.data)

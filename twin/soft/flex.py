@@ -46,14 +46,13 @@ def flex(body: SoftBody, step: float) -> mujoco.MjSpec:
     points, tetrahedra = mesh(body)
     side = float(body.cone.radius(body.cone.clamp))
     box = np.array([[x, y, z] for x in (-side, side) for y in (-side, side) for z in (body.cone.clamp, body.cone.length)])
-    spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{step:.9g}"/>
+    return mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{step:.9g}"/>
 <worldbody><body name="{BASE}">
 <flexcomp name="{NAME}" type="direct" dim="3" dof="quadratic" cellcount="1 1 {body.cells}" radius="{SKIN}" mass="1"
  point="{_words(np.vstack([points, box]))}" element="{_words(tetrahedra)}" rgba="{_words(np.array(RUBBER))}">
 <contact selfcollide="none" contype="{FINGER}" conaffinity="{THING}"/><elasticity young="1e5" poisson="0.3" damping="1"/>
 <pin gridrange="0 0 0 2 2 0"/></flexcomp>
 </body></worldbody></mujoco>""")
-    return spec
 
 
 def place(model: mujoco.MjModel, body: SoftBody, prefix: str = "", payload: float = 0.0) -> np.ndarray:

@@ -128,9 +128,7 @@ def stand(body: HandBody, problem: Problem, longest: float = math.inf) -> tuple[
     for k, (one, place, turn) in enumerate(zip(started, body.places, body.turns, strict=True)):
         quat = np.empty(4)
         mujoco.mju_mat2Quat(quat, np.ascontiguousarray(turn @ turned(one.body.turn)).ravel())
-        spec.attach(
-            flex(one.body, step), prefix=f"finger_{k + 1}_", frame=spec.worldbody.add_frame(pos=place, quat=quat)
-        )
+        spec.attach(flex(one.body, step), prefix=f"finger_{k + 1}_", frame=spec.worldbody.add_frame(pos=place, quat=quat))
     return started, spec
 
 

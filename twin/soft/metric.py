@@ -30,24 +30,24 @@ class Metric(NamedTuple):
     upper: np.ndarray
 
 
-def metric(grid: Lattice, parts: Parts, mass: np.ndarray, weight: float, bulk: float) -> Metric:
-    """Of a body whose unknowns have `mass` (n,) kg: `weight` (s^2) is h b, `bulk` the share of the bulk moduli that counts."""
+def metric(grid: Lattice, parts: Parts, mass: np.ndarray, weight: float) -> Metric:
+    """Of a body whose unknowns have `mass` (n,) kg; `weight` (s^2) is h b."""
     unknowns, n = parts.cells.unknowns, mass.size
     end = np.zeros(n, int)
     for own in unknowns:
         end[own[own >= 0]] = own.max() + 1
     slope = shape_functions(np.zeros(3))[1] / grid.half[:, None]
-    return Metric(mass, weight * _at_rest(parts, bulk), slope, end, np.zeros((n, n)))
+    return Metric(mass, weight * _at_rest(parts), slope, end, np.zeros((n, n)))
 
 
-def _at_rest(parts: Parts, bulk: float) -> np.ndarray:
-    """(c, 81, 81) N/m: tangents of the cells at rest, with a share of their bulk moduli."""
+def _at_rest(parts: Parts) -> np.ndarray:
+    """(c, 81, 81) N/m: tangents of the cells at rest."""
     cells, K = parts.cells, []
     for e in range(len(cells.members)):
         one = slice(e, e + 1)
         alone = Cells(
             np.arange(NODES)[None], np.arange(3 * NODES)[None], cells.gradient[one], cells.weight[one], cells.basis[one],
-            cells.inverse[one], cells.shear[one], bulk * cells.bulk[one],
+            cells.inverse[one], cells.shear[one], cells.bulk[one],
         )  # fmt: skip
         tangent = Tangent(np.empty((3 * NODES, 3 * NODES)), np.zeros((1, 4, 3 * NODES)), np.zeros((1, 4)))
         stiffness(np.zeros((NODES, 3)), alone, np.empty((0, 0, 6)), tangent)
@@ -85,7 +85,7 @@ def rotation(u, members, slope, R):
 @inner
 def assemble(at, cells, u):
     """The metric at nodal displacements u (n_node, 3), into `at.upper`."""
-    A, R, half, block = at.upper, np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    A, R, half = at.upper, np.empty((3, 3)), np.empty((3, 3))
     n = at.mass.size
     for i in range(n):
         A[i, i : at.end[i]] = 0.0

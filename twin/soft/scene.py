@@ -18,9 +18,11 @@ from twin.errors import DataError, SolveError
 from twin.soft.flex import FINGER, THING
 from twin.soft.hand import HandBody, moving, stand
 
-STICKS = 20.0  # MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 1 mm/s, with its usual 1 by 14
-LONGEST = 2.5e-3  # s: with steps of 4 ms cells that are held hard turned inside out in 3 of 6 grasps, with 3 and 2 ms in none
-SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
+STICKS = (
+    20.0  # MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 0.04 mm/s, with its usual 1 by 0.8
+)
+LONGEST = 2.5e-3  # s: half of it moves what holds a ball by 0.01 mm
+SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by hundredths of a millimetre
 SHAPES = {
     "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
     "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, 2),

@@ -64,8 +64,8 @@ class Engine(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """MuJoCo's contacts, three rows each: the sparse rows' values, columns, starts (n,) and counts (n,); their stiffness, damping and
-    impedance (n, 4), gaps (n,) m and speeds (n,) m/s; each contact's friction (c,); and `impratio`."""
+    """MuJoCo's contacts, three rows each: the sparse rows' values, columns, starts (n,) and counts (n,); their stiffness, damping
+    and impedance (n, 4), gaps (n,) m and speeds (n,) m/s; each contact's friction (c,); and `impratio`."""
 
     value: np.ndarray
     column: np.ndarray
@@ -79,8 +79,8 @@ class Touch(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """The tendons that are held, then the contacts, three rows each: what resists them, W (n, n) 1/kg; their lags e (n,) m/s without
-    force; their forces f (n,) N; and their law."""
+    """The tendons that are held, then the contacts, three rows each: what resists them, W (n, n) 1/kg; their lags e (n,) m/s
+    without force; their forces f (n,) N; and their law."""
 
     W: np.ndarray
     e: np.ndarray
@@ -89,8 +89,8 @@ class Rows(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """What one body makes of a step: how it ended; the rows (m,) it feels; and, by U'^-1 of its metric, its momentum at the step's end
-    without them and how they move with its nodes, (nq, 1 + m)."""
+    """What one body makes of a step: how it ended; the rows (m,) it feels; and, by U'^-1 of its metric, its momentum at the step's
+    end without them and how they move with its nodes, (nq, 1 + m)."""
 
     how: int
     rows: np.ndarray
