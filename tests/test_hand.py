@@ -217,7 +217,7 @@ def test_three_fingers_hold_a_ball_against_its_weight() -> None:
 def test_a_step_among_contacts_is_the_one_mujoco_solves() -> None:
     """MuJoCo's own elements and Newton's method, given the contacts' softness: K as its flex's stiffness in frames that turn, the
     rest of the force, and the tensions found, applied. Tendons and contacts are all in one solve here, MuJoCo's is independent."""
-    scene = Scene(hand(), [replace(BALL, friction=0.1), TABLE], HANGING)
+    scene = Scene(hand(), [replace(BALL, friction=0.03), TABLE], HANGING)
     close(scene, 8e-3, 0.36)
     scene.step([[9e-3, 0.0], [8e-3, 1e-3], [8e-3, 0.0]], 0.02)
     moving, h = scene.moving, scene.moving.step
