@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route, named
@@ -17,6 +17,7 @@ from twin.soft import SoftBody, SoftDynamics, SoftPath, SoftStatics
 from twin.soft import dynamics as moving
 from twin.soft.dynamics import Moving, Started, step_for
 from twin.soft.flex import flex
+from twin.soft.metric import metric, weighed
 from twin.soft.room import parts_of
 from twin.soft.silicone import Tangent, forces, stiffness
 from twin.twin import Twin
@@ -54,26 +55,35 @@ def stood(problem: Problem, body: SoftBody | None = None) -> SoftPath:
 
 
 def test_the_flex_is_the_lattice() -> None:
-    """Nodes, mass, and, for small displacements, MuJoCo's own elastic force."""
+    """Its nodes' mass, and its skin."""
     body = finger()
     started = Started.of(body, Problem(np.zeros(1), np.zeros((1, 4)), Loads(np.zeros(3)), drives=HELD))
-    made = Moving.of(flex(body, started.parts, 1e-3), [started], [""], ["it"])
-    model, data, dof = made.model, made.data, made.limbs[0].dof
+    made = Moving.of(flex(body, 1e-3), [started], [""], ["it"])
     weight = body.density * body.lattice.quadrature[1].sum()
     clamped = body.density * body.lattice.quadrature[1].sum() - body.density * body.lattice.volume.sum()
-    np.testing.assert_allclose(model.body_mass.sum(), weight - clamped, rtol=1e-9)
-    u = 1e-7 * np.random.default_rng(0).normal(size=dof.size)
-    data.qpos[dof] = u
-    softer = SoftBody(**{**vars(body), "bulk": 0.5 * body.bulk, "poisson": 0.47})  # flex.BULK: what MuJoCo's own element has of it
-    mujoco.mj_forward(model, data)
-    f, p = np.empty(u.size), np.zeros((body.cells, 4))
-    whole = np.vstack([np.zeros((9, 3)), u.reshape(-1, 3)])
-    forces(whole, parts_of(softer).cells, np.empty((0, 0, 6)), f, p)
-    # of strains of 1e-5: second order, and the turn of the cell's frame
-    np.testing.assert_allclose(-data.qfrc_spring[dof], f, atol=1e-4 * np.abs(f).max())
-    # its skin lies on the cone, but for the depth at which the mesh is put, at facets' corners
-    x = data.flexvert_xpos[np.hypot(*data.flexvert_xpos[:, :2].T) > 1e-3]
+    np.testing.assert_allclose(made.model.body_mass.sum(), weight - clamped, rtol=1e-9)
+    np.testing.assert_allclose(made.limbs[0].metric.mass.sum(), 3.0 * (weight - clamped), rtol=1e-9)
+    # it lies on the cone, but for the depth at which the mesh is put, at facets' corners
+    x = made.data.flexvert_xpos[np.hypot(*made.data.flexvert_xpos[:, :2].T) > 1e-3]
     np.testing.assert_allclose(np.hypot(x[:, 0], x[:, 1]), body.cone.radius(x[:, 2]) - 5e-4, atol=1e-6)
+
+
+def test_the_metric_is_mass_and_damping_in_a_frame_that_turns() -> None:
+    """Turned as a whole and strained a little, the factor's metric is that of rest, turned."""
+    body = finger()
+    parts, n = parts_of(body), 3 * body.lattice.n_free
+    mass, turn = np.repeat(body.density * body.lattice.volume, 3), Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
+    x, small = body.lattice.nodes, 1e-7 * np.random.default_rng(0).normal(size=n).reshape(-1, 3)
+    own = metric(body.lattice, parts, mass, 2e-5)
+    moved = (x + np.vstack([np.zeros((9, 3)), small])) @ turn.T - x
+    weighed(own, parts.cells, moved)
+    U = np.triu(own.upper, 1) + np.diag(1.0 / np.diag(own.upper))
+    spun = np.kron(np.eye(n // 3), turn)
+    A = spun.T @ U.T @ U @ spun
+    f, p = np.empty(n), np.zeros((body.cells, 4))
+    forces(np.vstack([np.zeros((9, 3)), small]), parts.cells, np.empty((0, 0, 6)), f, p)
+    # of strains of 1e-5: second order
+    np.testing.assert_allclose(A @ small.ravel() - mass * small.ravel(), 2e-5 * f, atol=2e-4 * 2e-5 * np.abs(f).max())
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from functools import cache
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -210,6 +212,57 @@ def test_three_fingers_hold_a_ball_against_its_weight() -> None:
     for _ in range(10):
         seen = scene.step(np.tile([8e-3, 0.0], (3, 1)), 0.02)
     assert np.linalg.norm(seen.place[0] - [0.0, 0.0, 0.092]) < 5e-3  # let go it would be 60 mm away
+
+
+def test_a_step_among_contacts_is_the_one_mujoco_solves() -> None:
+    """MuJoCo's own elements and Newton's method, given the contacts' softness: K as its flex's stiffness in frames that turn, the
+    rest of the force, and the tensions found, applied. Tendons and contacts are all in one solve here, MuJoCo's is independent."""
+    scene = Scene(hand(), [replace(BALL, friction=0.03), TABLE], HANGING)
+    close(scene, 8e-3, 0.36)
+    scene.step([[9e-3, 0.0], [8e-3, 1e-3], [8e-3, 0.0]], 0.02)
+    moving, h = scene.moving, scene.moving.step
+    before = copy.copy(scene.data)
+    mujoco.mj_step1(scene.model, before)  # contacts' springs as described, not as `discrete` folds them
+    spring, damping, impedance, _ = before.efc_KBIP.reshape(-1, 4).T.copy()
+    command = np.concatenate([scene.see().servos, -scene.see().servos], axis=1)
+    moving.run(command, command, 1)
+    model = copy.copy(scene.model)
+    model.opt.integrator, model.opt.solver = mujoco.mjtIntegrator.mjINT_DISCRETE, mujoco.mjtSolver.mjSOL_NEWTON
+    model.opt.tolerance, model.opt.iterations = 1e-14, 1000
+    off = mujoco.mjtDisableBit
+    model.opt.disableflags &= ~(off.mjDSBL_SPRING | off.mjDSBL_DAMPER)
+    b = moving.started[0].body.damping
+    model.flex_stiffness[:] = np.concatenate([-limb.metric.damping.ravel() / (h * b) for limb in moving.limbs])
+    model.flex_damping[:] = b - h
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = before.qpos, before.qvel
+    mujoco.mj_step1(model, data)
+    J = np.zeros((data.nefc, model.nv))
+    for r in range(data.nefc):
+        entry = slice(data.efc_J_rowadr[r], data.efc_J_rowadr[r] + data.efc_J_rownnz[r])
+        J[r, data.efc_J_colind[entry]] = data.efc_J[entry]
+    inverse = np.diag(1.0 / data.M[model.M_rowadr + model.M_rownnz - 1])
+    for limb in moving.limbs:
+        U = np.triu(limb.metric.upper, 1) + np.diag(1.0 / np.diag(limb.metric.upper))
+        inverse[np.ix_(limb.dof, limb.dof)] = np.linalg.inv(U.T @ U)
+        force = -limb.room.f + limb.force - limb.tension @ limb.room.pulled.pull
+        data.qfrc_applied[limb.dof] = force - data.qfrc_spring[limb.dof]
+    hard = 1.0 / h + damping + h * spring * impedance
+    W = (J @ inverse @ J.T)[::3, ::3].diagonal()
+    D = np.repeat((hard * impedance)[::3] / ((1.0 - impedance[::3]) * W), 3) * np.tile([1.0, 20.0, 20.0], len(W))
+    goal = (data.efc_vel / h - spring * impedance * (data.efc_pos - data.efc_margin)) / hard
+    data.efc_D[:], data.efc_R[:], data.efc_aref[:] = h * D, 1.0 / (h * D), (goal - data.efc_vel) / h
+    for contact in data.contact:
+        contact.mu = contact.friction[0] / np.sqrt(20.0)
+    for stage in (mujoco.mj_fwdActuation, mujoco.mj_fwdAcceleration, mujoco.mj_fwdConstraint):
+        stage(model, data)
+    states = set(data.efc_state.tolist())
+    assert mujoco.mjtConstraintState.mjCNSTRSTATE_CONE in states  # some slide
+    assert mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC in states  # some stick
+    assert np.abs(J @ before.qvel).max() > 1e-3
+    after = before.qvel + h * data.qacc
+    # m/s, of 16 mm/s: MuJoCo's iterations stop at 5e-11
+    np.testing.assert_allclose(scene.data.qvel, after, rtol=0, atol=1e-8)
 
 
 def test_reset_and_repeat_are_the_same_bit_for_bit() -> None:

@@ -47,7 +47,7 @@ class FingerPlant:
         self._started = Started.of(
             body, Problem(np.zeros(1), at, loads, laws.route, self._wires.drives, laws.creep, stiffness=stiffness)
         )
-        self.spec = flex(self._started.body, self._started.parts, step_for(self._started.body))
+        self.spec = flex(self._started.body, step_for(self._started.body))
         self.spec.option.gravity = loads.gravity @ turned(body.turn)
         self.moving = Moving.of(self.spec, [self._started], [""], ["the finger"])
         self._relaxed = Relaxed(self._started)

@@ -16,21 +16,25 @@ from twin.effects import Drive
 from twin.errors import SolveError
 from twin.soft.body import SoftBody
 from twin.soft.creep import relax_for
-from twin.soft.flex import Placed, flex, place
+from twin.soft.flex import flex, place
+from twin.soft.metric import metric
 from twin.soft.newton import Parts
 from twin.soft.room import room_for
 from twin.soft.statics import SoftPath, SoftStatics, Trial, single_thread, turned
-from twin.soft.stepping import DONE, FASTEST, INVERTED, Engine, Limb, advance, shape
+from twin.soft.stepping import DONE, FASTEST, INVERTED, LOST, UNBALANCED, Engine, Limb, Touch, advance, shape
 
 LONGEST, SHORTEST, PER_DAMPING = (
     4e-3,
     5e-4,
     0.4,
 )  # s, s, 1: a step is that share of the silicone's damping coefficient, within these
-TURNS = 400  # that solve's turns; some hundred do
 STIFFNESS = 2e5  # N/m, of a held tendon that does not stretch: 10 um at 2 N
-POISSON = 0.47  # at most: MuJoCo's solve of what is less compressible takes twice as long; it moves the tip by 0.03 mm
-SOLVED = 1e-3  # MuJoCo's tolerance for the metric's solve; with a tenth of it shapes are the same to 0.01 mm
+POISSON = 0.47  # at most: with 0.49 the finger comes to rest 0.1 mm from statics among rubbing tendons, not 0.02
+WRONG = {
+    INVERTED: "a cell of its silicone has turned inside out",
+    LOST: f"a node has no finite speed below {FASTEST:g} m/s",
+    UNBALANCED: "what its tendons and contacts push with is not found",
+}
 
 
 @dataclass(frozen=True)
@@ -68,16 +72,16 @@ class Started:
     def parts(self) -> Parts:
         return self.statics.parts
 
-    def limb(self, model: mujoco.MjModel, placed: Placed) -> Limb:
-        """The body as it is stepped. Its tendons' stiffness is set in the model."""
-        problem, trial, state = self.problem, self.trial, self.trial.state
+    def limb(self, mass: np.ndarray, dof: np.ndarray, step: float) -> Limb:
+        """The body as it is stepped, its unknowns of `mass` (n,) kg at the coordinates `dof`."""
+        problem, trial, state, body = self.problem, self.trial, self.trial.state, self.body
         held = problem.which(Drive.DISPLACEMENT)
         stiffness = np.full(len(held), 1.0 / (problem.route.stretch + 1.0 / STIFFNESS))
-        model.tendon_stiffness[placed.wraps.tendon] = np.where(held, stiffness, 0.0)
-        force = self.statics.pressed(problem.loads).ravel()
+        damps = metric(body.lattice, self.parts, mass, step * max(body.damping, step))
         return Limb(
-            self.parts, room_for(self.parts, len(problem.creep.amplitude) > 0), placed.dof, placed.wraps, held, stiffness,
-            trial.hanging, state.slip, state.beyond, state.tension, force, float(problem.route.mu), float(problem.route.presliding),
+            self.parts, room_for(self.parts, len(problem.creep.amplitude) > 0), damps, dof, held, stiffness, trial.hanging,
+            state.slip, state.beyond, state.tension, self.statics.pressed(problem.loads).ravel(), float(problem.route.mu),
+            float(problem.route.presliding),
         )  # fmt: skip
 
 
@@ -87,33 +91,35 @@ class Moving:
     `model` is compiled of what `flex` makes of each, `placed` says where each is in it, `names` what each is called.
     """
 
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, started: Sequence[Started], placed: Sequence[Placed], names: Sequence[str]
-    ) -> None:
-        model.opt.tolerance, model.opt.iterations = SOLVED, TURNS
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a state that is lost must be seen as such
-        self.model, self.data, self.names, self.started = model, data, tuple(names), tuple(started)
-        self.limbs = tuple(s.limb(model, p) for s, p in zip(started, placed, strict=True))
-        for s, limb in zip(started, self.limbs, strict=True):
-            data.qpos[limb.dof] = s.trial.state.u
-        mujoco.mj_forward(model, data)
-        self._engine = Engine(
-            model._address, data._address, data.qpos, data.qvel, data.qfrc_spring, data.qfrc_applied, model.wrap_prm,
-            data.ten_length, model.tendon_lengthspring,
-        )  # fmt: skip
+    def __init__(self, model: mujoco.MjModel, started: Sequence[Started], dof: Sequence[np.ndarray], names: Sequence[str]) -> None:
+        off = mujoco.mjtDisableBit
+        model.opt.disableflags |= off.mjDSBL_AUTORESET  # a state that is lost must be seen as such
+        model.opt.disableflags |= (
+            off.mjDSBL_SPRING | off.mjDSBL_DAMPER | off.mjDSBL_REFSAFE | off.mjDSBL_ISLAND
+        )  # all in stepping.py
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+        self.model, self.data, self.names, self.started = model, mujoco.MjData(model), tuple(names), tuple(started)
+        mujoco.mj_setConst(model, self.data)
+        mujoco.mj_resetData(model, self.data)
+        for s, own in zip(started, dof, strict=True):
+            self.data.qpos[own] = s.trial.state.u
+        mujoco.mj_forward(model, self.data)
+        mass = self.data.M[model.M_rowadr + model.M_rownnz - 1]
+        self.limbs = tuple(s.limb(mass[own], own, self.step) for s, own in zip(started, dof, strict=True))
+        limb, place = np.full(model.nv, -1), np.zeros(model.nv, int)
+        for k, own in enumerate(dof):
+            limb[own], place[own] = k, np.arange(len(own))
+        place[limb < 0] = np.arange((limb < 0).sum())
+        data = self.data
+        self._engine = Engine(data.qpos, data.qvel, data.qfrc_bias, mass, limb, place, int((limb < 0).sum()), self.step)
         self._warned = self._warnings()
 
     @staticmethod
     def of(spec: mujoco.MjSpec, started: Sequence[Started], prefixes: Sequence[str], names: Sequence[str]) -> Moving:
         """Of a spec that holds what `flex` makes of each body under its prefix."""
         model = spec.compile()
-        placed = [
-            place(model, s.body, s.parts, prefix, s.problem.loads.payload) for s, prefix in zip(started, prefixes, strict=True)
-        ]
-        data = mujoco.MjData(model)
-        mujoco.mj_setConst(model, data)
-        mujoco.mj_resetData(model, data)
-        return Moving(model, data, started, placed, names)
+        dof = [place(model, s.body, prefix, s.problem.loads.payload) for s, prefix in zip(started, prefixes, strict=True)]
+        return Moving(model, started, dof, names)
 
     @property
     def step(self) -> float:
@@ -124,17 +130,20 @@ class Moving:
 
         Raises SolveError naming the body and the time where a cell turns inside out, a state is not finite or MuJoCo warns.
         """
-        how, which = advance(self.limbs, self._engine, start, end, n)
+        for step in range(n):
+            mujoco.mj_step1(self.model, self.data)
+            share = (step + 1.0) / n
+            how, which = advance(self.limbs, self._engine, self._touch(), (1.0 - share) * start + share * end)
+            if how != DONE:
+                break
+            mujoco.mj_integratePos(self.model, self.data.qpos, self.data.qvel, self.step)
+            self.data.time += self.step
         if how != DONE:
-            what = (
-                "a cell of its silicone has turned inside out"
-                if how == INVERTED
-                else f"a node has no finite speed below {FASTEST:g} m/s"
-            )
-            pull = ", ".join(f"{T:.3g}" for T in self.limbs[which].tension)
+            concerned = slice(None) if which < 0 else slice(which, which + 1)
+            pull = ", ".join(f"{T:.3g}" for limb in self.limbs[concerned] for T in limb.tension)
             raise SolveError(
-                f"{self.names[which]} is lost at t = {self.data.time:.4g} s: {what}, under tensions {pull} N; smoother or smaller "
-                "commands, or a shorter step, may keep it"
+                f"{', '.join(self.names[concerned])} is lost at t = {self.data.time:.4g} s: {WRONG[how]}, under tensions {pull} N; "
+                "smoother or smaller commands, or a shorter step, may keep it"
             )
         warned = self._warnings()
         if (warned > self._warned).any():
@@ -149,10 +158,19 @@ class Moving:
         dof = self.limbs[k].dof
         return (self.data.qpos[dof] + ahead * self.data.qvel[dof]).reshape(-1, 3)
 
+    def _touch(self) -> Touch:
+        """What touches, where `mj_step1` has seen it."""
+        data = self.data
+        friction = data.contact.friction[data.efc_id[::3], 0] if data.nefc else np.empty(0)
+        return Touch(
+            data.efc_J, data.efc_J_colind, data.efc_J_rowadr, data.efc_J_rownnz, data.efc_KBIP.reshape(-1, 4),
+            data.efc_pos - data.efc_margin, data.efc_vel, friction, float(self.model.opt.impratio),
+        )  # fmt: skip
+
     def lengths(self, k: int) -> np.ndarray:
         """(t,) m, path lengths of body k's tendons."""
         limb = self.limbs[k]
-        shape(limb, self._engine)
+        shape(limb, self.data.qpos)
         return limb.room.pulled.length.copy()
 
     def _warnings(self) -> np.ndarray:
@@ -182,7 +200,7 @@ class SoftDynamics:
         Where the motion is lost `ended` says how; samples from there on are NaN.
         """
         started = Started.of(self.body, problem)
-        spec = flex(started.body, started.parts, step_for(self.body))
+        spec = flex(started.body, step_for(self.body))
         spec.option.gravity = problem.loads.gravity @ turned(self.body.turn)
         moving = Moving.of(spec, [started], [""], ["the finger"])
         return followed(moving, problem.time, np.array(problem.command, float)[:, None])[0]

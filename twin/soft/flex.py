@@ -1,29 +1,17 @@
 """A silicone body as MuJoCo's quadratic flex on the lattice of its statics: what MuJoCo moves, collides and draws.
 
-MuJoCo's own grid of cells is even and its element linear, in a frame that turns with the cell. Here its nodes stand where the
-lattice has them, carry the silicone's mass, and each cell's stiffness K is the neo-Hookean law's at rest; the force that
-`stepping.py` puts in its place has that tangent, but for large strains. The metric of the integrator `discrete` is then
-
-    M + h D + h^2 K = M + b K,        D = (b - h) K,        b: Rayleigh's coefficient of the silicone
-
-since an implicit step h damps by itself as a coefficient of h would, and that is taken off (where b < h it stays). What is left of
-the error of a step is of second order. A stiffness K' of the force is stable while K' < 2 K b / h; and MuJoCo's iterative solve of
-the metric is the slower the less compressible K is: its bulk modulus, and with it the damping of changes of volume, is half of the
-force's, more only where the step needs it.
+MuJoCo's own grid of cells is even; here its nodes stand where the lattice has them and carry the silicone's mass. The flex has no
+elasticity of its own: forces and damping are those of `stepping.py`.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from scipy.spatial import KDTree
 
 from twin.soft.body import SoftBody
-from twin.soft.lattice import ACROSS, NODES
-from twin.soft.newton import Parts
-from twin.soft.silicone import Cells, Tangent, stiffness
+from twin.soft.lattice import ACROSS
 
 AROUND, LAYERS = 16, 2  # of the mesh that touches: points around, layers a cell; it lies within 2 % of the radius
 WEDGE = ((0, 1, 2, 5), (0, 1, 4, 5), (0, 3, 4, 5))  # corners of three tetrahedra; lowest corner first, so that neighbours fit
@@ -31,26 +19,6 @@ SKIN = 5e-4  # m: the mesh lies that far inside the skin, and touches at that di
 RUBBER = (0.93, 0.9, 0.82, 1.0)
 NAME, BASE = "silicone", "base"
 FINGER, THING = 1, 2  # who touches whom: fingers touch things, not each other
-TOUCHED = 1e-9  # weight of a node by which a tendon does not move
-OPEN = 1e3  # m: a dead band without end
-MARGIN, BULK = 2.5, 0.5  # of the metric's bulk modulus over the least that is stable; and its least share of the force's
-
-
-class Wraps(NamedTuple):
-    """Where the tendons are in a compiled model: ids (t,), places (t, most) in `wrap_prm` and the unknowns (t, most) there, -1
-    where a tendon has fewer."""
-
-    tendon: np.ndarray
-    place: np.ndarray
-    unknown: np.ndarray
-
-
-class Placed(NamedTuple):
-    """Where a body is in a compiled model: coordinates (nq,) of its unknowns, in `qpos` and `qvel` alike (free joints come later),
-    and its tendons."""
-
-    dof: np.ndarray
-    wraps: Wraps
 
 
 def mesh(body: SoftBody) -> tuple[np.ndarray, np.ndarray]:
@@ -73,40 +41,23 @@ def mesh(body: SoftBody) -> tuple[np.ndarray, np.ndarray]:
     return points, tetrahedra
 
 
-def flex(body: SoftBody, parts: Parts, step: float) -> mujoco.MjSpec:
-    """The body alone, in its own frame, for `place` to finish once it is compiled, by itself or attached to more.
-
-    Each of its tendons is there as `tendon_I`, a fixed one over the joints of the nodes that it moves with, in their order:
-    MuJoCo's time for one grows with the square of their number."""
+def flex(body: SoftBody, step: float) -> mujoco.MjSpec:
+    """The body alone, in its own frame, for `place` to finish once it is compiled, by itself or attached to more."""
     points, tetrahedra = mesh(body)
     side = float(body.cone.radius(body.cone.clamp))
     box = np.array([[x, y, z] for x in (-side, side) for y in (-side, side) for z in (body.cone.clamp, body.cone.length)])
-    spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{step:.9g}" integrator="discrete" solver="Newton"/>
+    return mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{step:.9g}"/>
 <worldbody><body name="{BASE}">
 <flexcomp name="{NAME}" type="direct" dim="3" dof="quadratic" cellcount="1 1 {body.cells}" radius="{SKIN}" mass="1"
  point="{_words(np.vstack([points, box]))}" element="{_words(tetrahedra)}" rgba="{_words(np.array(RUBBER))}">
 <contact selfcollide="none" contype="{FINGER}" conaffinity="{THING}"/><elasticity young="1e5" poisson="0.3" damping="1"/>
 <pin gridrange="0 0 0 2 2 0"/></flexcomp>
 </body></worldbody></mujoco>""")
-    even = np.linspace(body.cone.clamp, body.cone.length, body.cells + 1)
-    joints: list[tuple[int, list[str]]] = []
-    for node in spec.body(BASE).bodies:
-        x, y, z = node.pos
-        unknown = _nearest(body, np.array([[x, y, np.interp(z, even, body.lattice.edges)]]))[0]
-        for axis, joint in zip("xyz", node.joints, strict=True):
-            joint.name = f"{node.name}_{axis}"
-        joints.append((int(unknown), [joint.name for joint in node.joints]))
-    for t, weights in enumerate(parts.cables.weights, 1):
-        tendon = spec.add_tendon(name=f"tendon_{t}")
-        tendon.springlength = [-OPEN, OPEN]
-        moving = np.abs(weights).max(axis=0) > TOUCHED
-        for name in (name for unknown, names in joints if moving[unknown] for name in names):
-            tendon.wrap_joint(name, 1.0)
-    return spec
 
 
-def place(model: mujoco.MjModel, body: SoftBody, parts: Parts, prefix: str = "", payload: float = 0.0) -> Placed:
-    """Make a compiled `flex` the body it stands for: nodes, masses (`payload`, kg, at its tip), stiffness and damping.
+def place(model: mujoco.MjModel, body: SoftBody, prefix: str = "", payload: float = 0.0) -> np.ndarray:
+    """Make a compiled `flex` the body it stands for: nodes and masses (`payload`, kg, at its tip). Returns the coordinates (nq,) of
+    its unknowns, in `qpos` and `qvel` alike (free joints come later).
 
     `mujoco.mj_setConst` must follow, for MuJoCo's own quantities of rest.
     """
@@ -124,43 +75,12 @@ def place(model: mujoco.MjModel, body: SoftBody, parts: Parts, prefix: str = "",
     model.body_mass[bodies] = (body.density * grid.volume + payload * tip)[unknown]
     dof = np.zeros((grid.n_free, 3), np.int64)
     dof[unknown] = model.jnt_dofadr[model.body_jntadr[bodies]][:, None] + np.arange(3)
-    stiff = slice(model.flex_stiffnessadr[f], model.flex_stiffnessadr[f] + body.cells * (3 * NODES) ** 2)
-    step = float(model.opt.timestep)
-    model.flex_stiffness[stiff] = -_at_rest(parts, min(1.0, max(BULK, MARGIN * 0.5 * step / max(body.damping, step)))).ravel()
-    model.flex_damping[f] = max(0.0, body.damping - step)
-    return Placed(dof.ravel(), _wraps(model, dof.ravel(), [prefix + f"tendon_{t + 1}" for t in range(len(parts.cables.rest))]))
-
-
-def _wraps(model: mujoco.MjModel, dof: np.ndarray, names: list[str]) -> Wraps:
-    ids = np.array([model.tendon(name).id for name in names])
-    count = model.tendon_num[ids]
-    where = np.full(model.nv, -1)
-    where[dof] = np.arange(len(dof))
-    place, unknown = np.full((2, len(ids), int(count.max(initial=0))), -1)
-    for t, (start, n) in enumerate(zip(model.tendon_adr[ids], count, strict=True)):
-        place[t, :n] = start + np.arange(n)
-        unknown[t, :n] = where[model.jnt_dofadr[model.wrap_objid[place[t, :n]]]]
-    return Wraps(ids, place, unknown)
+    return dof.ravel()
 
 
 def _nearest(body: SoftBody, at: np.ndarray) -> np.ndarray:
     """(n,) the free node of the lattice that stands at each point (n, 3)."""
     return np.asarray(KDTree(body.lattice.nodes[ACROSS**2 :]).query(at)[1])
-
-
-def _at_rest(parts: Parts, bulk: float) -> np.ndarray:
-    """(c, 81, 81) N/m: tangents of the cells at rest, with a share of their bulk moduli."""
-    cells, K = parts.cells, []
-    for e in range(len(cells.members)):
-        one = slice(e, e + 1)
-        alone = Cells(
-            np.arange(NODES)[None], np.arange(3 * NODES)[None], cells.gradient[one], cells.weight[one], cells.basis[one],
-            cells.inverse[one], cells.shear[one], bulk * cells.bulk[one],
-        )  # fmt: skip
-        tangent = Tangent(np.empty((3 * NODES, 3 * NODES)), np.zeros((1, 4, 3 * NODES)), np.zeros((1, 4)))
-        stiffness(np.zeros((NODES, 3)), alone, np.empty((0, 0, 6)), tangent)
-        K.append(0.5 * (tangent.K + tangent.K.T))
-    return np.stack(K)
 
 
 def _words(values: np.ndarray) -> str:

@@ -123,14 +123,12 @@ def stand(body: HandBody, problem: Problem, longest: float = math.inf) -> tuple[
     started = [Started.of(finger, body.share(k, problem)) for k, finger in enumerate(body.fingers)]
     step = min(longest, *(step_for(finger) for finger in body.fingers))
     spec = mujoco.MjSpec()
-    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_DISCRETE
+    spec.option.timestep = step
     spec.option.gravity = problem.loads.gravity
     for k, (one, place, turn) in enumerate(zip(started, body.places, body.turns, strict=True)):
         quat = np.empty(4)
         mujoco.mju_mat2Quat(quat, np.ascontiguousarray(turn @ turned(one.body.turn)).ravel())
-        spec.attach(
-            flex(one.body, one.parts, step), prefix=f"finger_{k + 1}_", frame=spec.worldbody.add_frame(pos=place, quat=quat)
-        )
+        spec.attach(flex(one.body, step), prefix=f"finger_{k + 1}_", frame=spec.worldbody.add_frame(pos=place, quat=quat))
     return started, spec
 
 

@@ -18,9 +18,11 @@ from twin.errors import DataError, SolveError
 from twin.soft.flex import FINGER, THING
 from twin.soft.hand import HandBody, moving, stand
 
-STICKS = 20.0  # MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 1 mm/s, with its usual 1 by 14
-LONGEST = 2.5e-3  # s: with steps of 4 ms cells that are held hard turned inside out in 3 of 6 grasps, with 3 and 2 ms in none
-SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
+STICKS = (
+    20.0  # MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 0.09 mm/s, with its usual 1 by 0.8
+)
+LONGEST = 2.5e-3  # s: half of it moves fingers that hold a ball by 0.01 mm, the ball by 0.3; cells last as well with 4 ms
+SETTLES = 8e-3  # s: MuJoCo's time constant of a contact; a vertex that touches counts four times, so that its own is 4 ms
 SHAPES = {
     "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
     "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, 2),
@@ -107,7 +109,6 @@ class Scene:
             thing.add(spec)
         self.spec, self.moving = spec, moving(started, spec)
         self.model, self.data = self.moving.model, self.moving.data
-        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # one iteration a step; CG leaves 0.3 N of jitter in the tendons
         self.model.opt.cone, self.model.opt.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, STICKS
         joints = [self.model.joint(t.name) for t in things if not t.fixed]
         self._at = np.array([j.qposadr[0] + np.arange(7) for j in joints], int).reshape(-1, 7)
