@@ -21,7 +21,7 @@ from twin.soft.metric import metric
 from twin.soft.newton import Parts
 from twin.soft.room import room_for
 from twin.soft.statics import SoftPath, SoftStatics, Trial, single_thread, turned
-from twin.soft.stepping import DONE, FASTEST, INVERTED, LOST, UNBALANCED, Engine, Limb, Touch, advance, shape
+from twin.soft.stepping import DONE, FASTEST, INVERTED, LOST, UNBALANCED, Engine, Limb, Touch, advance, once, shape
 
 LONGEST, SHORTEST, PER_DAMPING = (
     4e-3,
@@ -160,11 +160,15 @@ class Moving:
 
     def _touch(self) -> Touch:
         """What touches, where `mj_step1` has seen it."""
-        data = self.data
-        friction = data.contact.friction[data.efc_id[::3], 0] if data.nefc else np.empty(0)
+        data, rows, friction = self.data, np.empty(0, np.int64), np.empty(0)
+        if data.nefc:
+            which = data.efc_id[::3]
+            # A vertex is seen once for each of its facets; it touches once.
+            one = once(data.contact.pos[which], data.contact.geom[which], data.contact.flex[which])
+            rows, friction = (3 * one[:, None] + np.arange(3)).ravel(), data.contact.friction[which[one], 0]
         return Touch(
-            data.efc_J, data.efc_J_colind, data.efc_J_rowadr, data.efc_J_rownnz, data.efc_KBIP.reshape(-1, 4),
-            data.efc_pos - data.efc_margin, data.efc_vel, friction, float(self.model.opt.impratio),
+            data.efc_J, data.efc_J_colind, data.efc_J_rowadr[rows], data.efc_J_rownnz[rows], data.efc_KBIP.reshape(-1, 4)[rows],
+            data.efc_pos[rows] - data.efc_margin[rows], data.efc_vel[rows], friction, float(self.model.opt.impratio),
         )  # fmt: skip
 
     def lengths(self, k: int) -> np.ndarray:

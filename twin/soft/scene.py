@@ -18,11 +18,10 @@ from twin.errors import DataError, SolveError
 from twin.soft.flex import FINGER, THING
 from twin.soft.hand import HandBody, moving, stand
 
-STICKS = (
-    20.0  # MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 0.09 mm/s, with its usual 1 by 0.8
-)
+# MuJoCo's impratio, with an elliptic cone: 15 g held by three fingers then sink by 0.09 mm/s, with its usual 1 by 0.8.
+STICKS = 20.0
 LONGEST = 2.5e-3  # s: half of it moves fingers that hold a ball by 0.01 mm, the ball by 0.3; cells last as well with 4 ms
-SETTLES = 8e-3  # s: MuJoCo's time constant of a contact; a vertex that touches counts four times, so that its own is 4 ms
+SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
 SHAPES = {
     "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
     "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, 2),

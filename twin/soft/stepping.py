@@ -26,6 +26,7 @@ from twin.soft.newton import Parts, Room
 from twin.soft.silicone import LEAST, forces
 
 DONE, INVERTED, LOST, UNBALANCED = 0, 1, 2, 3  # how a step ended
+SAME = 1e-9  # m: places that are one
 FASTEST = 1e3  # m/s: a node that fast is lost, long before its numbers overflow
 
 
@@ -137,6 +138,23 @@ def feel(limb, k, engine, touch, command, first, rows):
         for j in range(own.size):
             rows.W[own[i], own[j]] += both[1 + i, 1 + j]
     return DONE, own, moved
+
+
+@jit
+def once(pos, geom, flex):
+    """Of contacts at places (n, 3) m between geometries and flexes (n, 2) the first at each place."""
+    kept, count = np.empty(pos.shape[0], np.int64), 0
+    for i in range(pos.shape[0]):
+        new = True
+        for k in range(count):
+            j = kept[k]
+            near = max(abs(pos[i, 0] - pos[j, 0]), abs(pos[i, 1] - pos[j, 1]), abs(pos[i, 2] - pos[j, 2])) < SAME
+            same = geom[i, 0] == geom[j, 0] and geom[i, 1] == geom[j, 1] and flex[i, 0] == flex[j, 0] and flex[i, 1] == flex[j, 1]
+            new = new and not (near and same)
+        if new:
+            kept[count] = i
+            count += 1
+    return kept[:count]
 
 
 @jit
