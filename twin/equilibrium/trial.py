@@ -60,7 +60,7 @@ class Near(NamedTuple):
 
 class How(NamedTuple):
     """To which tolerance (rad); whether a tangent factorised at each solution is kept; whether a single Newton step is taken from a
-    neighbour: exact to first order in the difference."""
+    neighbour, exact to first order in the difference, where no tendon rubs."""
 
     tol: float
     keep: bool
@@ -294,9 +294,12 @@ def drive(now, driving, near, i):
 
 @part
 def settled(now, near, how):
-    """The equilibrium of the present sample. Returns its status; the shape stays the last one where there is none."""
+    """The equilibrium of the present sample. Returns its status; the shape stays the last one where there is none.
+
+    Friction wants it in full: slip carries what a single step leaves on to all samples that follow.
+    """
     at, state, factors, held = now.at, now.state, now.factors, now.held
-    lengths, once = some(held.which), how.once and near.q.size > 0
+    lengths, once = some(held.which), how.once and near.q.size > 0 and not now.at.law.mu > 0.0
     if lengths and once:
         move(held, now.sought, now.sought, 1.0)
         status = hold_once(at, state, factors, held)
