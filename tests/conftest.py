@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("MUJOCO_GL", "egl")  # before anything imports mujoco, which reads it then
+
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

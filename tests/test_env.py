@@ -9,8 +9,6 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
-os.environ.setdefault("MUJOCO_GL", "egl")
-
 import gymnasium
 import numpy as np
 import pytest
@@ -202,6 +200,24 @@ def test_randomisation_draws_what_the_diagnosis_does_not_know(diagnosed: Path) -
     assert 0.001 <= next(e for e in joined.effects if e.id == "tip_payload")["mass"] <= 0.002
     own = read_spread("continuum", Twin.of("continuum"))
     assert own.std["backbone.youngs_modulus"] == pytest.approx(4.66e9)
+
+
+def test_a_machine_that_cannot_draw_says_so_each_time() -> None:
+    """In a process of its own: asked a second time, OpenGL without a screen ended it."""
+    code = """
+import mujoco
+from twin.env.picture import Picture
+from twin.errors import TwinError
+for _ in range(2):
+    try:
+        Picture(mujoco.MjSpec(), 0.1)
+    except TwinError as told:
+        print(told)
+"""
+    bare = {k: v for k, v in os.environ.items() if k != "DISPLAY"} | {"MUJOCO_GL": "glfw"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env=bare)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("without a screen set MUJOCO_GL=egl") == 2
 
 
 @pytest.mark.parametrize(("name", "steps"), [("ContinuumReach-v0", 20), ("FingerShape-v0", 8), ("HandReorient-v0", 4)])

@@ -25,6 +25,22 @@ class Mark(NamedTuple):
     to: np.ndarray | None = None
 
 
+_failed: list[str] = []  # why this process cannot draw: OpenGL aborts the process where it is asked once more
+
+
+def _renderer(model: mujoco.MjModel) -> mujoco.Renderer:
+    """Raises TwinError where this machine cannot draw."""
+    if not _failed:
+        try:
+            return mujoco.Renderer(model, HEIGHT, WIDTH)
+        except Exception as fault:  # whatever the machine's OpenGL raises
+            _failed.append(f"{type(fault).__name__}: {fault}")
+    raise TwinError(
+        f"MuJoCo cannot draw here ({_failed[0]}); without a screen set MUJOCO_GL=egl before Python starts and install libegl1, or "
+        "MUJOCO_GL=osmesa and libosmesa6"
+    )
+
+
 class Picture:
     """A camera on a model of one shape, whatever its parameters: only its coordinates change."""
 
@@ -46,13 +62,7 @@ class Picture:
         self._camera = mujoco.MjvCamera()
         self._camera.lookat[:], self._camera.distance = [0.0, 0.0, 0.5 * size], 2.6 * size
         self._camera.azimuth, self._camera.elevation = 130.0, -20.0 * up
-        try:
-            self._renderer = mujoco.Renderer(self._model, HEIGHT, WIDTH)
-        except Exception as fault:  # whatever the machine's OpenGL raises
-            raise TwinError(
-                f"MuJoCo cannot draw here ({type(fault).__name__}: {fault}); without a screen set MUJOCO_GL=egl before Python "
-                "starts and install libegl1, or MUJOCO_GL=osmesa and libosmesa6"
-            ) from None
+        self._renderer = _renderer(self._model)
 
     def draw(self, q: np.ndarray, marks: Sequence[Mark]) -> np.ndarray:
         """(HEIGHT, WIDTH, 3) bytes of the model at coordinates q (nq,), and what is marked."""
