@@ -203,7 +203,7 @@ def test_three_fingers_hold_a_ball_against_its_weight() -> None:
     """Squeezed, then the table's gravity is turned off its side: it is held within millimetres, and does not fall through."""
     scene = Scene(hand(), [BALL, TABLE], HANGING)
     seen = close(scene, 8e-3)[-1]
-    assert seen.touching >= 6
+    assert seen.touching >= 3
     assert depth(scene, seen, 0.025) < 1e-3
     free = close(Scene(hand(), [], HANGING), 8e-3)[-1]
     assert np.linalg.norm(seen.nodes - free.nodes, axis=2).max() > 3e-3  # the ball keeps the fingers apart

@@ -143,8 +143,8 @@ class Problem:
 
     A command is what its tendon's drive says (all tensions if not said). `delayed` are the strains that creep has left, the body's
     own business, advanced in place. `stiffness` (n,) scales the body's. `near`, the kept answer to a neighbouring problem on the
-    same samples, speeds a solve up; with `once` one Newton step a sample is taken from it; `keep` keeps what that needs. `seen` are
-    patches of skin that a camera saw, where a body is asked for those.
+    same samples, speeds a solve up; with `once` one Newton step a sample is taken from it (a backbone whose tendons rub is solved
+    in full); `keep` keeps what that needs. `seen` are patches of skin that a camera saw, where a body is asked for those.
     """
 
     time: np.ndarray

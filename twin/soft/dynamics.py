@@ -88,15 +88,14 @@ class Started:
 class Moving:
     """Bodies in one MuJoCo model, from rest in equilibrium on.
 
-    `model` is compiled of what `flex` makes of each, `placed` says where each is in it, `names` what each is called.
+    `model` is compiled of what `flex` makes of each, `dof` are each one's coordinates in it, `names` what each is called.
     """
 
     def __init__(self, model: mujoco.MjModel, started: Sequence[Started], dof: Sequence[np.ndarray], names: Sequence[str]) -> None:
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= off.mjDSBL_AUTORESET  # a state that is lost must be seen as such
-        model.opt.disableflags |= (
-            off.mjDSBL_SPRING | off.mjDSBL_DAMPER | off.mjDSBL_REFSAFE | off.mjDSBL_ISLAND
-        )  # all in stepping.py
+        # What these do is done in stepping.py.
+        model.opt.disableflags |= off.mjDSBL_SPRING | off.mjDSBL_DAMPER | off.mjDSBL_REFSAFE | off.mjDSBL_ISLAND
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
         self.model, self.data, self.names, self.started = model, mujoco.MjData(model), tuple(names), tuple(started)
         mujoco.mj_setConst(model, self.data)
