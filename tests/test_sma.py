@@ -16,13 +16,14 @@ from scipy.optimize import root
 
 from tools.bench.bench import run
 from tools.bench.design import bench_day
+from tools.bench.effects.tendon_elasticity import TendonElasticity
 from tools.bench.rod import Rod, follow
 from tools.bench.sensors import Noise
 from tools.bench.springs import GF, Springs
 from tools.bench.write import write_set
 from twin.bench import prepare
 from twin.body import Heating, Problem
-from twin.effects import Drive, Loads, Route, named
+from twin.effects import Drive, Effect, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial, read
@@ -353,6 +354,28 @@ def test_a_current_driven_set_is_simulated_from_the_command_line(tmp_path: Path)
             # A tenth more than the instrument's: the readings that drive the twin are noisy too. Tensions feel those most.
             most = (2.0 if channel.kind == "tendon_tension" else 1.2) * (channel.noise or 0.0)
             assert np.sqrt(np.nanmean(error**2)) < most, channel.name
+
+
+def test_a_spring_pulls_in_what_its_elastic_tendon_stretches_too(tmp_path: Path) -> None:
+    """0.2 mm/N on the bench and in the twin: the same displacements at the springs' ends, which are not the paths' own."""
+    rng = np.random.default_rng(4)
+    day = bench_day("by_current", rng)
+    day = replace(day, trials=tuple(t for t in day.trials if t.name in ("turns_1", "pair_2")))
+    noise = Noise()
+    write_set(tmp_path / "day", "an elastic tendon", day, run(Rod(), [TendonElasticity(4.0)], day), noise, rng, displacement=True)
+    robot = load("continuum")
+    bench = prepare(read(tmp_path / "day"), robot)
+    at = [i for i, o in enumerate(bench.outputs) if o.channel.kind == "tendon_displacement"]
+    assert len(at) == 3
+
+    def missed(*effects: Effect) -> float:
+        """RMS, in the encoders' noise."""
+        seen = readings(bench, report(effects, simulate(replace(Twin.of(robot), effects=effects), bench)[0].true))
+        return float(np.sqrt(np.nanmean((bench.measured[0] - seen)[:, at] ** 2))) / noise.displacement
+
+    # The readings of the currents that drive the twin are noisy too: 1.20 in all; without the stretch 19.
+    assert missed(named("tendon_elasticity")({"stretch": 2e-4}, 3)) < 1.5
+    assert missed() > 5.0
 
 
 @pytest.mark.parametrize("name", ["sma_cooling", "sma_hysteresis"])

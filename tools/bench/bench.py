@@ -144,10 +144,11 @@ def _run_heated(situation: Situation, effects: Sequence[Effect], day: Day, trial
         keep=np.arange(len(clock) + lead) >= lead,
         nodes=NODES,
     )
-    markers, tension = shape.markers, shape.tension[:, 0]
+    markers, tension, displacement = shape.markers, shape.tension[:, 0], shape.displacement
     for effect in effects:
+        displacement = effect.encode(displacement, tension)  # at the spring's end, as at the motor's
         markers, tension = effect.observe(clock, ambient, markers), effect.read(clock, tension)
-    return Log(trial, tension, markers, shape.displacement, ambient, current, shape.temperature)
+    return Log(trial, tension, markers, displacement, ambient, current, shape.temperature)
 
 
 def _milestones(time: np.ndarray, drive: np.ndarray, stride: float) -> np.ndarray:
