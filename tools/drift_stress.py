@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from tools.shape_error import score
-from twin.bench import CONTACT
 from twin.diagnose import Settings, diagnose
 from twin.measurements import Recording, read
+from twin.measurements.recording import CONTACT
 from twin.robots import load
 from twin.shape.align import align
 from twin.shape.estimator import estimator

@@ -14,9 +14,9 @@ from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.measurements.channels import meaning
 from twin.measurements.patches import PATCHES, SHARED, Patches, cut, scatter, side
+from twin.measurements.recording import CONTACT
 from twin.robots import Robot
 
-CONTACT = "external_contact"  # a trial's condition: a hand deforms the robot
 ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
 
 
@@ -157,7 +157,7 @@ def _undisturbed(recording: Recording) -> tuple[Recording, list[str]]:
             "predicted: record one without"
         )
     pushed = [t.name for t in recording.trials if CONTACT in t.other]
-    notes = [f"{name}: {CONTACT}, a force nobody knows; the trial is left out" for name in pushed]
+    notes = [f"{name}: {CONTACT}, a force nobody knows; its shape is not predicted" for name in pushed]
     return (replace(recording, trials=free) if pushed else recording), [*recording.notices, *notes]
 
 

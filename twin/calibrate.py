@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from twin.bench import Bench
 from twin.body import TOLERANCE
 from twin.effects import Effect, named
 from twin.errors import SolveError
-from twin.information import solve, untold
+from twin.information import scatter, solve, untold
 from twin.quantities import Fitted, Parameter
 from twin.residual import Whitener
 from twin.robots import Robot
@@ -193,7 +194,18 @@ class Fit:
         return self.J.T @ self.J + np.diag(prior_weight(self.model) ** 2)
 
     def std(self) -> np.ndarray:
-        """Standard errors (n_free,) in SI, widened where the residual is larger than the noise it was divided by."""
+        """Standard errors (n_free,) in SI: by the noise, or by how far trials disagree, whichever is more. A law that is not
+        quite the robot's errs alike all through a trial, and from trial to trial otherwise."""
+        noise, free = self._by_noise(), ~self.at_bound()
+        step = np.array([f.parameter.step for f in self.model.free])
+        J, each = self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
+        if len(each) > 1 and free.any():
+            parts = [(J[a:b].T @ J[a:b], J[a:b].T @ self.z[a:b]) for a, b in each]
+            noise[free] = np.maximum(noise[free], np.sqrt(scatter(parts, self.information()[np.ix_(free, free)])) * step[free])
+        return noise
+
+    def _by_noise(self) -> np.ndarray:
+        """(n_free,) in SI, widened where the residual is larger than the noise it was divided by."""
         inflation = max(1.0, float(self.z @ self.z) / max(self.z.size - len(self.model.free), 1))
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information())), 0.0) * inflation)
         return spread * np.array([f.parameter.step for f in self.model.free])
@@ -229,7 +241,7 @@ class Fit:
         """Labels of the parameters the data do not fix: their standard error stays near their prior's, or nothing tells them, or
         not from each other."""
         out = []
-        for f, s, b in zip(self.model.free, self.std(), untold(self.information()), strict=True):
+        for f, s, b in zip(self.model.free, self._by_noise(), untold(self.information()), strict=True):
             if b or (f.parameter.std is not None and s > UNFIXED * f.parameter.std):
                 out.append(f.label)
         return out

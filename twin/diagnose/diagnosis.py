@@ -14,6 +14,7 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.suspicions.case import Suspicion
 from twin.quantities import Fitted
 from twin.residual import Noise
+from twin.shape.under_hand import UnderHand
 from twin.twin import Twin
 
 
@@ -104,3 +105,4 @@ class Diagnosis:
     settings: Settings
     scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
     untried: tuple[str, ...] = ()  # sets of effects for which the budget left no time
+    under_hand: UnderHand | None = None  # None where no trial shows the shape of a robot that a hand bends

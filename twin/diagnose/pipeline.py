@@ -33,6 +33,7 @@ from twin.diagnose.thresholds import FEW
 from twin.errors import DataError
 from twin.evaluate import UNIT, headline, rms
 from twin.measurements import Recording
+from twin.shape.under_hand import under_hand
 from twin.twin import Twin
 
 Hear = Callable[[Looked], None]
@@ -54,11 +55,15 @@ def diagnose(
     """
     settings = settings or Settings()
     bench = prepare(recording, twin.robot)
-    n = len(bench.inputs)
-    if n < 2:
+    if len(bench.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one sealed")
     looked = looked_at(bench, twin, settings, progress)
     hear(looked)
+    return _by_hand(recording, _sealed(looked, twin, settings, progress))
+
+
+def _sealed(looked: Looked, twin: Twin, settings: Settings, progress: Progress) -> Diagnosis:
+    n = len(looked.bench.inputs)
     bench, nominal = looked.bench, looked.nominal
     if n >= FEW:
         found = conclude(bench, twin, looked.sealed, nominal, settings, progress)
@@ -72,6 +77,14 @@ def diagnose(
         parts.append((conclude(bench, twin, [k], nominal, share, told), [k]))
     found = conclude(bench, twin, [], nominal, share, lambda words: progress(f"all {n} trials: {words}"))
     return _reported(looked, twin, found, parts, settings)
+
+
+def _by_hand(recording: Recording, found: Diagnosis) -> Diagnosis:
+    """What trials under a hand, which nothing was fitted to, say of the sensors that the diagnosis speaks of."""
+    try:
+        return replace(found, under_hand=under_hand(recording, found.calibrated, found.twin))
+    except DataError as error:
+        return replace(found, notices=(*found.notices, f"trials under a hand say nothing of the sensors: {error}"))
 
 
 def conclude(

@@ -10,7 +10,7 @@ import numpy as np
 from twin.errors import shown
 from twin.measurements.channels import Channel
 from twin.measurements.plausible import SLACK_SIGMAS
-from twin.measurements.recording import Trial
+from twin.measurements.recording import CONTACT, Trial
 from twin.measurements.tables import Table
 
 MOST_NAMED = 5  # undeclared columns
@@ -29,7 +29,7 @@ def notices_of(channels: Sequence[Channel], trials: Sequence[Trial], tables: Seq
     else:
         for name, files in extra.items():
             notices.append(f"column {shown(name)} is not declared in measurements.toml and not read ({_listed(files)})")
-    for name, files in _where((trial.name, trial.other) for trial in trials).items():
+    for name, files in _where((trial.name, trial.other.keys() - {CONTACT}) for trial in trials).items():
         notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_listed(files)})")
     for channel in channels:
         gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}

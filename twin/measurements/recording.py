@@ -19,6 +19,8 @@ from twin.measurements.fingerprint import fingerprint
 
 Condition = float | np.ndarray  # a scalar or (3,), SI
 
+CONTACT = "external_contact"  # a trial's condition: something, a hand mostly, pushes the robot with a force nobody knows
+
 
 def read_only(values: Any, dtype: type = float) -> np.ndarray:
     """`values` as an array nobody can write to; copied unless it is one already."""

@@ -11,6 +11,7 @@ from twin.evaluate import KIND
 from twin.report.contents import experiment_words
 from twin.report.loops import loop_words
 from twin.report.numbers import SHOWN, plus_minus
+from twin.report.sections import under_hand
 from twin.report.sections.before_after import rows
 from twin.report.sections.effects import table
 from twin.report.sentence import blind, groups, headline, sentence
@@ -46,6 +47,8 @@ def console(diagnosis: Diagnosis) -> RenderableType:
             effects.add_row(str(row["name"]), Text(values), str(row["probability"]), str(row["error"]))
         parts += [Text("effects in force", style="dim"), effects, Text("")]
     parts += [Text(loop_words(d.loops)), Text("")]
+    if d.under_hand is not None:
+        parts += [Text(under_hand.words(d.under_hand)), Text("")]
     if d.verdict in ("partly_explained", "unexplained"):
         parts.append(Text(d.description))
     if (words := experiment_words(d)) is not None:

@@ -58,6 +58,7 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
         "unfixed": list(d.unfixed),
         "correlation": _correlation(*d.correlation),
         "noise": _noise(d),
+        "under_hand": _under_hand(d),
         "notices": list(d.notices),
         "source": d.bench.recording.source,
         "title": d.bench.recording.title,
@@ -97,6 +98,18 @@ def _visibility(v: Visibility) -> dict[str, Any]:
 def _correlation(names: Sequence[str], of: np.ndarray) -> dict[str, Any]:
     """How the errors of fitted parameters go together, rows and columns as named."""
     return {"parameters": list(names), "matrix": [[finite(float(x)) for x in row] for row in of]}
+
+
+def _under_hand(d: Diagnosis) -> dict[str, Any] | None:
+    """Strains felt less those of the shapes seen, a number a sensor; None where no trial has a hand on a robot that is seen."""
+    seen = d.under_hand
+    if seen is None:
+        return None
+    each = {"calibrated": seen.before, "after": seen.after, "seen_std": seen.seen}
+    return {
+        "trials": list(seen.trials), "frames": seen.frames, "unit": "strain",
+        **{name: [finite(float(x)) for x in values] for name, values in each.items()},
+    }  # fmt: skip
 
 
 def _parameters(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:

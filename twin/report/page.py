@@ -33,7 +33,8 @@ def page(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> str:
     common = {"source": recording.source, "title": recording.title}
     sections = []
     for make in SECTIONS:
-        section = make(story)
+        if (section := make(story)) is None:
+            continue
         body = environment().get_template(section.template).render({**common, **section.content})
         sections.append({"id": section.id, "title": section.title, "body": Markup(body)})
     return (

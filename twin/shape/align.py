@@ -163,8 +163,8 @@ def _known(shown: Sequence[Shown], fit: CloudFit, statics: SoftStatics, net: Net
             covariance = np.broadcast_to(FREE**2 * np.eye(eps.shape[1]), (len(eps), eps.shape[1], eps.shape[1]))
             parts.append((eps, trial.sensed.resistance, covariance))
             continue
-        _, found, at = _fitted(trial, fit, net, body)
-        strains = [_strained(statics, net, z, covariance) for z, covariance in found]
+        _, found, at = behind(trial, fit, net, body)
+        strains = [strained(statics, net, z, covariance) for z, covariance in found]
         parts.append((np.stack([e for e, _ in strains]), trial.sensed.resistance[at], np.stack([c for _, c in strains])))
     return Known(*(np.concatenate(p) for p in zip(*parts, strict=True)))
 
@@ -179,7 +179,7 @@ def _bands(pushed: Sequence[Shown], fit: CloudFit, net: Network, twin: Twin) -> 
     return Bands(by, tuple(sorted({trial.sensed.contact or "" for trial in pushed})))
 
 
-def _fitted(
+def behind(
     trial: Shown, fit: CloudFit, net: Network, body: SoftBody
 ) -> tuple[Felt, list[tuple[np.ndarray, np.ndarray]], list[int]]:
     """What was felt at a trial's clouds, coordinates of the shapes behind these with their covariance, and the samples."""
@@ -190,7 +190,7 @@ def _fitted(
     return felt, [fit(cloud, z) for (_, cloud), z in zip(frames, start, strict=True)], at
 
 
-def _strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Strains (s,) of a shape and their covariance (s, s)."""
     eps = statics.sensed(net.modes.nodes(np.concatenate([z[None], z + STEP * np.eye(len(z))])))["strain"]
     slope = (eps[1:] - eps[0]).T / STEP
@@ -200,7 +200,7 @@ def _strained(statics: SoftStatics, net: Network, z: np.ndarray, covariance: np.
 def _behind(trial: Shown, fit: CloudFit, net: Network, twin: Twin) -> Behind:
     """The named points behind a pushed trial's clouds."""
     body = feeling(twin)
-    felt, found, at = _fitted(trial, fit, net, body)
+    felt, found, at = behind(trial, fit, net, body)
     weights = body.lattice.weights(named_points(twin.robot).rest)
     moved = np.einsum("pn,fnc->fpc", weights, net.modes.nodes(np.stack([z for z, _ in found])))
     basis = np.einsum("pn,knc->kpc", weights, net.modes.basis.reshape(len(net.modes.basis), -1, 3))

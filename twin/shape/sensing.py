@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.bench import CONTACT, Inputs, prepare
+from twin.bench import Inputs, prepare
 from twin.effects import Drive
 from twin.errors import DataError
 from twin.measurements import Recording
+from twin.measurements.recording import CONTACT
 from twin.sensors import Cords, strain
 from twin.soft import SoftBody
 from twin.twin import Twin

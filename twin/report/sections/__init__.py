@@ -19,10 +19,11 @@ from twin.report.sections import (
     residual,
     shapes,
     tip,
+    under_hand,
 )
 from twin.report.sections.section import Section, Story
 
-SECTIONS: tuple[Callable[[Story], Section], ...] = (
+SECTIONS: tuple[Callable[[Story], Section | None], ...] = (
     before_after.section,
     effects.section,
     loops.section,
@@ -34,6 +35,7 @@ SECTIONS: tuple[Callable[[Story], Section], ...] = (
     next_experiment.section,
     identifiability.section,
     parameters.section,
+    under_hand.section,
     noise.section,
     notices.section,
     made_with.section,
