@@ -121,8 +121,8 @@ def test_the_sentence_names_the_sensor_that_differs() -> None:
     seen = np.full(3, 0.0025)
     found = UnderHand(("hand.csv",), 33, np.array([0.002, 0.0132, np.nan]), np.array([0.002, 0.0013, np.nan]), seen)
     assert words(found) == (
-        "Under a hand (33 frames of hand.csv, fitted to nothing): sensor 2 felt 1.32 % strain off the shapes that were seen, with the "
-        "effects 0.13 %; sensor 3 says nothing; the others agree with these to within 0.25 %."
+        "Under a hand (33 frames of hand.csv, fitted to nothing): sensor 2 felt 1.32 % strain off the shapes that were seen, "
+        "with the effects 0.13 %; sensor 3 says nothing; the others agree with these to within 0.25 %."
     )
     agreed = replace(found, before=np.full(3, 0.002), after=np.full(3, 0.003))
     assert "all sensors agree with the shapes that were seen to within 0.25 %" in words(agreed)
