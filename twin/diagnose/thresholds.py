@@ -28,6 +28,8 @@ TABLE: dict[str, Threshold] = {}
 
 
 def _row(name: str, value: Number, unit: str, reason: str, evidence: str) -> Number:
+    if name in TABLE:
+        raise ValueError(f"threshold {name} is in the table already; give this one a name of its own")
     TABLE[name] = Threshold(value, unit, reason, evidence)
     return value
 
@@ -100,7 +102,15 @@ ASTRAY = _row(
     "ASTRAY", 2.0, "ratio", "of markers' distance from their cloud to that of its points from each other: 0.9 on good days",
     "python -m tools.mistakes SET (a finger's)",
 )  # fmt: skip
+THICKER = _row(
+    "THICKER", 1.25, "ratio", "of a body near its base, seen to described: 0.996 to 1.000 on ten finite element days",
+    "python -m tools.mistakes SET (a finger's without markers)",
+)  # fmt: skip
 STUCK = _row("STUCK", 0.1, "of the noise", "a channel that scatters by less is not read", "judgement")
+MOVED = _row(
+    "MOVED", 0.025, "of the motion described", "less, beside noise, is none: half the weakest gain that is called one",
+    "derivation: 0.05 / 2",
+)  # fmt: skip
 ALIVE = _row("ALIVE", 10.0, "standard deviations of noise", "a motion so large cannot be missed", "derivation: 10 sigma")
 EXPLAINED = _row("EXPLAINED", 0.5, "of an error", "as FITS: what one pattern must take", "judgement: as FITS")
 NOISY = _row(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
@@ -77,7 +77,8 @@ class SoftStatics:
             if cold and (found := _SOLVED.get((asked, problem.tolerance))) is not None:
                 u = found.q.reshape(len(found.q), -1, 3)
                 return replace(found, markers=self.markers(u), others=self.sensed(u, problem))
-            trial.run()
+            with suppress(np.linalg.LinAlgError):  # a tangent without an inverse: what comes from there on has no equilibrium
+                trial.run()
         u = trial.found.u.reshape(len(trial.found.u), -1, 3)
         path = SoftPath(
             tension=trial.found.tension, path=trial.found.length - trial.hanging + self.straight_path, markers=self.markers(u),

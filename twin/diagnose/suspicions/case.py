@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.bench import Bench, Inputs
-from twin.diagnose.thresholds import ALIVE, FITS, MOST, SAMPLES, STUCK
+from twin.diagnose.thresholds import ALIVE, FITS, MOST, MOVED, SAMPLES, STUCK
 from twin.effects import Loads
 from twin.errors import TwinError
 from twin.evaluate import TYPICAL, headline
@@ -71,13 +71,15 @@ class Case:
         return names, np.array(whole, int).reshape(-1, 3)
 
     def dead(self) -> list[int]:
-        """Columns of outputs that stand still where the robot as described moves."""
+        """Columns of outputs that stand still, but for noise, where the robot as described moves."""
         if self.predicted is None:
             return []
         y, p = (np.concatenate([v[k] for k in self.trials]) for v in (self.bench.measured, self.predicted))
-        noise = [o.channel.noise or TYPICAL[o.group] for o in self.bench.outputs]
-        still = [np.isfinite(c).any() and np.nanstd(c) < STUCK * s for c, s in zip(y.T, noise, strict=True)]
-        return [j for j, s in enumerate(noise) if still[j] and np.std(p[:, j]) > ALIVE * s]
+        noise = np.array([o.channel.noise or TYPICAL[o.group] for o in self.bench.outputs])
+        there = [np.isfinite(c) for c in y.T]
+        spread, most = (np.array([np.std(c[t]) if t.any() else np.nan for c, t in zip(v.T, there, strict=True)]) for v in (y, p))
+        still = (spread < STUCK * noise) | (np.sqrt(np.maximum(spread**2 - noise**2, 0.0)) < MOVED * most)
+        return np.flatnonzero(still & (most > ALIVE * noise)).tolist()
 
     def few(self) -> list[int]:
         """Of the fitted trials those that pull each tendon most and that carry most: enough to try a change on."""
@@ -154,10 +156,10 @@ class Case:
 
 def beginnings(bench: Bench) -> Bench:
     """The bench with the first row of each trial alone: where that has no equilibrium neither has the trial, and a solver that
-    looks for one row by row takes minutes to say so."""
+    looks for one row by row takes minutes to say so. Where a seen skin would stand is not asked of it."""
     inputs = tuple(
         replace(i, time=i.time[:1], clock=i.clock[:1], command=i.command[:1], temperature=i.temperature[:1],
-                loads=i.loads if len(i.loads.torque) == 1 else replace(i.loads, torque=i.loads.torque[:1]))
+                loads=i.loads if len(i.loads.torque) == 1 else replace(i.loads, torque=i.loads.torque[:1]), seen=None)
         for i in bench.inputs
     )  # fmt: skip
     return replace(bench, inputs=inputs, measured=tuple(y[:1] for y in bench.measured))

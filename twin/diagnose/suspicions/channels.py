@@ -19,7 +19,7 @@ def outputs(case: Case) -> Iterator[Suspicion]:
     """Outputs that stand still where the robot as described moves."""
     found = [case.bench.outputs[j].channel.name for j in case.dead()]
     if found:
-        words = f"{', '.join(found)}: one value all day, and the robot as described moves there"
+        words = f"{', '.join(found)}: one value all day, but for noise, and the robot as described moves there"
         yield Suspicion("dead channel", words, f"remove the [[channel]] {', '.join(found)}, or log again")
 
 

@@ -1,4 +1,4 @@
-"""Point clouds: in another unit than metres, and away from the markers of the same instant."""
+"""Point clouds: in another unit than metres, of another body, and away from the markers of the same instant."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from twin.diagnose.suspicions.case import Case, Suspicion
-from twin.diagnose.thresholds import ASTRAY, HUNDREDS
+from twin.diagnose.thresholds import ASTRAY, HUNDREDS, THICKER
 from twin.measurements import Clouds
+from twin.measurements.patches import BANDS, PATCHES
 
 KIND = "point clouds"
 
@@ -30,7 +31,10 @@ def clouds(case: Case) -> Iterator[Suspicion]:
         words = f"the clouds are {size:.3g} m across and the robot {robot:.2g} m"
         yield Suspicion(KIND, words, f"write `points` in metres: as they stand they would be {unit} (times {factor:g})")
         return
+    yield from _width(case)
     names, columns = case.points()
+    if not names:
+        return
     near = [_nearest(case.bench.measured[k][:, columns], case.bench.inputs[k].time, c) for k, c in seen.items()]
     off, spacing = (np.concatenate([n[part] for n in near]) for part in (0, 1))
     if off.size and np.median(off) > ASTRAY * np.median(spacing):
@@ -40,6 +44,21 @@ def clouds(case: Case) -> Iterator[Suspicion]:
         )
         change = "give clouds and markers in the base frame, both of this robot and by the trial's own clock, or leave out `cloud`"
         yield Suspicion(KIND, words, change)
+
+
+def _width(case: Case) -> Iterator[Suspicion]:
+    """Clouds that are compared, of a body thicker or thinner near its base, where it hardly moves, than the one described."""
+    near = [j for j in case.columns("skin") if case.bench.outputs[j].index < PATCHES // BANDS]
+    if case.predicted is None or not near:
+        return
+    seen, shown = (np.concatenate([v[k] for k in case.trials])[:, near] for v in (case.bench.measured, case.predicted))
+    there = np.isfinite(seen) & np.isfinite(shown)
+    if not there.any():
+        return
+    stands, described = float(np.median(seen[there])), float(np.median(shown[there]))
+    if not 1.0 / THICKER < stands / described < THICKER:
+        words = f"near the base the clouds stand {1e3 * stands:.1f} mm off the axis, and the robot's skin {1e3 * described:.1f} mm"
+        yield Suspicion(KIND, words, "give clouds in the base frame, of this robot, or leave out `cloud`")
 
 
 def _nearest(markers: np.ndarray, time: np.ndarray, clouds: Clouds) -> tuple[np.ndarray, np.ndarray]:
