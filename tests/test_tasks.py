@@ -14,7 +14,9 @@ from twin.errors import DataError, UnknownNameError
 from twin.learn import lerobot
 from twin.learn.demonstrate import ATTEMPTS, FPS, Order, body_of, demonstrate, read
 from twin.learn.hands import LEFT, Eye, aligned, built, fingers
-from twin.learn.imitate import AHEAD, PRESS, Actor, ByStrain, Nearest, learn
+from twin.learn.imitate import AHEAD, PRESS, Actor, Nearest, learn
+from twin.learn.teach import Lesson
+from twin.learn.ways import ByStrain
 from twin.robots import load
 from twin.sensors import resistance
 from twin.tasks import Outcome, Track, Trial, task, tasks
@@ -205,7 +207,7 @@ def test_strains_are_tared(shown: Path) -> None:
 def test_what_was_shown_by_hand_is_done_by_tendons(shown: Path) -> None:
     """From two demonstrations 11 of the 13 trials 11 and 100 to 111 succeeded, 11 and 105 not. Of four of the others one may fail:
     how a grasp ends can hang on rounding."""
-    actor = Actor(task("hold"), HAND, ORDER.seed, "shape", learn("shape", shown))
+    actor = Actor(task("hold"), HAND, ORDER.seed, "shape", learn(Lesson("nearest", "shape", 0), shown))
     trials = [actor.act(np.random.default_rng(seed)) for seed in (103, 104, 106, 107)]
     assert sum(trial.outcome() is Outcome.SUCCESS for trial in trials) >= 3
     assert max(trial.seen.tension.max() for trial in trials) < 6.0  # N: told 4 at most by a twin of other silicone
