@@ -33,6 +33,7 @@ from twin.tasks import Outcome, Task, Trial
 
 NEAREST = "nearest"
 PRESS = 0.1  # chosen, as AHEAD, on five or six trials each of seed 100: 4 of 6, at 0.2 3 of 5, the others squeezed up and out
+LEARNED_PRESS = 0.05  # of a learned policy; on four trials of turn of seed 100: all; with 0.1 cylinders were turned too far
 DRIFT = 0.083  # of a cord's resistance in 14 h, at most (Yoo et al. 2025)
 AHEAD = 5  # frames, 0.2 s: what is followed lags by some 0.05 s, and a frame is 0.04 s
 
@@ -54,7 +55,7 @@ class Nearest:
         ends = np.cumsum([len(e) for e in episodes])
         last = np.repeat(ends - 1, [len(e) for e in episodes])
         later = self.frames[np.minimum(np.arange(len(self.frames)) + AHEAD, last)]
-        self.wanted = pressed(later, hanging(episodes))
+        self.wanted = pressed(later, hanging(episodes), PRESS)
 
     def begin(self, rng: np.random.Generator) -> Act:
         return self
@@ -75,7 +76,7 @@ class Learned:
         from twin.learn.policy import Acting
 
         acting = Acting(self.net, int(rng.integers(2**31)))
-        return lambda x: pressed(acting(x), self.hanging)
+        return lambda x: pressed(acting(x), self.hanging, LEARNED_PRESS)
 
 
 def hanging(episodes: Sequence[np.ndarray]) -> np.ndarray:
@@ -83,9 +84,9 @@ def hanging(episodes: Sequence[np.ndarray]) -> np.ndarray:
     return np.mean([e[0] for e in episodes], axis=0)
 
 
-def pressed(wanted: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Exaggerated by PRESS."""
-    return wanted + PRESS * (wanted - rest)
+def pressed(wanted: np.ndarray, rest: np.ndarray, share: float) -> np.ndarray:
+    """Further from rest by this share."""
+    return wanted + share * (wanted - rest)
 
 
 def learn(lesson: Lesson, folder: Path, progress: Callable[[str], None] = lambda words: None) -> Policy:
