@@ -157,6 +157,14 @@ def test_an_action_is_the_way_to_the_next_shape(shown: Path) -> None:
     assert set(json.loads((shown / ATTEMPTS).read_text("utf-8"))["outcomes"]) <= {o.value for o in Outcome}
 
 
+def test_a_person_steadies_what_turns_in_the_hand(shown: Path) -> None:
+    """Turned by 0.3 and 0.2 degrees in the end; by 29 and 13 under a hand that pushes straight on, whatever turns."""
+    for episode in lerobot.read_episodes(shown, ("object.pose",)):
+        pose = episode["object.pose"]
+        angle = np.unwrap(2.0 * np.arctan2(pose[:, 6], pose[:, 3]))
+        assert abs(np.degrees(angle[-1] - angle[0])) < 3.0
+
+
 # ---- what is learned -------------------------------------------------------------------------------------------------------------
 
 
@@ -222,6 +230,7 @@ def test_what_was_shown_by_hand_is_done_by_tendons(shown: Path) -> None:
         (["demonstrate", "holt", "--n", "1", "--out", "x"], "did you mean 'hold'"),
         (["demonstrate", "hold", "--n", "0", "--out", "x"], "n and jobs from 1 on"),
         (["imitate", "x"], "make them with twin demonstrate"),
+        (["imitate", "x", "--drift", "1.5"], "a share from 0 to below 1"),
     ],
 )
 def test_bad_words_are_said_in_one_line(

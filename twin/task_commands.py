@@ -73,6 +73,8 @@ class Imitate:
     way: Annotated[str, arg(help="shape, strain, or bend: what opposite cords differ by")] = "shape"
     train_seed: Annotated[int, arg(help="draws the training; nearest has none")] = 0
     hand: Annotated[int | None, arg(help="seed of the hand that acts; default: the one that was shown")] = None
+    drift: Annotated[float, arg(help="share by which cords drift at most, from the first trial to the last; 0.083 was seen")] = 0.0
+    checked: Annotated[bool, arg(help="free motion before each trial tells the drift, which is undone")] = False
     trials: Annotated[int, arg(help="how many")] = 20
     seed: Annotated[int, arg(help="draws the trials")] = 0
     jobs: Annotated[int, arg(help="worker threads")] = cores()
@@ -86,13 +88,16 @@ class Imitate:
 
         if self.trials < 1 or min(self.seed, self.train_seed, self.hand or 0) < 0 or self.jobs < 1:
             raise DataError("--trials and --jobs from 1 on, --seed, --train-seed and --hand from 0 on are needed")
+        if not 0.0 <= self.drift < 1.0:
+            raise DataError(f"--drift {self.drift:g}: a share from 0 to below 1 is needed")
         order = read(self.data)
         lesson, what = Lesson(self.policy, self.way, self.train_seed), task(order["task"])
         hand = order["seed"] if self.hand is None else self.hand
         out.print(f"{what.name()}: success is that {what.success}", highlight=False, markup=False)
         with working(f"{what.name()} by {self.way}") as progress:
             policy = learn(lesson, self.data, progress)
-            found = Actor(what, load(HAND), hand, self.way, policy).score(self.trials, self.seed, self.jobs, progress)
+            actor = Actor(what, load(HAND), hand, self.way, policy, self.drift, self.checked)
+            found = actor.score(self.trials, self.seed, self.jobs, progress)
         whose = "the hand shown" if hand == order["seed"] else f"hand {hand}, shown on hand {order['seed']}"
         said = f"{what.name()} by {self.way} ({self.policy}), {whose}, seed {self.seed}: {counts(found)}"
         out.print(said, highlight=False, markup=False)

@@ -22,8 +22,8 @@ from twin.robots import Robot
 from twin.tasks import STEP
 
 CORDS = 4  # of a finger
-# Chosen on trials of seed 100, between what turns every cylinder (2.5 N; 2 N did not) and what lifts a disc by 6 mm, not 10 (2 N; 2.5
-# did): the harder tendons pull the more fingers shorten and drag along what they hold.
+# Chosen on trials of seed 100, between what turns every cylinder (2.5 N; 2 N did not) and what lifts a disc by 6 mm, not 10
+# (2 N; 2.5 did): the harder tendons pull the more fingers shorten and drag along what they hold.
 GRIP = Limits(most=2.25)
 
 
