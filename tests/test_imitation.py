@@ -49,15 +49,15 @@ def done(policy: Cloning, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["diffusion", "cloning"])
 def test_what_is_taught_does_what_was_shown_and_what_is_not_does_not(shown: Path, kind: str) -> None:
-    """Courses differ by 20 % of the way aside and the time: within 20 % of how far the mean course goes, root mean
-    square; what is not taught leaves most of it."""
-    mean = np.mean([e["observation.state"] for e in lerobot.read_episodes(shown, ("observation.state",))], axis=0)
-    mean = mean[np.minimum(np.arange(FRAMES) + SOON, FRAMES - 1)]
+    """From the mean course demonstrations stray by up to 21 % of how far it goes, root mean square; what is taught by up to 22 (seen),
+    what is not by most of it."""
+    courses = [e["observation.state"] for e in lerobot.read_episodes(shown, ("observation.state",))]
+    mean = np.mean(courses, axis=0)[np.minimum(np.arange(FRAMES) + SOON, FRAMES - 1)]
     size = np.sqrt(mean.var(axis=0).mean())
     both = {epochs: done(taught(Lesson(kind, "shape", epochs, epochs), shown)) for epochs in (0, 100)}
     off = {epochs: np.sqrt(((wanted - mean) ** 2).mean()) for epochs, wanted in both.items()}
     assert off[0] > 0.5 * size
-    assert off[100] < 0.2 * size
+    assert off[100] < 0.3 * size
     card = json.loads((shown / "policies" / f"{kind}-shape-100.json").read_text("utf-8"))
     assert card["loss"][-1] < 0.2 * card["loss"][0]
     assert {"torch", "diffusers", "numpy"} == card["versions"].keys()

@@ -213,8 +213,8 @@ def test_strains_are_tared(shown: Path) -> None:
 
 
 def test_what_was_shown_by_hand_is_done_by_tendons(shown: Path) -> None:
-    """From two demonstrations 11 of the 13 trials 11 and 100 to 111 succeeded, 11 and 105 not. Of four of the others one may fail:
-    how a grasp ends can hang on rounding."""
+    """From two demonstrations 11 of the 13 trials 11 and 100 to 111 succeeded, 11 and 105 not, before persons steadied what turns;
+    of these four three or four do since: how a grasp ends can hang on rounding."""
     actor = Actor(task("hold"), HAND, ORDER.seed, "shape", learn(Lesson("nearest", "shape", 0), shown))
     trials = [actor.act(np.random.default_rng(seed)) for seed in (103, 104, 106, 107)]
     assert sum(trial.outcome() is Outcome.SUCCESS for trial in trials) >= 3
