@@ -49,8 +49,8 @@ def done(policy: Cloning, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["diffusion", "cloning"])
 def test_what_is_taught_does_what_was_shown_and_what_is_not_does_not(shown: Path, kind: str) -> None:
-    """From the mean course demonstrations stray by up to 21 % of how far it goes, root mean square; what is taught by up to 22 (seen),
-    what is not by most of it."""
+    """From the mean course demonstrations stray by up to 21 % of how far it goes, RMS; what is taught by up to 22 (seen), what
+    is not by most of it."""
     courses = [e["observation.state"] for e in lerobot.read_episodes(shown, ("observation.state",))]
     mean = np.mean(courses, axis=0)[np.minimum(np.arange(FRAMES) + SOON, FRAMES - 1)]
     size = np.sqrt(mean.var(axis=0).mean())
