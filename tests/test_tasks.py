@@ -14,7 +14,9 @@ from twin.errors import DataError, UnknownNameError
 from twin.learn import lerobot
 from twin.learn.demonstrate import ATTEMPTS, FPS, Order, body_of, demonstrate, read
 from twin.learn.hands import LEFT, Eye, aligned, built, fingers
-from twin.learn.imitate import AHEAD, PRESS, Actor, ByStrain, Nearest, learn
+from twin.learn.imitate import AHEAD, PRESS, Actor, Nearest, learn
+from twin.learn.teach import Lesson
+from twin.learn.ways import ByStrain
 from twin.robots import load
 from twin.sensors import resistance
 from twin.tasks import Outcome, Track, Trial, task, tasks
@@ -155,6 +157,14 @@ def test_an_action_is_the_way_to_the_next_shape(shown: Path) -> None:
     assert set(json.loads((shown / ATTEMPTS).read_text("utf-8"))["outcomes"]) <= {o.value for o in Outcome}
 
 
+def test_a_person_steadies_what_turns_in_the_hand(shown: Path) -> None:
+    """Turned by 0.3 and 0.2 degrees in the end; by 29 and 13 under a hand that pushes straight on, whatever turns."""
+    for episode in lerobot.read_episodes(shown, ("object.pose",)):
+        pose = episode["object.pose"]
+        angle = np.unwrap(2.0 * np.arctan2(pose[:, 6], pose[:, 3]))
+        assert abs(np.degrees(angle[-1] - angle[0])) < 3.0
+
+
 # ---- what is learned -------------------------------------------------------------------------------------------------------------
 
 
@@ -203,9 +213,9 @@ def test_strains_are_tared(shown: Path) -> None:
 
 
 def test_what_was_shown_by_hand_is_done_by_tendons(shown: Path) -> None:
-    """From two demonstrations 11 of the 13 trials 11 and 100 to 111 succeeded, 11 and 105 not. Of four of the others one may fail:
-    how a grasp ends can hang on rounding."""
-    actor = Actor(task("hold"), HAND, ORDER.seed, "shape", learn("shape", shown))
+    """From two demonstrations 11 of the 13 trials 11 and 100 to 111 succeeded, 11 and 105 not, before persons steadied what turns;
+    of these four three or four do since: how a grasp ends can hang on rounding."""
+    actor = Actor(task("hold"), HAND, ORDER.seed, "shape", learn(Lesson("nearest", "shape", 0), shown))
     trials = [actor.act(np.random.default_rng(seed)) for seed in (103, 104, 106, 107)]
     assert sum(trial.outcome() is Outcome.SUCCESS for trial in trials) >= 3
     assert max(trial.seen.tension.max() for trial in trials) < 6.0  # N: told 4 at most by a twin of other silicone
@@ -220,6 +230,7 @@ def test_what_was_shown_by_hand_is_done_by_tendons(shown: Path) -> None:
         (["demonstrate", "holt", "--n", "1", "--out", "x"], "did you mean 'hold'"),
         (["demonstrate", "hold", "--n", "0", "--out", "x"], "n and jobs from 1 on"),
         (["imitate", "x"], "make them with twin demonstrate"),
+        (["imitate", "x", "--drift", "1.5"], "a share from 0 to below 1"),
     ],
 )
 def test_bad_words_are_said_in_one_line(

@@ -64,12 +64,17 @@ class Demonstrate:
 class Imitate:
     """Do by tendons what was shown by hand, and count what becomes of fresh trials.
 
-    The nearest frame shown says what is wanted next, of shapes or of raw strains; control by shape, or strain tracking, follows.
+    A policy says what is wanted next, of shapes or of raw strains; control by shape, or strain tracking, follows. It is learned
+    first where DATA/policies does not hold it yet; a stop in between loses little.
     """
 
     data: Positional[Annotated[Path, arg(help="folder that twin demonstrate made")]]
+    policy: Annotated[str, arg(help="diffusion or cloning (extra imitation), or nearest: the nearest frame")] = "diffusion"
     way: Annotated[str, arg(help="shape, strain, or bend: what opposite cords differ by")] = "shape"
+    train_seed: Annotated[int, arg(help="draws the training; nearest has none")] = 0
     hand: Annotated[int | None, arg(help="seed of the hand that acts; default: the one that was shown")] = None
+    drift: Annotated[float, arg(help="share by which cords drift at most, from the first trial to the last; 0.083 was seen")] = 0.0
+    checked: Annotated[bool, arg(help="free motion before each trial tells the drift, which is undone")] = False
     trials: Annotated[int, arg(help="how many")] = 20
     seed: Annotated[int, arg(help="draws the trials")] = 0
     jobs: Annotated[int, arg(help="worker threads")] = cores()
@@ -77,19 +82,25 @@ class Imitate:
     def run(self) -> None:
         from twin.learn.demonstrate import read
         from twin.learn.imitate import Actor, learn
+        from twin.learn.teach import Lesson
         from twin.robots import load
         from twin.tasks import task
 
-        if self.trials < 1 or min(self.seed, self.hand or 0) < 0 or self.jobs < 1:
-            raise DataError("--trials and --jobs from 1 on, --seed and --hand from 0 on are needed")
+        if self.trials < 1 or min(self.seed, self.train_seed, self.hand or 0) < 0 or self.jobs < 1:
+            raise DataError("--trials and --jobs from 1 on, --seed, --train-seed and --hand from 0 on are needed")
+        if not 0.0 <= self.drift < 1.0:
+            raise DataError(f"--drift {self.drift:g}: a share from 0 to below 1 is needed")
         order = read(self.data)
-        policy, what = learn(self.way, self.data), task(order["task"])
+        lesson, what = Lesson(self.policy, self.way, self.train_seed), task(order["task"])
         hand = order["seed"] if self.hand is None else self.hand
         out.print(f"{what.name()}: success is that {what.success}", highlight=False, markup=False)
         with working(f"{what.name()} by {self.way}") as progress:
-            found = Actor(what, load(HAND), hand, self.way, policy).score(self.trials, self.seed, self.jobs, progress)
+            policy = learn(lesson, self.data, progress)
+            actor = Actor(what, load(HAND), hand, self.way, policy, self.drift, self.checked)
+            found = actor.score(self.trials, self.seed, self.jobs, progress)
         whose = "the hand shown" if hand == order["seed"] else f"hand {hand}, shown on hand {order['seed']}"
-        out.print(f"{what.name()} by {self.way}, {whose}, seed {self.seed}: {counts(found)}", highlight=False, markup=False)
+        said = f"{what.name()} by {self.way} ({self.policy}), {whose}, seed {self.seed}: {counts(found)}"
+        out.print(said, highlight=False, markup=False)
 
 
 def counts(found: Counter[Outcome]) -> str:

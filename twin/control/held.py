@@ -86,8 +86,10 @@ class HeldFinger:
         return self.statics.strain_slope(self._shape.u)[0]
 
     def response(self) -> Response:
+        """Raises SolveError where a failed `hold` has left none."""
         inverse, pulled = self._shape.inverse, self._solid.pulled
-        assert inverse is not None  # `hang` and `march` leave one
+        if inverse is None:
+            raise SolveError("the finger was not found again where it stayed; start it anew from its hanging rest")
         moved = -(inverse @ pulled.pull.T.astype(np.float32)).astype(float)  # (n, t)
         points = (self._weights @ moved.reshape(len(moved) // 3, -1)).reshape(-1, 3, moved.shape[1])
         length = pulled.gradient @ moved - self.route.stretch * np.eye(moved.shape[1])

@@ -26,6 +26,10 @@ TABLE = "table"
 HALF = 5e-3  # m, half the table's thickness
 TOUCHED = 0.2  # s: touched for less than that an object was not reached
 LAST = 0.4  # s at the end, over which an object must stay
+EAGER, STRONGEST = (
+    1.5,
+    0.6,
+)  # N/(rad s), N: how a person who sees a thing turn pushes against it; force, not speed, is what hands give
 FALLEN, SUNK, SLIDES = 30e-3, 10e-3, 3e-3  # m: dropped; slipped since the start; slipped in the last LAST s
 
 
@@ -111,9 +115,16 @@ class Task(ABC):
     def things(self, rng: np.random.Generator) -> tuple[Thing, ...]:
         """The object and the table, in the palm's frame."""
 
-    def sideways(self, before: float, seen: Sight, start: Sight) -> float:
-        """N by which a person who pushed by `before` and sees this pushes each finger along its own y axis."""
+    def turns(self, t: float) -> float:
+        """rad by which a person wants the object turned about the palm's axis, t (s) after the start."""
         return 0.0
+
+    def sideways(self, before: float, seen: Sight, start: Sight) -> float:
+        """N by which a person who pushed by `before` and sees this pushes each finger along its own y axis, which goes around
+        against the palm's z axis: ever harder until the object is turned as it should be by now."""
+        turned = 2.0 * np.arctan2(seen.turn[0, 3], seen.turn[0, 0]) - 2.0 * np.arctan2(start.turn[0, 3], start.turn[0, 0])
+        push = before - EAGER * STEP * (self.turns(seen.time - start.time) - turned)
+        return float(np.clip(push, -STRONGEST, STRONGEST))
 
     @abstractmethod
     def judge(self, track: Track) -> Outcome:

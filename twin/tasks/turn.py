@@ -6,12 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from twin.soft.scene import Sight, Thing
-from twin.tasks.task import STEP, Outcome, Task, Track, table
+from twin.soft.scene import Thing
+from twin.tasks.task import Outcome, Task, Track, table
 
 WANTED, WITHIN = np.radians(30.0), np.radians(10.0)
 BEGINS, TAKES = 1.3, 1.0  # s
-EAGER, STRONGEST = 1.5, 0.6  # N/(rad s), N: how a person who sees that it lags pushes harder; force, not speed, is what hands give
 AWAY, TILTED = 10e-3, np.radians(20.0)
 
 
@@ -29,12 +28,9 @@ class Turn(Task):
         )  # fmt: skip
         return thing, table(0.110)
 
-    def sideways(self, before: float, seen: Sight, start: Sight) -> float:
-        """Ever harder until it is where it should be by now; a finger's own y axis goes around against the palm's z axis."""
-        x = float(np.clip((seen.time - start.time - BEGINS) / TAKES, 0.0, 1.0))
-        turned = 2.0 * np.arctan2(seen.turn[0, 3], seen.turn[0, 0])
-        push = before - EAGER * STEP * (WANTED * x * x * (3.0 - 2.0 * x) - turned)
-        return float(np.clip(push, -STRONGEST, STRONGEST))
+    def turns(self, t: float) -> float:
+        x = float(np.clip((t - BEGINS) / TAKES, 0.0, 1.0))
+        return WANTED * x * x * (3.0 - 2.0 * x)
 
     def judge(self, track: Track) -> Outcome:
         yaw, last = track.yaw(), track.last
