@@ -189,11 +189,12 @@ def by_length(data: Recording) -> Recording:
     """The same motion commanded by lengths; a tendon that hardly pulled is paid out by 2 mm, or three would fight each other."""
     bench = prepare(data, load(data.robot))
     drives = tuple(Channel(f"tendon_{i}_displacement", "input", "mm", 2e-5) for i in (1, 2, 3))
+    disks = tuple(c for c in data.channels if c.name.startswith("disk"))
     trials = []
     for trial, trace in zip(data.trials, simulate(Twin(bench.robot), bench), strict=True):
         lengths = trace.true.displacement - 2e-3 * np.exp(-trace.true.tension / 0.15)
-        trials.append(replace(trial, values=dict(trial.values) | {c.name: u for c, u in zip(drives, lengths.T, strict=True)}))
-    disks = tuple(c for c in data.channels if c.name.startswith("disk"))
+        seen = {c.name: trial.values[c.name] for c in disks}
+        trials.append(replace(trial, values=seen | {c.name: u for c, u in zip(drives, lengths.T, strict=True)}))
     return replace(data, channels=(*drives, *disks), trials=tuple(trials))
 
 
