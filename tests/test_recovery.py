@@ -29,7 +29,8 @@ from twin.robots import load
 from twin.twin import Twin
 
 STRENGTH = {"load_cell_bias": 4.0, "load_cell_drift": 3.0, "base_tilt": 4.0, "tip_payload": 4.0, "contact": 1.6, "time_delay": 0.8,
-            "actuator_saturation": 3.5, "tendon_backlash": 4.0, "load_cell_crosstalk": 1.0, "transmission_error": 4.0}  # fmt: skip
+            "actuator_saturation": 3.5, "tendon_backlash": 4.0, "load_cell_crosstalk": 1.0, "transmission_error": 4.0,
+            "stroke_limit": 6.0}  # fmt: skip
 
 
 def fitted_alone(bench: Day, effect: str, seed: int = 5) -> tuple[Fit, Fit, Truth]:

@@ -1,7 +1,9 @@
 """The verdict's sentence, its numbers, and the console."""
 
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
 from small_diagnosis import diagnosis, recording
@@ -9,7 +11,7 @@ from small_diagnosis import diagnosis, recording
 from twin.diagnose import Claim, Fold
 from twin.diagnose.loops import Loop, Loops
 from twin.quantities import Fitted
-from twin.report import console, sentence
+from twin.report import console, sentence, widths
 from twin.report.loops import advice, loop_words
 from twin.report.numbers import column, number, percent, plus_minus, rough
 from twin.report.sentence import blind, claim_words, verdict_words
@@ -175,3 +177,17 @@ def test_what_the_budget_left_untried_stands_beside_the_verdict():
     assert "no effect tried may claim" in words
     assert "before tendon friction, backbone creep, tendon friction + base tilt and 1 more." in words
     assert "budget" not in sentence(diagnosis("unexplained"))
+
+
+def test_loop_widths_are_drawn_against_the_load_measured_and_predicted() -> None:
+    d = diagnosis()
+    assert widths.plot(d) is None, "one load"
+    held = [replace(i, loads=replace(i.loads, torque=np.full(len(i.time), 0.1 * k))) for k, i in enumerate(d.bench.inputs)]
+    drawn = widths.plot(replace(d, bench=replace(d.bench, inputs=tuple(held))))
+    assert drawn is not None
+    data: Any = drawn.figure.data
+    measured, calibrated, after = data
+    np.testing.assert_allclose(measured.x, 0.1 * np.arange(5), atol=1e-6)
+    # mm: the loop made is 2 mm a newton wide, its mean over pulls to 2, 2.2, ... N half of that; its ends, at rest, do not count
+    np.testing.assert_allclose(calibrated.y, 2.0 * (1.0 + 0.1 * np.arange(5)), rtol=0.15)
+    assert max(*measured.y, *after.y) < 0.15, "noise alone"

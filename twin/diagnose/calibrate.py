@@ -7,15 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.bench import Bench
-from twin.calibrate import fit
+from twin.calibrate import Fit, fit
 from twin.diagnose.budget import Budget
 from twin.diagnose.diagnosis import Settings
 from twin.diagnose.evidence import Evidence
+from twin.diagnose.jumps import next_jump, stands
 from twin.diagnose.objective import objective_of
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind
 from twin.diagnose.study import Progress, Study
+from twin.diagnose.thresholds import JUMPS
 from twin.diagnose.weigh import Weighed, weigh
+from twin.diagnose.zeros import Jump, jumping
 from twin.twin import Twin
 
 
@@ -33,4 +36,21 @@ def calibrate(
     start, objective, notes = objective_of(bench, twin, fitted, settings)
     study = Study(objective, Evidence(bench, fitted), progress, budget)
     progress("calibration")
-    return study, weigh(study, fit(objective, start, refresh=True)), [*alone, *notes]
+    return study, weigh(study, _with_jumps(study, fit(objective, start, refresh=True))), [*alone, *notes]
+
+
+def _with_jumps(study: Study, base: Fit) -> Fit:
+    """The calibrated robot, fitted again beside the zeros that jump, one after the other; where there are more than `JUMPS`, they
+    are no zeros and none is taken."""
+    jumps: list[Jump] = []
+    found = base
+    while (jump := next_jump(study, found, jumps)) is not None:
+        if len(jumps) == JUMPS:
+            return base
+        study.progress(f"zeros that jump, {len(jumps) + 1}")
+        more = sorted([*jumps, jump], key=lambda j: j.since)
+        fitted = fit(study.objective, jumping(base.model, more), near=base.evaluation, refresh=True)
+        if not stands(study, fitted, jump):
+            break
+        jumps, found = more, fitted
+    return found

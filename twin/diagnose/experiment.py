@@ -13,6 +13,7 @@ import numpy as np
 from twin.bench import Bench, Inputs, Output
 from twin.calibrate import Evaluation, Fit, Objective
 from twin.diagnose.thresholds import CLEAR, HEAVIEST, HELD, LEAST_LOAD, MOST_RUNS
+from twin.diagnose.zeros import of_robot
 from twin.effects import Drive
 from twin.errors import SolveError
 from twin.information import solve
@@ -94,7 +95,7 @@ def _shown(x: float) -> str:
 
 def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
     """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
-    rivals = tuple(e.id for e in a.model.twin.effects), tuple(e.id for e in b.model.twin.effects)
+    rivals = tuple(e.id for e in of_robot(a.model.twin.effects)), tuple(e.id for e in of_robot(b.model.twin.effects))
     bench, noise = _foreseen(bench, noise)
     apart = []
     for words, inputs in menu(bench):

@@ -5,7 +5,7 @@ look -> calibrate -> screen -> search -> choose -> gate -> judge -> describe, al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,9 +29,11 @@ from twin.diagnose.search import search
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind, split
 from twin.diagnose.study import Progress, silent
-from twin.diagnose.thresholds import FEW
+from twin.diagnose.thresholds import FEW, FIRST
+from twin.diagnose.zeros import jumps_of, lasting
+from twin.diagnose.zeros import words as jumped
 from twin.errors import DataError
-from twin.evaluate import UNIT, headline, rms
+from twin.evaluate import KIND, UNIT, headline, rms
 from twin.measurements import Recording
 from twin.shape.under_hand import under_hand
 from twin.twin import Twin
@@ -113,8 +115,8 @@ def _reported(
     folds = tuple(Fold(trials[0], c.judged.verdict, tuple(x.effect for x in c.judged.claims)) for c, trials in parts)
     return Diagnosis(
         verdict=judged.verdict,
-        twin=found.final,
-        calibrated=found.base,
+        twin=lasting(found.final),
+        calibrated=lasting(found.base),
         claims=tuple(replace(c, error=opened.error(lambda x, e=c.effect: x.without(e))) for c in judged.claims),
         runners_up=tuple(
             replace(c, error=opened.error(lambda x, s=(c.effect, *c.beside): x.weighed(s))) for c in judged.runners_up
@@ -146,11 +148,22 @@ def _reported(
         loops=seen,
         suspicions=looked.suspicions,
         predictions=_predictions(bench, found, opened, nominal),
-        notices=(*bench.notices, *found.notices, *said.notices),
+        notices=(*bench.notices, *found.notices, *jumped(bench, final.fit), *_anew(found, opened), *said.notices),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.found.all),
         untried=tuple(study.budget.untried),
     )
+
+
+def _anew(found: Conclusion, opened: Opened) -> Iterator[str]:
+    """Where zeros jump, the sealed trials' error with those that were fitted, and with each trial's own."""
+    for group in dict.fromkeys(j.group for j in jumps_of(found.final)):
+        unit, factor = UNIT[group]
+        fitted, own = (factor * e for e in opened.rezeroed(group))
+        yield (
+            f"sealed trials, {KIND[group]}: {fitted:.3g} {unit} with the zeros that were fitted, {own:.3g} {unit} where each "
+            f"trial's is taken from its own first {FIRST} rows; the first counts"
+        )
 
 
 def _experiment(found: Conclusion, settings: Settings) -> Experiment | None:

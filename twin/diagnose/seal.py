@@ -13,6 +13,7 @@ from twin.diagnose.diagnosis import Errors
 from twin.diagnose.objective import sensitivity
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind
+from twin.diagnose.zeros import anew
 from twin.errors import SolveError
 from twin.evaluate import headline, rms, squares
 from twin.twin import Twin, readings, report, simulate
@@ -55,6 +56,12 @@ class Opened:
             return float("nan")
         groups = [o.group for o in self.bench.outputs]
         return rms(self.bench, [self.bench.measured[k] - at[k] for k in self.trials], headline(groups))
+
+    def rezeroed(self, group: str) -> tuple[float, float]:
+        """RMS in SI of one group of outputs by the twins left in force: as it is, and with each trial's zero taken anew."""
+        at = self.predictions(lambda c: c.final)
+        raw = [self.bench.measured[k] - at[k] for k in self.trials]
+        return rms(self.bench, raw, group), rms(self.bench, [anew(self.bench, group, r) for r in raw], group)
 
     def errors(self, seed: int) -> Errors:
         """As described, calibrated and with the effects, on the sealed trials that each of the three has an equilibrium for."""

@@ -294,3 +294,15 @@ MOST_RUNS = _row("MOST_RUNS", 50, "runs", "more than that is no advice", "judgem
 HEAVIEST = _row("HEAVIEST", 0.03, "kg", "nobody is asked to hang more on a robot than that", "judgement")
 LEAST_LOAD = _row("LEAST_LOAD", 0.01, "kg", "a payload that bends a bench-sized robot", "judgement")
 HELD = _row("HELD", 0.75, "of the largest command", "a step that is held, within what was already commanded", "judgement")
+
+# ---- zeros that jump ---------------------------------------------------------------------------------------------------------
+
+NEARBY = _row("NEARBY", 8, "trials", "before and after a jump that are compared; more of them wander", "judgement")
+JUMPED = _row("JUMPED", 0.5, "sigma", "a smaller jump moves no name", "judgement: as MUCH")
+RIGID = _row(
+    "RIGID", 0.9, "of a step's square", "what a moved camera does to eight markers in a row, of which a turn about the base takes "
+    "0.79 at most where it is shifted", "derivation: (sum z)^2 / (8 sum z^2), z = 1..8",
+)  # fmt: skip
+JUMPS = _row("JUMPS", 4, "jumps", "more of them in a session: nothing there has a zero", "judgement")
+FIRST = _row("FIRST", 5, "rows", "of a trial that its zero is taken anew by, to compare", "judgement")
+SURE = _row("SURE", 3.0, "standard errors", "of several angles those that jumped by more are named", "judgement")

@@ -10,6 +10,7 @@ from twin.calibrate import Fit, Model, fit
 from twin.diagnose.evidence import Discrepancy
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import ROUGHLY
+from twin.diagnose.zeros import of_robot
 from twin.effects import Start, catalogue
 from twin.errors import SolveError
 
@@ -24,7 +25,8 @@ class Weighed:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        return tuple(sorted(e.id for e in self.fit.model.twin.effects))
+        """Of the robot, that is: not the zeros of this recording that jumped."""
+        return tuple(sorted(e.id for e in of_robot(self.fit.model.twin.effects)))
 
 
 def weigh(study: Study, fitted: Fit) -> Weighed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from twin.report import strains
+from twin.report import strains, widths
 from twin.report.loops import loop_words
 from twin.report.numbers import SHOWN, number
 from twin.report.sections.section import Section, Story
@@ -24,6 +24,5 @@ def section(story: Story) -> Section:
         }
         for name, loop in zip(names, d.loops.each, strict=True)
     ]
-    return Section(
-        "loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": loop_words(d.loops), "strains": strains.plot(d)}
-    )
+    plots = {"widths": widths.plot(d), "strains": strains.plot(d)}
+    return Section("loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": loop_words(d.loops), **plots})
