@@ -306,6 +306,7 @@ class Piped:
         monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: bench)
         monkeypatch.setattr(pipeline, "looked_at", lambda bench, twin, settings, progress: looked)
         monkeypatch.setattr(pipeline, "conclude", self.conclude)
+        monkeypatch.setattr(pipeline, "_by_hand", lambda recording, found: found)
         monkeypatch.setattr(
             pipeline, "_reported", lambda looked, twin, found, parts, settings: self.reported.append((found, parts, settings))
         )
