@@ -284,7 +284,7 @@ def _named(side: Side) -> str:
 def _standing(shown: Frames) -> str:
     x, y, z = 1e3 * shown.markers[0, -1]
     ends = f"; tension along the tendons {shown.tension.min():.2f} to {shown.tension.max():.2f} N"
-    return f"tip at x **{x:.1f}**, y **{y:.1f}**, z **{z:.1f}** mm{ends}"
+    return f"tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm{ends}"
 
 
 def _warm(side: Side) -> str:
