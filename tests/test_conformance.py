@@ -30,7 +30,6 @@ NEW = {
     "transmission_error",
     "constructional_stretch",
     "joint_friction",
-    "stroke_limit",
 }  # identifiers of our own, beside those of the contract
 
 laws = pytest.mark.parametrize("law", catalogue().values(), ids=catalogue().keys())
@@ -201,8 +200,6 @@ def by_length(data: Recording) -> Recording:
 @laws
 def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: Recording) -> None:
     effects = starts(law, two_trials)
-    if law.id == "stroke_limit":  # where tensions command it does nothing
-        two_trials = by_length(two_trials)
     plain = predict((), two_trials)
     for effect in effects:
         moved = predict((effect,), two_trials)
@@ -213,6 +210,15 @@ def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: R
             assert 1e-3 < change < 0.5  # rad: more than an encoder's count, less than the drum's turn
         else:
             assert 1e-6 < change < 0.05  # m: more than a micrometre, less than half the robot
+
+
+def test_a_stroke_that_ends_does_something_where_lengths_command(two_trials: Recording) -> None:
+    pulled = by_length(two_trials)
+    plain, effects = predict((), pulled), starts(named("actuator_saturation"), pulled)
+    assert all("stroke" in e.values and e["loss_1"] + e["loss_2"] + e["loss_3"] > 0.0 for e in effects)
+    for effect in effects:
+        change = max(np.abs(a - b).max() for a, b in zip(plain, predict((effect,), pulled), strict=True))
+        assert 1e-6 < change < 0.05  # m, as above
 
 
 @laws

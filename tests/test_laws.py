@@ -220,7 +220,7 @@ def test_a_drum_that_is_not_round_errs_by_its_turn_and_reports_what_it_believes(
 
 def test_a_drive_on_its_stop_draws_in_no_more_and_pays_out_freely() -> None:
     """delivered = u below the limit, limit + (1 - loss) (u - limit) above it; of tendons that tensions pull nothing changes."""
-    stops = law("stroke_limit", loss_1=1.0, loss_2=0.25, limit=5e-3, corner=1e-6)
+    stops = law("actuator_saturation", loss_1=1.0, loss_2=0.25, stroke=5e-3, give=1e-6)
     u = np.array([[-2e-3, 0.0, 0.0], [4e-3, 4e-3, 4e-3], [9e-3, 9e-3, 9e-3]])
     time, zero = np.arange(3.0), np.zeros((3, 3))
     held = Signals(time, time, zero, u, np.zeros((3, 0, 3)), time, (Drive.DISPLACEMENT,) * 3)

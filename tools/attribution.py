@@ -38,7 +38,6 @@ AMPLITUDES = (1.0, 3.0, 8.0)
 DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length", "by_current")
 BLOCK = ("none", "one", "one", "one", "pair", "unknown", "one", "none", "one", "one", "one", "one", "pair", "unknown",
          "one", "one", "one", "pair", "unknown", "none")  # fmt: skip
-BY_TENSION = {"actuator_saturation"}  # where lengths are commanded the bench has no such law
 NO_SPRINGS = {"actuator_saturation", "actuator_lag", "tendon_backlash", "backbone_creep"}  # not on the bench where springs pull
 
 
@@ -78,11 +77,11 @@ def plan(sets: int, seed: int) -> list[Case]:
         elif kind == "unknown":
             effects = (next_of("unknown", others),)
         amplitude, design = float(rng.choice(AMPLITUDES)), str(rng.choice(DESIGNS))
-        if (BY_TENSION & set(effects) and design == "by_length") or (NO_SPRINGS & set(effects) and design == "by_current"):
+        if NO_SPRINGS & set(effects) and design == "by_current":
             design = "default"
         if any(all_effects()[e].by_length for e in effects):
             design = "by_length"
-            if any(e in BY_TENSION or all_effects()[e].by_current for e in effects):
+            if any(all_effects()[e].by_current for e in effects):
                 design, effects, kind = "default", tuple(e for e in effects if not all_effects()[e].by_length), "one"
         if any(all_effects()[e].by_current for e in effects):
             design = "by_current"

@@ -73,8 +73,9 @@ COMPARED: dict[str, Compare] = {
     "time_delay": lambda t, v: (0.1 * t.strength, v["delay"], SAME),
     # Another law there: of second order, whose steady lag behind a ramp is 2 zeta tau.
     "actuator_lag": lambda t, v: (2 * t.zeta * 0.1 * t.strength, v["time"] + v["time_2"], OTHER),
-    "actuator_saturation": lambda t, v: (5.0 - 0.6 * t.strength, v["limit"], SAME),  # a softer corner there
-    "stroke_limit": lambda t, v: (16e-3 - 8e-4 * t.strength, v["limit"], SAME),
+    "actuator_saturation": lambda t, v: (  # a softer corner there
+        (16e-3 - 1.6e-3 * t.strength, v["stroke"], SAME) if any(_each(v, "loss")) else (5.0 - 0.6 * t.strength, v["limit"], SAME)
+    ),
     "load_cell_crosstalk": lambda t, v: (
         0.03 * t.strength * np.array(t.share), [v[f"share_{i}_{j}"] for i in (1, 2, 3) for j in (1, 2, 3) if i != j], OTHER,
     ),

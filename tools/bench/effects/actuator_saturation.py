@@ -1,4 +1,8 @@
-"""The drive runs into its limit softly: T = c / (1 + (c/L)^p)^(1/p), L = 5 N - 0.6 N strength. The logged input is the command."""
+"""The drive runs into its limit softly: it delivers (c^-p + L^-p)^(-1/p) of c. The logged input is the command.
+
+Of tensions L = 5 N - 0.6 N strength, all drives; of lengths L = 16 mm - 1.6 mm strength, one drive or all of them; they pay out
+freely.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +21,20 @@ class ActuatorSaturation(Effect):
     logs_command: ClassVar[bool] = True
 
     sharpness: float  # p
+    stops: tuple[bool, ...] = (True, True, True)
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> ActuatorSaturation:
-        return cls(1.0, float(rng.uniform(10, 25)))
+        sharpness, alone = float(rng.uniform(10, 25)), np.arange(3) == rng.integers(3)
+        return cls(1.0, sharpness, tuple(map(bool, alone if rng.random() < 0.5 else np.ones(3, bool))))
 
-    def deliver(self, time: np.ndarray, command: np.ndarray) -> np.ndarray:
+    def _within(self, command: np.ndarray, limit: float) -> np.ndarray:
         if self.strength == 0.0:
             return command
-        limit = 5.0 - 0.6 * self.strength
         return command / (1 + (np.maximum(command, 0.0) / limit) ** self.sharpness) ** (1 / self.sharpness)
+
+    def deliver(self, time: np.ndarray, command: np.ndarray) -> np.ndarray:
+        return self._within(command, 5.0 - 0.6 * self.strength)
+
+    def pull(self, displacement: np.ndarray) -> np.ndarray:
+        return np.where(np.array(self.stops), self._within(displacement, 16e-3 - 1.6e-3 * self.strength), displacement)
