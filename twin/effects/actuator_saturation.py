@@ -22,8 +22,8 @@ def _beyond(command: np.ndarray, limit: float, corner: float) -> np.ndarray:
 
 class ActuatorSaturation(Effect):
     """Delivered = c - loss r(c - limit), r(x) = (x + sqrt(x^2 + corner^2)) / 2: all of it below the limit, the share 1 - loss of
-    what is above, with a corner of that width. Of tensions `loss` is common to the drives, with `limit` and `corner` in N; of lengths
-    drive i has its own `loss_i`, beyond a `stroke` with a corner `give` that the drives, which are alike, share.
+    what is above, with a corner of that width. Of tensions `loss` is common to the drives, with `limit` and `corner` in N; of
+    lengths drive i has its own `loss_i`, beyond a `stroke` with a corner `give` that the drives, which are alike, share.
 
     A drive that stalls or stands on its end stop has a loss of 1, one that stalls on a spring less. Commands are what is logged: a
     drive that reports where it is shows nothing of it.
