@@ -26,10 +26,8 @@ TABLE = "table"
 HALF = 5e-3  # m, half the table's thickness
 TOUCHED = 0.2  # s: touched for less than that an object was not reached
 LAST = 0.4  # s at the end, over which an object must stay
-EAGER, STRONGEST = (
-    1.5,
-    0.6,
-)  # N/(rad s), N: how a person who sees a thing turn pushes against it; force, not speed, is what hands give
+EAGER = 1.5  # N/(rad s): how a person who sees a thing turn pushes against it; force, not speed, is what hands give
+STRONGEST = 0.6  # N
 FALLEN, SUNK, SLIDES = 30e-3, 10e-3, 3e-3  # m: dropped; slipped since the start; slipped in the last LAST s
 
 
