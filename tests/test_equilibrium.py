@@ -11,7 +11,7 @@ from tools.bench.rod import NoEquilibrium, Rod, follow
 from tools.bench.rod import solve as rod_solve
 from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.effects import Loads, Push, Route, catalogue
-from twin.equilibrium import Equilibrium, trial
+from twin.equilibrium import Equilibrium, pulled
 from twin.robots import load
 
 G = 9.81
@@ -243,7 +243,7 @@ def test_the_loop_is_compiled_once_whatever_the_order_of_commands_in_memory() ->
     robot = load("continuum")
     solver, rows = robot.solver(robot.build()), np.linspace(0.0, 1.0, 6)[:, None] * np.array([1.0, 0.2, 0.0])
     one = solver.solve(Problem(np.arange(6.0), rows, Loads(robot.gravity)))
-    compiled = len(trial.run.signatures)
+    compiled = len(pulled.run.signatures)
     other = solver.solve(Problem(np.arange(6.0), np.asfortranarray(rows), Loads(robot.gravity)))
-    assert len(trial.run.signatures) == compiled
+    assert len(pulled.run.signatures) == compiled
     assert np.array_equal(one.q, other.q)

@@ -193,7 +193,7 @@ def test_body_and_springs_meet_where_another_solver_finds_them(loads: Loads) -> 
     time = np.arange(0.0, 100.0, 4.0)
     found = drive(time, turns(time), loads)
     straight = robot().straight_path
-    weight = np.arange(1, 9) / 8.0  # gravity and payload come on in steps, as in `twin.equilibrium.trial`
+    weight = np.arange(1, 9) / 8.0  # gravity and payload come on in steps, as in `twin.equilibrium.held`
     now = Springs().at(ROOM - 273.15)
     for i in range(-len(weight), len(time)):
         part = Loads(loads.gravity * (weight[i] if i < 0 else 1.0), loads.payload)

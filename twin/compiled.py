@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numba
+from numba.core import event
 
 # No flag that lets the compiler assume finite numbers: a diverging step must be seen as such.
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
@@ -30,6 +32,30 @@ def part(function: Callable[..., Any]) -> Any:
     of calls each level costs seconds. Not for recursion, nor for what Python calls.
     """
     return numba.njit(nogil=True, fastmath=_FAST, error_model="numpy", inline="always")(function)
+
+
+class _Compiling(event.Listener):
+    def __init__(self, told: Callable[[bool], None]) -> None:
+        self.told, self.depth = told, 0
+
+    def on_start(self, event: event.Event) -> None:
+        self.depth += 1
+        self.told(True)
+
+    def on_end(self, event: event.Event) -> None:
+        self.depth -= 1
+        self.told(self.depth > 0)
+
+
+@contextmanager
+def compiling(told: Callable[[bool], None]) -> Iterator[None]:
+    """Tell whether anything is being compiled, whenever that may have changed; what lies in the disk cache is not."""
+    listener = _Compiling(told)
+    event.register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)
 
 
 @inner

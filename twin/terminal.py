@@ -13,6 +13,7 @@ from rich.text import Text
 
 out = Console()
 err = Console(stderr=True)
+COMPILING = "compiling inner loops, once on this machine (a minute at most)"
 
 
 def cores() -> int:
@@ -21,17 +22,19 @@ def cores() -> int:
 
 @contextmanager
 def working(title: str) -> Iterator[Callable[[str], None]]:
-    """A spinner with the present step; says so while the solver is compiled, which happens once."""
-    from twin.equilibrium import is_compiled
-    from twin.robots import compile_solver
+    """A spinner with the present step; says so while inner loops are compiled, which happens once on a machine."""
+    from twin.compiled import compiling
 
-    title = escape(str(plain(title)))
+    title = step = escape(str(plain(title)))
     with err.status(title) as status:
-        if not is_compiled():
-            status.update("compiling the solver, once on this machine (a minute or more)")
-            compile_solver()
-        status.update(title)
-        yield lambda words: status.update(f"{title}: {words}")
+
+        def now(words: str) -> None:
+            nonlocal step
+            step = f"{title}: {words}"
+            status.update(step)
+
+        with compiling(lambda on: status.update(f"{title}: {COMPILING}" if on else step)):
+            yield now
 
 
 def plain(words: str) -> Text:

@@ -4,28 +4,29 @@ engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic e
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
 move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
-trial.py    a trial, sample by sample                  antagonists.py  a jaw between two tendons
+instant.py  a trial's present instant                  pulled.py  a trial of given tensions, sample by sample
+antagonists.py  a jaw between two tendons              held.py    a trial of tendons held at lengths or by SMA springs
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path as File
 
 import mujoco
 import numpy as np
 
 from twin.body import Path, Problem
 from twin.effects import Drive, Loads, Push
+from twin.equilibrium import held, pulled
 from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
+from twin.equilibrium.instant import Driving, Found, How, Near, Slow
 from twin.equilibrium.lengths import STIFFEST
-from twin.equilibrium.trial import Driving, Found, How, Near, Slow, run
 from twin.hinges import HingeChain, hinge_pairs
 from twin.springs.spring import no_springs
 
-__all__ = ["ChainPath", "Equilibrium", "is_compiled"]
+__all__ = ["ChainPath", "Equilibrium"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +137,7 @@ class Equilibrium:
         )
 
     def solve(self, problem: Problem) -> ChainPath:
-        """Equilibria in the order of `twin.equilibrium.trial`.
+        """Equilibria in the order of `twin.equilibrium.pulled`, or `held` where a tendon is held at a length or by a spring.
 
         Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before. Raises SolveError for held
         lengths of tendons that stiffen.
@@ -155,9 +156,11 @@ class Equilibrium:
             temperature=np.empty((n, nt)),
             status=np.empty(n, np.int64),
         )
+        driving = self.driving(problem)
+        run = held.run if np.any(driving.by_length | driving.by_spring) else pulled.run
         started = run(
             self.statics(problem),
-            self.driving(problem),
+            driving,
             Slow(amplitude, np.array(creep.time, float), delayed),
             Near(np.empty((0, nv)), np.empty((0, nt)), found.LU[:0]) if near is None else Near(near.q, near.tension, near.LU),
             How(float(problem.tolerance), problem.keep, problem.once),
@@ -174,8 +177,3 @@ class Equilibrium:
 def _unsprung(n: int) -> np.ndarray:
     """Records for n tendons that no spring pulls."""
     return no_springs(n).records
-
-
-def is_compiled() -> bool:
-    """Whether the compiled solver lies in numba's disk cache, so that a first solve takes no seconds."""
-    return bool(run.stats.cache_path) and any(File(run.stats.cache_path).glob("trial.run*.nbi"))

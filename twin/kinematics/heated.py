@@ -1,6 +1,6 @@
 """A twin under given loads whose tendons are pulled by SMA springs, stepped in time: currents in, heat, tensions and shape out.
 
-What a trial of a current-driven recording does sample by sample (`twin.equilibrium.trial`), for those who decide the next current
+What a trial of a current-driven recording does sample by sample (`twin.equilibrium.held`), for those who decide the next current
 only when they have seen the last tension: controllers and environments.
 """
 

@@ -5,6 +5,6 @@ with a SCHEMA of every number it reads: unit, range, default and meaning (schema
 """
 
 from twin.robots.family import Family, families, family
-from twin.robots.robot import Robot, available, compile_solver, load
+from twin.robots.robot import Robot, available, load
 
-__all__ = ["Family", "Robot", "available", "compile_solver", "families", "family", "load"]
+__all__ = ["Family", "Robot", "available", "families", "family", "load"]

@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import Field
 
-from twin.body import Body, Problem, Solver
-from twin.effects import Loads
+from twin.body import Body, Solver
 from twin.errors import DataError, TwinError, UnknownNameError, listed, shown
 from twin.forms import Form, Line, fill
 from twin.hinges import HingeChain
@@ -124,13 +123,6 @@ def load(name: str, relative_to: Path | None = None) -> Robot:
             )
             raise UnknownNameError("robot", name, available(), besides)
     return _read(folder.resolve(), read_text(folder / FILE, LARGEST))
-
-
-def compile_solver() -> None:
-    """Compile the static solve of backbones (or load it from disk) by solving nothing."""
-    robot = next(r for r in map(load, available()) if "backbone" in r.build().parts)
-    n = np.zeros((1, robot.n_tendon))
-    robot.solver(robot.build()).solve(Problem(np.zeros(1), n, Loads(np.zeros(3))))
 
 
 @lru_cache(maxsize=16)

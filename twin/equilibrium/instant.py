@@ -1,10 +1,4 @@
-"""A trial, sample by sample: slow states advance in measured time, one static solve a sample, warm-started.
-
-The order in which loads are applied is part of the answer, since friction remembers it (millimetres under a sideways payload):
-straight and unloaded; gravity, payload and tip force at once with slack tendons; the first tensions in `RAMP` equal steps;
-then the log. Within a sample all tensions change together. SMA springs pull from the beginning, cold: with them gravity and payload
-come in `RAMP` equal steps. Their temperature advances once a sample, under the current and at the elongation of the sample before.
-"""
+"""The instant of a trial: what it is driven by, what creeps, what is found, and the steps that all trials share."""
 
 from __future__ import annotations
 
@@ -12,19 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiled import assign, inner, jit, part
+from twin.compiled import assign, inner, part
 from twin.effects.backbone_creep import retard
 from twin.equilibrium.chain import Law, Load, State, Statics, balance, settle
 from twin.equilibrium.elastic import bendings
-from twin.equilibrium.lengths import Held, Sought, hold_once, move, reach, remember, tangent
-from twin.equilibrium.move import onward
-from twin.equilibrium.newton import Factors, follow, is_minimum, no_factors, place, solve, step_once
-from twin.springs.heat import heated
+from twin.equilibrium.lengths import Held, Sought
+from twin.equilibrium.newton import Factors, follow, is_minimum, no_factors, place, solve
 
 RAMP = 8  # steps from slack to the first tensions; 8 against 512 moved the tip by at most 0.015 mm in 180 random poses, mu 0.2
-
-RAMP_TOLERANCE = 1e-6  # rad
-FINE = 1e-7  # rad, where tensions are sought
 
 
 class Driving(NamedTuple):
@@ -175,75 +164,12 @@ def at_rest(plain, driving, slow, state):
 
 
 @part
-def unmoved(now):
-    """Tendons held by their motors have not moved while the weight came on."""
-    for t in range(now.state.T.size):
-        if not now.held.by_spring[t]:
-            assign(now.state.s[t], now.straight[t])
-            for d in range(now.state.z.shape[1]):
-                now.state.z[t, d] = 0.0
-
-
-@part
-def load_on(now, driving, tol):
-    """Gravity, payload and force come on with slack tendons, under cold springs in steps. Returns the status of the start."""
-    state, factors = now.state, now.factors
-    if not some(driving.by_spring):
-        started = solve(now.at, state, factors, tol)
-        if started == 1 and not is_minimum(now.at, state, factors.LU):
-            started = 2 if follow(now.at, state, factors, tol) else 0
-        return started
-    started = 1
-    for k in range(1, RAMP + 1):
-        soften(now, driving, 0, k / RAMP)
-        assign(now.last, state.q)
-        if reach(now.at, state, factors, now.held, now.last, now.sought, min(tol, FINE)) == 0:
-            started = 0
-        remember(now.held, state.s, state.T)
-    return started
-
-
-@part
-def first_pull(now, driving, tol, started):
-    """The first tensions or displacements, in equal steps. Returns the status of the start."""
-    state, factors, held = now.state, now.factors, now.held
-    lengths, factor = some(held.which), held.factor[0]
-    steps = RAMP if now.at.law.mu > 0.0 or lengths else 1
-    for k in range(0 if lengths else 1, steps + 1):
-        for t in range(state.T.size):
-            if driving.by_length[t]:
-                now.sought.free[t] = driving.straight[t] - driving.command[0, t] * (k / steps)
-            elif not driving.by_spring[t]:
-                state.T[t] = factor * driving.command[0, t] * (k / steps)
-                now.T1[t] = factor * driving.command[0, t] * ((k - 1) / steps)
-        assign(now.last, state.q)
-        if lengths:
-            found = reach(now.at, state, factors, held, now.last, now.sought, min(tol, FINE))  # a rough shape has no sharp tensions
-            remember(held, state.s, state.T)
-        else:
-            found = onward(now.at, state, factors, now.T1, now.last, RAMP_TOLERANCE)
-        if found == 0:
-            started = 0
-    return started
-
-
-@part
-def begin(now, driving, near, tol):
-    """Loads, then first commands. Returns the status of the start: 1, or 2 where the loaded robot has no stable equilibrium near
-    straight, 0 where none was found."""
-    springs, others, started = some(driving.by_spring), False, 1
-    remembers = springs or now.at.law.mu > 0.0 or near.q.size == 0  # else a trial has no memory of its start
-    if remembers:
-        started = load_on(now, driving, tol)
-    for t in range(now.state.T.size):
-        now.held.which[t] = driving.by_length[t] or driving.by_spring[t]
-        others = others or not driving.by_spring[t]
-    if some(now.held.which):
-        unmoved(now)
-    if others and remembers:
-        started = first_pull(now, driving, tol, started)
-    assign(now.last, now.state.q)
-    assign(now.second, now.state.q)
+def weigh(now, tol):
+    """Gravity, payload and force come on with slack tendons. Returns the status of the start: 1, or 2 where the loaded robot has no
+    stable equilibrium near straight, 0 where none was found."""
+    started = solve(now.at, now.state, now.factors, tol)
+    if started == 1 and not is_minimum(now.at, now.state, now.factors.LU):
+        started = 2 if follow(now.at, now.state, now.factors, tol) else 0
     return started
 
 
@@ -274,59 +200,6 @@ def guess(now, near, i):
 
 
 @part
-def drive(now, driving, near, i):
-    """What pulls at sample i: tensions, lengths, and the temperatures that springs have been heated to since the sample before."""
-    T, held, factor = now.state.T, now.held, now.held.factor[0]
-    for t in range(T.size):
-        if driving.by_spring[t] and i > 0:
-            dt, warm = driving.time[i] - driving.time[i - 1], now.sought.temperature
-            current, room = driving.command[i - 1, t], driving.ambient[i - 1]
-            warm[t] = heated(driving.spring, t, warm[t], held.elongation[t], current, room, dt)
-        elif driving.by_length[t]:
-            now.sought.free[t] = driving.straight[t] - driving.command[i, t]
-        elif not driving.by_spring[t]:
-            T[t] = factor * driving.command[i, t]
-            now.T1[t] = factor * driving.command[max(0, i - 1), t]
-        if near.q.size and held.which[t]:
-            T[t] = factor * near.T[i, t]
-            now.factors.held_by[t] = T[t] > 0.0
-
-
-@part
-def settled(now, near, how):
-    """The equilibrium of the present sample. Returns its status; the shape stays the last one where there is none.
-
-    Friction wants it in full: slip carries what a single step leaves on to all samples that follow.
-    """
-    at, state, factors, held = now.at, now.state, now.factors, now.held
-    lengths, once = some(held.which), how.once and near.q.size > 0 and not now.at.law.mu > 0.0
-    if lengths and once:
-        move(held, now.sought, now.sought, 1.0)
-        status = hold_once(at, state, factors, held)
-    elif lengths:
-        status = reach(at, state, factors, held, now.last, now.sought, min(how.tol, FINE))
-    elif once:
-        status = step_once(at, state, factors.LU)
-    else:
-        status = onward(at, state, factors, now.T1, now.last, how.tol)
-    if status == 0:
-        assign(state.q, now.last)
-    return status
-
-
-@part
-def keep_tangent(now, LU):
-    """The present tangent's factors to LU; where it has none, those last used."""
-    if some(now.held.which):
-        kept = tangent(now.at, now.state, now.held.which, LU, now.factors.held_by)
-    else:
-        kept = is_minimum(now.at, now.state, LU)
-    if not kept:
-        for k in range(now.last.size):
-            assign(LU[k], now.factors.LU[k])
-
-
-@part
 def record(now, i, found):
     state, chain = now.state, now.at.chain
     assign(found.q[i], state.q)
@@ -336,26 +209,3 @@ def record(now, i, found):
         found.path[i, t] = state.s[t, 0]
         found.tension[i, t] = state.T[t] / now.held.factor[0]
         found.temperature[i, t] = now.sought.temperature[t]
-
-
-@jit
-def run(plain, driving, slow, near, how, state, found):
-    """Solve a whole trial of what is in balance as `plain` says, to `found`; `state` becomes that at its end.
-
-    Returns the status of the start.
-    """
-    now = at_rest(plain, driving, slow, state)
-    started = begin(now, driving, near, how.tol)
-    for i in range(driving.time.size):
-        if slow.amplitude.size and i > 0:
-            relax(now, slow, driving.time[i] - driving.time[i - 1])
-        guess(now, near, i)
-        soften(now, driving, i, 1.0)
-        drive(now, driving, near, i)
-        found.status[i] = settled(now, near, how)
-        if how.keep:
-            keep_tangent(now, found.LU[i])
-        remember(now.held, state.s, state.T)
-        assign(now.last, state.q)
-        record(now, i, found)
-    return started
