@@ -35,7 +35,7 @@ def test_forward_is_what_a_trial_gives(twin: Twin) -> None:
     route = named("tendon_friction")({"mu": 0.15}, 3).route() if twin is RUBBING else Route()
     path = Equilibrium(load("continuum").build()).solve(Problem(when, tension, SIDEWAYS, route))
     stepped = np.array([robot.pull(T).markers for T in tension])
-    # The trial ramps its first tensions in other parts, which friction remembers (RAMP in equilibrium/instant.py: 0.015 mm).
+    # The trial ramps its first tensions in other parts, which friction remembers (RAMP in equilibrium/trial.py: 0.015 mm).
     np.testing.assert_allclose(stepped, path.markers, atol=2e-5 if twin is RUBBING else 2e-7)  # two solves within 1e-7 rad
 
 

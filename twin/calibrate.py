@@ -120,17 +120,24 @@ class Objective:
 
     def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
         """The evaluation of a model whose |z|^2 is `most` at most, else None, without a look at the trials that are left then."""
-        at, traces, total = {k: i for i, k in enumerate(self.trials)}, {}, 0.0
+        at, traces = {k: i for i, k in enumerate(self.trials)}, {}
         raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
-        for k, trace in simulated(model.twin, self.bench, self.trials, Way(near or {}, keep=True)):
-            traces[k] = trace
-            if (i := at.get(k)) is not None:
-                raw[i] = self.bench.measured[k] - readings(self.bench, report(model.twin.effects, trace.true))
-                z[i] = self.whitener.trial(i, raw[i]).ravel()
-                total += float(z[i] @ z[i])
-                if total > most:
-                    return None
-        return Evaluation(model, traces, raw, np.concatenate(z))
+        n = 1 if model.twin.laws.creep.amplitude else min(self.jobs, len(at))  # a body that creeps remembers the trials before
+        shares = [self.trials[i::n] for i in range(n)]
+        total = np.zeros(n)
+
+        def solve(share: int) -> None:
+            for k, trace in simulated(model.twin, self.bench, shares[share], Way(near or {}, keep=True)):
+                traces[k] = trace
+                if (i := at.get(k)) is not None:
+                    raw[i] = self.bench.measured[k] - readings(self.bench, report(model.twin.effects, trace.true))
+                    z[i] = self.whitener.trial(i, raw[i]).ravel()
+                    total[share] += float(z[i] @ z[i])
+                    if total.sum() > most:
+                        return
+
+        Parallel(n_jobs=n, prefer="threads", require="sharedmem")(delayed(solve)(s) for s in range(n))
+        return None if total.sum() > most else Evaluation(model, dict(sorted(traces.items())), raw, np.concatenate(z))
 
     def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])

@@ -22,10 +22,10 @@ from twin.engine import mj_step
 from twin.equilibrium import ChainPath, Equilibrium
 from twin.equilibrium.chain import State, laid, lay, lever, pass_on, shorter
 from twin.equilibrium.elastic import COUPLING, bendings, springs
-from twin.equilibrium.instant import Slow, rested, some
-from twin.equilibrium.instant import creep as advance_creep
 from twin.equilibrium.lengths import linearise
 from twin.equilibrium.newton import place
+from twin.equilibrium.trial import Slow, rested, some
+from twin.equilibrium.trial import creep as advance_creep
 from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs
 from twin.winding import hang, heat, let_go, press, pulled, winding

@@ -37,8 +37,9 @@ class Dictionary:
         return Dictionary(tuple(left), self.columns)
 
 
-def dictionary(objective: Objective, fit: Fit) -> Dictionary:
-    """Patterns of every effect of the catalogue that the model lacks, that finds what it needs and is not akin to one it has."""
+def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = None) -> Dictionary:
+    """Patterns of every effect of the catalogue (or `among` these) that the model lacks, that finds what it needs and is not akin
+    to one it has."""
     bench = objective.bench
     present = {e.id for e in fit.model.twin.effects}
     predicted = [report(fit.model.twin.effects, t.true) for t in fit.evaluation.traces.values()]
@@ -47,7 +48,7 @@ def dictionary(objective: Objective, fit: Fit) -> Dictionary:
     index: dict[Twin, int] = {}  # several starts may share a pattern
     parts = bench.robot.build().parts
     for identifier, law in catalogue().items():
-        if identifier in present or present & set(law.akin) or not law.needs <= parts:
+        if identifier in present or present & set(law.akin) or not law.needs <= parts or not (among is None or identifier in among):
             continue
         for start in law.starts(predicted, bench.n_tendon):
             try:

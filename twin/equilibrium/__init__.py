@@ -4,7 +4,7 @@ engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic e
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
 move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
-instant.py  a trial's present instant                  pulled.py  a trial of given tensions, sample by sample
+trial.py    what all trials share                  pulled.py  a trial of given tensions, sample by sample
 antagonists.py  a jaw between two tendons              held.py    a trial of tendons held at lengths or by SMA springs
 """
 
@@ -21,8 +21,8 @@ from twin.effects import Drive, Loads, Push
 from twin.equilibrium import held, pulled
 from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
-from twin.equilibrium.instant import Driving, Found, How, Near, Slow
 from twin.equilibrium.lengths import STIFFEST
+from twin.equilibrium.trial import Driving, Found, How, Near, Slow
 from twin.hinges import HingeChain, hinge_pairs
 from twin.springs.spring import no_springs
 

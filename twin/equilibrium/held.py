@@ -8,8 +8,8 @@ sample, under the current and at the elongation of the sample before.
 from __future__ import annotations
 
 from twin.compiled import assign, jit, part
-from twin.equilibrium.instant import RAMP, at_rest, guess, record, relax, soften, some, weigh
 from twin.equilibrium.lengths import hold_once, move, reach, remember, tangent
+from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, weigh
 from twin.springs.heat import heated
 
 FINE = 1e-7  # rad, where tensions are sought: a rough shape has no sharp ones

@@ -8,9 +8,9 @@ then the log. Within a sample all tensions change together. Apart from held.py, 
 from __future__ import annotations
 
 from twin.compiled import assign, jit, part
-from twin.equilibrium.instant import RAMP, at_rest, guess, record, relax, soften, weigh
 from twin.equilibrium.move import onward
 from twin.equilibrium.newton import is_minimum, step_once
+from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, weigh
 
 RAMP_TOLERANCE = 1e-6  # rad
 

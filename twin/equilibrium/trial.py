@@ -1,4 +1,4 @@
-"""The instant of a trial: what it is driven by, what creeps, what is found, and the steps that all trials share."""
+"""What all trials share: what drives them, what creeps, what is found, and the steps of each sample."""
 
 from __future__ import annotations
 
