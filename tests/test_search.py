@@ -24,7 +24,8 @@ class World:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, worth: dict[str, float], together: dict[str, float] | None = None) -> None:
         self.worth, self.together = worth, together or {}
         self.refitted: list[tuple[str, ...]] = []
-        monkeypatch.setattr(stage, "dictionary", lambda objective, fit: None)
+        self.anew: list[set[str]] = []
+        monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: self.anew.append(among))
         monkeypatch.setattr(stage, "rank", self.rank)
         monkeypatch.setattr(stage, "extended", lambda study, member, effect, start, beat: self.of(*member.effects, effect))
         monkeypatch.setattr(stage, "fuller", lambda study, w, effects, accept: w)
@@ -38,19 +39,25 @@ class World:
         fit = SimpleNamespace(effects=effects, z=np.zeros(1), model=SimpleNamespace(free=effects), cost=-score)
         return SimpleNamespace(effects=effects, score=score, fit=fit, discrepancy=None)
 
-    def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any) -> list[Any]:
-        """All promise enough to be tried."""
-        return [SimpleNamespace(effect=e, start=None, gain=1e6) for e in self.worth if e not in fit.effects]
+    def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
+        """All promise enough to be tried but what is worth nothing at all."""
+        return [SimpleNamespace(effect=e, start=None, gain=1e6) for e in self.worth if e not in fit.effects and self.worth[e]]
 
     def found(self, study: Any = STUDY) -> Any:
         base = self.of()
-        patterns: Any = SimpleNamespace(beside=lambda effects: None)
+        patterns: Any = SimpleNamespace(beside=lambda effects: SimpleNamespace(patterns=()))
         return search(study, base, patterns, Thresholds())
 
 
 def test_three_effects_are_found_together(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "drift": 200.0, "tilt": -5.0})
     assert world.found().best.effects == ("creep", "drift", "friction")
+
+
+def test_patterns_are_taken_anew_of_what_promises_anything_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "tilt": 0.0})
+    world.found()
+    assert world.anew[0] == {"creep"}
 
 
 def test_when_the_time_is_up_the_best_so_far_stands_and_the_rest_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
