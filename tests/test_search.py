@@ -104,8 +104,8 @@ def test_of_two_the_one_that_the_other_does_without_is_dropped(monkeypatch: pyte
     """Creep promises nothing until routing is there, and is worth as much without it: its set alone is met by dropping."""
     world = World(monkeypatch, {"routing": 600.0, "creep": 690.0}, {"creep+routing": -595.0})
 
-    def rank(*asked: Any) -> list[Any]:
-        return [c for c in world.rank(*asked) if c.effect == "routing" or "routing" in asked[2].effects]
+    def rank(*asked: Any, **how: Any) -> list[Any]:
+        return [c for c in world.rank(*asked, **how) if c.effect == "routing" or "routing" in asked[2].effects]
 
     monkeypatch.setattr(stage, "rank", rank)
     assert world.found().best.effects == ("creep",)
