@@ -44,8 +44,10 @@ def test_holds_of_the_tentacle_are_where_the_derived_table_has_them(raw: Path, t
     assert len(recording.trials) == 22
     for trial in recording.trials:
         row = table[trial.name]
+        anew = 4 if float(row["dt_s"]) < 0.0045 else 0  # the second session, 240 Hz, has markers of its own
         for m in range(1, 5):
-            seen = [trial.values[f"marker_{m}_{a}"].mean() for a in "xyz"]
+            assert np.isnan(trial.values[f"marker_{m + 4 - anew}_x"]).all()
+            seen = [trial.values[f"marker_{m + anew}_{a}"].mean() for a in "xyz"]
             robot = [float(row[f"p{m}_{a}_m"]) for a in "xyz"]
             # m: an eighth of one hold's samples are spikes of half a millimetre and left out here, not in the table
             np.testing.assert_allclose(seen, [robot[0], -robot[1], -robot[2]], rtol=0, atol=1e-4)

@@ -6,7 +6,8 @@ Backward from the free tip, where force and moment are zero, so that only the ti
     dp/ds = lambda R e3,  dR/ds = R [kappa]x,  dM/ds = -dp/ds x N,  N(s) = g int_s^L rho A,
 
 N and M the force and moment on the section, tendons included. In it, with t_i the unit tangent of tendon i at r_i,
-lambda e3 + kappa x r_i + dr_i/ds, the material carries M - sum T_i r_i x t_i and, along e3, N - sum T_i t_i.
+lambda e3 + lambda^(-1/2) (kappa x r_i + dr_i/ds), where r_i is its place at rest, the material carries M - sum T_i lambda^(-1/2)
+r_i x t_i and, along e3, N - sum T_i (t_i - 1/2 lambda^(-3/2) t_i . (kappa x r_i + dr_i/ds)).
 """
 
 from __future__ import annotations
@@ -64,12 +65,13 @@ class SoftRod:
             moment, force = stiff * law * k, EA * (a - a**-2) / 3 + 0.5 * float((stiff * slope * k**2).sum())
             for i in range(2 if pulled else 0):
                 r, dr = (11.4e-3 - 0.0295 * s) * out[i], -0.0295 * out[i]
-                t = a * E3 + cross(k, r) + dr
+                wide = max(a, 0.1) ** -0.5  # the section, and the channel's place in it
+                t = a * E3 + wide * (cross(k, r) + dr)
                 t = tension[i] * t / np.linalg.norm(t)
-                moment, force = moment + cross(r, t), force + t[2]
+                moment, force = moment + wide * cross(r, t), force + t[2] - 0.5 * wide / a * float(t @ (cross(k, r) + dr))
             return np.append((moment - m) / EI, (force - n) / EA)
 
-        return fsolve(lack, guess, xtol=1e-11)
+        return np.asarray(fsolve(lack, guess, xtol=1e-11))
 
     def shape(self, tension: np.ndarray, at: list[float]) -> tuple[np.ndarray, np.ndarray]:
         """Positions (k, 3) and rotations (k, 3, 3) at arc lengths `at`, in the base frame."""

@@ -48,10 +48,12 @@ def draw_tentacle(folder: Path) -> None:
     twins = {"Hooke's law": (calibrated(bench, alone, (), HOOKE), BEFORE), "neo-Hookean": (calibrated(bench, alone), AFTER)}
     figure, axes = plt.subplots(1, 4, figsize=(9.0, 3.0), sharey=True, layout="constrained")
     for axis, k in zip(axes, sorted(both, key=lambda k: pulls[k].sum())[1::2], strict=True):
-        seen = 1e3 * bench.measured[k].mean(axis=0).reshape(4, 3)
+        there = bench.measured[k].mean(axis=0)
+        seen = 1e3 * tentacle.joined(there).reshape(4, 3)
         axis.plot(seen[:, 0], -seen[:, 2], "ko", ms=4, label="measured")
         for name, (twin, colour) in twins.items():
-            x = 1e3 * predicted(bench, twin, [k])[0].mean(axis=0).reshape(4, 3)
+            at = np.where(np.isnan(there), np.nan, predicted(bench, twin, [k])[0].mean(axis=0))
+            x = 1e3 * tentacle.joined(at).reshape(4, 3)
             axis.plot(x[:, 0], -x[:, 2], "x", color=colour, ms=6, label=name)
         axis.set(xlabel="x, mm", aspect="equal", xlim=(-40, 200))
         axis.set_title(f"{pulls[k, 0]:.1f} and {pulls[k, 1]:.1f} N", fontsize=9, loc="left")

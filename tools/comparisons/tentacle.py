@@ -62,11 +62,11 @@ def calibrated(bench: Bench, rows: Sequence[int] | np.ndarray, effects=(), value
 
 
 def residual(bench: Bench, twin: Twin, rows: Sequence[int] | np.ndarray) -> np.ndarray:
-    """Measured less predicted (n_hold, 12) m, means over each hold."""
+    """Measured less predicted (n_hold, 12) m, means over each hold, of the markers it was seen with."""
     rows = [int(k) for k in rows]
     traces = simulate(twin, bench, trials=rows)
     off = [bench.measured[k] - readings(bench, report(twin.effects, t.true)) for k, t in zip(rows, traces, strict=True)]
-    return np.stack([r.mean(axis=0) for r in off])
+    return tentacle.joined(np.stack([r.mean(axis=0) for r in off]))
 
 
 def by_marker(off: np.ndarray) -> np.ndarray:

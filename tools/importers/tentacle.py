@@ -5,6 +5,9 @@ noise is how well a hold repeats, not how quiet the cameras are (0.01-0.2 mm): t
 pulled alike they differ by millimetres. That difference, 240 Hz holds against a cubic through the 200 Hz ones, is measured here
 and printed. It is the same in all rows of a hold, so each is declared sqrt(ROWS) times as noisy: a hold counts once.
 
+Markers were put on anew between the sessions (where both pulled alike marker 2 sits 8 mm elsewhere, whatever the pull): those of the
+second are markers 5 to 8.
+
 Base frame: diag(1, -1, -1) of the authors' robot frame, which is R (p - (base marker + o)).
 """
 
@@ -47,15 +50,20 @@ def read(folder: Path) -> tuple[Recording, Dropped]:
         times.append(np.array([raw[rows, 1].mean() for rows in parts]))
     tension = np.array([[float(row[f"torque{i}_Nm"]) / PULLEY for i in (1, 2)] for row in table])
     names = [row["file"].removesuffix(".csv") for row in table]
-    repeats = repeatability(tension, np.mean(holds, axis=1), np.array([float(row["dt_s"]) < 0.0045 for row in table]))
+    second = np.array([float(row["dt_s"]) < 0.0045 for row in table])
+    repeats = repeatability(tension, np.mean(holds, axis=1), second)
     channels = [Channel(f"tendon_{i}_tension", "input", "N", TENSION_NOISE) for i in (1, 2)]
     channels += [
-        Channel(f"marker_{m + 1}_{a}", "output", "mm", float(np.sqrt(ROWS) * repeats[m])) for m in range(MARKERS) for a in "xyz"
+        Channel(f"marker_{m + 1}_{a}", "output", "mm", float(np.sqrt(ROWS) * repeats[m % MARKERS]))
+        for m in range(2 * MARKERS)
+        for a in "xyz"
     ]
     trials = []
     for k, name in enumerate(names):
         values = {f"tendon_{i + 1}_tension": np.full(ROWS, tension[k, i]) for i in range(2)}
-        values |= {f"marker_{m + 1}_{a}": holds[k][:, m, j] for m in range(MARKERS) for j, a in enumerate("xyz")}
+        unseen = np.full_like(holds[k], np.nan)
+        both = np.concatenate([unseen, holds[k]] if second[k] else [holds[k], unseen], axis=1)
+        values |= {f"marker_{m + 1}_{a}": both[:, m, j] for m in range(2 * MARKERS) for j, a in enumerate("xyz")}
         trials.append(Trial(name + ".csv", times[k], values, start=60.0 * k))
     said = "noise is how holds repeat between sessions: " + ", ".join(f"{1e3 * r:.1f}" for r in repeats) + " mm a coordinate"
     return Recording(
@@ -78,3 +86,9 @@ def repeatability(tension: np.ndarray, means: np.ndarray, second: np.ndarray) ->
         inside = alone & second & (tension[:, i] > tension[first[0], i])
         differences += [means[k] - through(tension[k, i]) for k in np.flatnonzero(inside)]
     return np.sqrt(np.square(differences).mean(axis=(0, 2)) / 2.0)
+
+
+def joined(of_sessions: np.ndarray) -> np.ndarray:
+    """(..., 24) of both sessions' markers, one of them NaN in each hold, as (..., 12)."""
+    first, second = np.split(of_sessions, 2, axis=-1)
+    return np.where(np.isnan(first), second, first)

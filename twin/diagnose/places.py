@@ -64,6 +64,8 @@ def misbent(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Seq
         return None
     columns = list(whole.values())
     seen = np.concatenate([np.isfinite(bench.measured[k][:, columns]).all(axis=(1, 2)) for k in trials])
+    if not seen.any():
+        return None
     t, moved = (_chords(x[:, columns][seen]) for x in (np.concatenate(list(predicted)), off))
     turn = np.cross(t, moved) / (t**2).sum(axis=2, keepdims=True)
     jump = (np.diff(turn, axis=1, prepend=0.0) ** 2).sum(axis=2).mean(axis=0)  # at the base and every marker but the last

@@ -82,6 +82,7 @@ class Equilibrium:
             coupling=coupling,
             bends=np.array([min(dof[at.bend_x], dof[at.bend_y]) for at in body.joints], np.int64),
             slide=np.array([dof[at.slide] for at in body.joints if at.slide is not None], np.int64),
+            lever=np.zeros((len(body.tendons) if any(at.slide for at in body.joints) else 0, model.nv)),
             stiffening=float(body.stiffening),
             hand=np.linalg.det(model.jnt_axis[hinge > 0.0].reshape(-1, 3, 3)),
             body=moved_by,
@@ -98,6 +99,12 @@ class Equilibrium:
         ends = data.site_xpos[hole]
         self._arclength = data.site_xpos[disk, 2] / body.length  # of each disk on the straight robot
         self.straight_path: np.ndarray = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)  # (n_tendon,) m
+        for t in range(len(self.chain.lever)):
+            for d in range(pieces[t]):
+                a, b = ends[t, d], ends[t, d + 1]
+                for i in range(self.chain.first[d], self.chain.first[d + 1]):
+                    turned = np.cross(data.xaxis[i], b - data.xanchor[i]) * (hinge[i] and not twists[i])
+                    self.chain.lever[t, i] = turned @ (b - a) / np.linalg.norm(b - a)
 
     @property
     def n_slow(self) -> int:

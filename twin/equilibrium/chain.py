@@ -40,6 +40,7 @@ class Chain(NamedTuple):
     coupling: np.ndarray  # (nv,) N m/rad
     bends: np.ndarray  # (n_set,) first of the three hinges of each set
     slide: np.ndarray  # (n_set,) slide of each set, or empty
+    lever: np.ndarray  # (n_tendon, nv) m, dpath/dq of the straight body at rest; or (0, nv) where tendons run from disk to disk
     stiffening: float  # of a body that stretches: 0 Hooke's law, 1 the neo-Hookean
     hand: np.ndarray  # (n_set,) 1 where a set's hinges are right-handed, else -1
     body: np.ndarray  # (nv,) the body each joint moves

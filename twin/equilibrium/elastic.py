@@ -94,7 +94,7 @@ def press(chain, tension, P):
 @inner
 def springs(q, rest, chain, tension, bowing, r, J):
     """Writes r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv); to bowing (n_tendon,) dE/dT (m), what bowing takes from
-    each tendon's length. `rest` is phi0 (nv,), `tension` (n_tendon,) N at the base.
+    each tendon's length and what the spreading of its channel does. `rest` is phi0 (nv,), `tension` (n_tendon,) N at the base.
     """
     nv, hand, partner, coupling, stiffness = q.size, chain.hand, chain.partner, chain.coupling, chain.stiffness
     bent = Bent(np.empty(nv), np.empty((hand.size, 3, 3)), np.empty(nv), np.empty(nv))
@@ -117,7 +117,7 @@ def springs(q, rest, chain, tension, bowing, r, J):
                 J[i, k] = 0.0
     for j in range(hand.size):
         if chain.slide.size:
-            soften_and_press(j, q, rest, chain, bent, r, J)
+            soften_and_press(j, q, rest, chain, tension, bent, bowing, r, J)
         o = chain.bends[j]
         for b in range(3):
             r[o + b] = D[j, 0, b] * m[o] + D[j, 1, b] * m[o + 1] + D[j, 2, b] * m[o + 2]

@@ -9,9 +9,13 @@ integrated over the section, per unit of rest length,
 
 Pressed to 0.8 of its length silicone bends 2.0 times as hard as at rest; in the limit lambda -> 1 it is the linear rod with EA, EI
 and GJ. Source: neo-Hookean law with G = E/3 (Treloar 1943); b and t are its expansion for a slender rod, as in the papers on
-stretched and bent elastomer beams (e.g. Lestringant and Audoly 2020, J. Elasticity 140). The tendons' channels are kept at their
-rest distance from the axis: their spreading by lambda^(-1/2) is left out. A body may be neo-Hookean in part: `stiffening` 0 is the
-rod that stretches and bends by Hooke's law, 1 the one above.
+stretched and bent elastomer beams (e.g. Lestringant and Audoly 2020, J. Elasticity 140). The tendons' channels go with the section
+that shrinks or spreads, so that a tendon under T whose path bending shortens by A phi at rest has
+
+    E = T (lambda^(-1/2) - 1) A phi
+
+besides, to first order in bending as A is. A body may be neo-Hookean in part: `stiffening` 0 is the rod that stretches and bends by
+Hooke's law, its section the same, 1 the one above.
 """
 
 from __future__ import annotations
@@ -60,8 +64,17 @@ class Bent(NamedTuple):
 
 
 @inner
-def soften_and_press(j, q, rest, chain, bent, r, J):
-    """What stretch changes in set j: its slide's own force, and that of bending and twist felt along it.
+def spread(stretch, share):
+    """share (lambda^(-1/2) - 1), by which channels move away from the axis; its first and second derivative."""
+    a = 1.0 / stretch
+    root = np.sqrt(a)
+    return share * (root - 1.0), -0.5 * share * a * root, 0.75 * share * a * a * root
+
+
+@inner
+def soften_and_press(j, q, rest, chain, tension, bent, bowing, r, J):
+    """What stretch changes in set j: its slide's own force, that of bending and twist felt along it, and how far the channels of
+    tendons are from the axis, which is added to bowing (n_tendon,) m.
 
     On entry bent.K and bent.m are stiffness and moment of the linear rod; on return those at the set's stretch, with r and,
     unless J is empty, J of the slide's rows and columns.
@@ -75,6 +88,7 @@ def soften_and_press(j, q, rest, chain, bent, r, J):
         return
     force, slope = axial(stretch, chain.stiffening)
     r[i], slope = chain.stiffness[i] * h * force, chain.stiffness[i] * slope
+    g, g1, g2 = spread(stretch, chain.stiffening)
     for c in range(3):
         k = first + c
         out = phi[k] - rest[k]
@@ -82,11 +96,16 @@ def soften_and_press(j, q, rest, chain, bent, r, J):
         f, f1, f2 = twist(stretch, chain.stiffening) if chain.twists[k] else bend(stretch, chain.stiffening)
         K[k] = own * f
         m[k] = own * f * out
-        r[i] += 0.5 * own * f1 * out * out / h
-        slope += 0.5 * own * f2 * out * out / (h * h)
+        pull = 0.0
+        for t in range(tension.size):
+            pull += tension[t] * chain.lever[t, k]
+            bowing[t] += g * chain.lever[t, k] * phi[k]
+        m[k] += g * pull
+        r[i] += (0.5 * own * f1 * out * out + g1 * pull * phi[k]) / h
+        slope += (0.5 * own * f2 * out * out + g2 * pull * phi[k]) / (h * h)
         if J.size:
             for b in range(3):
-                cross = own * f1 * out * D[j, c, b] / h
+                cross = (own * f1 * out + g1 * pull) * D[j, c, b] / h
                 J[i, first + b] += cross
                 J[first + b, i] += cross
     if J.size:
