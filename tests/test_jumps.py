@@ -17,7 +17,7 @@ from twin.bench import Bench, Output
 from twin.calibrate import Model
 from twin.diagnose import jumps
 from twin.diagnose.thresholds import CLEAR, NEARBY
-from twin.diagnose.zeros import SHIFT, TURN, Jump, Zeros, anew, jumping, jumps_of, lasting, without
+from twin.diagnose.zeros import SHIFT, TURN, Jump, Zeros, anew, jumping, jumps_of, lasting, without, words
 from twin.effects import Signals
 from twin.measurements import Channel
 from twin.twin import Twin
@@ -187,6 +187,46 @@ def test_patterns_are_what_small_moves_of_the_camera_do(rng: np.random.Generator
     np.testing.assert_array_equal(turned, moved[:, 3:])
 
 
+def looked_through(day: Bench, raw: list[np.ndarray], *taken: Jump) -> Jump | None:
+    noise = SimpleNamespace(sigma=np.full(len(day.outputs), 3e-4))
+    study: Any = SimpleNamespace(
+        bench=day, trials=range(len(raw)), objective=SimpleNamespace(whitener=SimpleNamespace(noise=noise))
+    )
+    fit: Any = SimpleNamespace(evaluation=SimpleNamespace(raw=raw))
+    return jumps.next_jump(study, fit, taken)
+
+
+def test_a_camera_that_moved_between_trials_is_the_next_jump_and_found_once(rng: np.random.Generator) -> None:
+    """Residuals of markers along a straight robot: noise, what the robot gets wrong and bends, and a shift from the tenth trial on.
+    Not where the payload changed there too, nor what moves less than half the noise, nor where it only turns about the base."""
+    day = planned()
+    place = {o.index: np.array([0.0, 0.0, 0.02 * (o.index + 1)]) for o in day.outputs}
+    where = np.array([place[o.index][o.axis] for o in day.outputs])
+    bend = np.array([place[o.index][2] ** 2 if o.axis == 0 else 0.0 for o in day.outputs]) / 0.16**2
+    measured = tuple(np.tile(where, (len(i.time), 1)) for i in day.inputs)
+    day = replace(day, measured=measured)
+    axis = np.array([o.axis for o in day.outputs])
+
+    def raw(moved: np.ndarray) -> list[np.ndarray]:
+        off = [3e-4 * rng.normal(size=y.shape) + np.outer(1e-3 * rng.normal(size=len(y)), bend) for y in measured]
+        return [x + (k >= 10) * moved for k, x in enumerate(off)]
+
+    shift, faint = np.array([1e-3, -2e-3, 1e-3])[axis], np.array([1e-4, 1e-4, 0.0])[axis]
+    found = looked_through(day, raw(shift))
+    assert found is not None
+    assert found == Jump("marker", float(day.inputs[9].clock[-1]), float(day.inputs[10].clock[0]))
+    assert looked_through(day, raw(shift), found) is None
+    for row in (day.inputs[9].clock[0], day.inputs[10].clock[-1]):
+        assert looked_through(day, raw(shift), replace(found, since=float(row))) is None, "wherever in the two trials it was put"
+    assert looked_through(day, raw(shift), replace(found, since=float(day.inputs[11].clock[0]))) == found
+    assert looked_through(day, raw(shift), replace(found, group="angle")) == found, "another zero may jump at that time"
+    assert looked_through(day, raw(faint)) is None
+    slipped = np.array([np.cross([0.01, 0.02, 0.0], place[o.index])[o.axis] for o in day.outputs])
+    assert looked_through(day, raw(slipped)) is None
+    heavier = [replace(i, loads=replace(i.loads, payload=0.05 + 0.001 * k if k >= 10 else 0.0)) for k, i in enumerate(day.inputs)]
+    assert looked_through(replace(day, inputs=tuple(heavier)), raw(shift)) is None
+
+
 def signals(n: int = 30) -> Signals:
     rng, clock = np.random.default_rng(1), np.arange(float(n))
     z = np.zeros((n, 3))
@@ -236,6 +276,39 @@ def test_a_jump_is_taken_out_alone_and_none_is_handed_on() -> None:
     assert [f.parameter.name for f in model.free] == [*(f"{x}_1" for x in (*TURN, *SHIFT)), "angle_1_2", "angle_3_2"]
     assert not lasting(model.twin).effects
     assert jumps_of(lasting(model.twin)) == ()
+
+
+def said(day: Bench, jump: Jump, *by: float) -> list[str]:
+    """What is said of a jump that was fitted to be `by` with a standard error of 1e-3 each."""
+    names = [f"{x}_1" for x in jump.numbers]
+    fitted = {n: SimpleNamespace(value=x, std=1e-3) for n, x in zip(names, by, strict=True)}
+    twin = jumping(Model(Twin.of("continuum"), ()), (jump,)).twin
+    fit: Any = SimpleNamespace(fitted=lambda effect: fitted, model=SimpleNamespace(twin=twin))
+    return words(day, fit)
+
+
+def test_a_jump_is_said_with_its_size_its_time_and_the_trials_beside_it() -> None:
+    day = planned()
+    name = [t.label for t in sorted(day.recording.trials, key=lambda t: t.start or 0.0)]
+    begin, end = ([float(i.clock[k]) for i in day.inputs] for k in (0, -1))
+    minutes = f"{(begin[4] - begin[0]) / 60.0:.0f} min into the session"
+    (camera,) = said(day, Jump("marker", end[3], begin[4]), 0.03, 0.0, 0.04, 3e-3, 4e-3, 0.0)  # 0.05 rad, 5 mm
+    assert camera.startswith(
+        f"the markers' frame moved by 5.0 mm and 2.9 deg (the camera, not the robot), between {name[3]} and {name[4]}"
+    )
+    assert minutes in camera
+    within = Jump("marker", float(day.inputs[4].clock[5]), float(day.inputs[4].clock[6]))
+    (inside,) = said(day, within, *np.zeros(6))
+    assert f"within {name[4]}, {within.since - begin[4]:.1f} s from its start" in inside
+    joints = Jump("angle", end[3], begin[4], (0, 1))
+    (sure,) = said(day, joints, np.deg2rad(2.0), 2e-3)  # 35 and 2 standard errors
+    assert "the zero jumped of joint_1_angle by 2.00 deg, between" in sure
+    (neither,) = said(day, joints, 1e-3, 2e-3)
+    assert "joint_1_angle by 0.06 deg, joint_2_angle by 0.11 deg" in neither
+    tip = replace(day, outputs=tuple(o for o in day.outputs if o.index == 7))
+    assert "one point does not tell" in said(tip, Jump("marker", end[3], begin[4]), *np.zeros(6))[0]
+    _, lost = said(day, Jump("marker", end[3], begin[6]), *np.zeros(6))
+    assert lost.startswith(f"{name[4]}, {name[5]}: run between the two")
 
 
 def test_a_trials_zero_is_taken_anew_from_its_first_rows() -> None:
