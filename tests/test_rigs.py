@@ -138,7 +138,7 @@ def test_of_robots_that_scatter_the_search_nearly_always_finds_the_best_of_all_p
         wanted = np.where(np.isin(np.arange(8), (1, 4, 5))[:, None], [1.5, 0.5], [-0.5, 0.0]) + 0.5 * rng.normal(size=(8, 2))
         z = np.einsum("knp,kp->kn", J, wanted) + rng.normal(size=(8, 50))
         free = tuple(Free(None, Parameter(n, 0.0, "m", -10.0, 10.0, "by hand", scale=1.0)) for n in ("one", "two"))
-        fitted = Fit(Evaluation(Model(Twin.of("continuum"), free), [], [], z.ravel()), J.reshape(-1, 2), 0.0)
+        fitted = Fit(Evaluation(Model(Twin.of("continuum"), free), {}, [], z.ravel()), J.reshape(-1, 2), 0.0)
         made: Any = SimpleNamespace(inputs=[SimpleNamespace(time=np.zeros(50))] * 8, outputs=[None])
         found_ = rigs(made, list(range(8)), fitted)
 
