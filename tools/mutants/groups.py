@@ -21,7 +21,7 @@ LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misr
 CONTROL = "not tracked and not less_of and not foreseen and not knows_of and not examples and not thousand and not takes_up"
 PLACES = "place_in_words or a_tip_alone or three_markers or bend or have_no_say"
 BY_NUMBERS = f"row or number or proposed or asked or lacks or {PLACES}"
-SUSPICIONS = "sample or mistake or good_finger or unusual or not_pulled or other_way or same_instant"
+SUSPICIONS = "parts or sample or mistake or good_finger or unusual or not_pulled"
 WORDS = "told or said or nearest or wave or a_step_is or drift_between"
 TENSIONS = "made_of or nothing or made_its or grows or likeliest"
 IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
@@ -98,7 +98,8 @@ GROUPS = {
     ),
     "base": _stage("calibrate", "tests/test_zeros.py"),
     "suspicions": Group(
-        ("twin/diagnose/suspicions/*.py",), ("tests/test_suspicions.py", "tests/test_suspicions_silent.py", "-k", SUSPICIONS)
+        ("twin/diagnose/suspicions/*.py",),
+        ("tests/test_suspicions_parts.py", "tests/test_suspicions.py", "tests/test_suspicions_silent.py", "-k", SUSPICIONS),
     ),
     "budget": _stage("budget", "tests/test_search.py", "-k", "time_is_up"),
     "seal": _stage("seal"),
