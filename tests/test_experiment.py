@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -83,6 +84,15 @@ def test_a_trial_comes_a_minute_after_the_last_and_has_the_rate_that_it_says() -
     assert top <= slow.command[:, 1].max()
     assert not slow.command[:, [0, 2]].any()
     assert slow.command[[0, -1], 1].tolist() == [0.0, 0.0]
+
+
+def test_a_pull_and_its_release_are_as_fast() -> None:
+    """So that a loop between them is friction's, not the rate's: seen backwards in time the trial is the same."""
+    pulls = [t for words, t in menu(planned("default")) if "and release it, " in words and "again" not in words]
+    assert len(pulls) >= 6
+    for trial in pulls:
+        np.testing.assert_allclose(trial.command, trial.command[::-1])
+        np.testing.assert_allclose(np.abs(np.diff(trial.command[:, trial.command.any(axis=0)], axis=0)).min(axis=0).max(), 0.0)
 
 
 def test_a_tendon_that_does_not_pull_is_paid_out_where_displacements_are_commanded() -> None:
@@ -172,6 +182,22 @@ def proposed(monkeypatch: pytest.MonkeyPatch, *lost: str, **trials: tuple[np.nda
     m = len(day.outputs)
     noise = Noise(np.ones(m), np.full(day.n_tendon, 0.1), np.zeros(m), "by hand")
     return next_experiment(day, noise, fitted(False), fitted(True), jobs=1)
+
+
+def test_no_derivatives_are_taken_of_trials_that_cannot_separate_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a rival could imitate only lessens |d|^2: of trials that differ by less than is found already, or by as much, no
+    solves of all its neighbours are paid for."""
+    d, nothing, taken = RNG.normal(size=8), np.zeros((8, 2)), []
+
+    class Counted(Lines):
+        def jacobian(self, at: Any, which: range) -> np.ndarray:
+            taken.append(self.name)
+            return super().jacobian(at, which)
+
+    monkeypatch.setattr(sys.modules[__name__], "Lines", Counted)
+    found = proposed(monkeypatch, best=(d, nothing), alike=(d, nothing), less=(0.9 * d, nothing), least=(0.1 * d, nothing))
+    assert found is not None
+    assert (found.words, taken) == ("best", ["best"])
 
 
 def apart(d: np.ndarray, J: np.ndarray) -> float:

@@ -79,3 +79,6 @@ def test_what_one_part_alone_tells_cannot_disagree() -> None:
     found = scatter(parts, alone + 2.0 * other)
     # Of the second: two parts with half the information each, d = (1/2) 3 sqrt(2) each way.
     assert found == pytest.approx([0.0, 2 * (3.0 / 2.0**0.5) ** 2])
+    # A fit ends with a slope of some thousandths of a standard error: no sign that the part disagrees with itself.
+    unfinished = [(alone, np.array([1e-3, 0.0])), *parts[1:]]
+    assert scatter(unfinished, alone + 2.0 * other) == pytest.approx(found)

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from tests.test_effects import some_signals
 from twin.bench import prepare
-from twin.effects import Drive, Effect, Loads, Signals, named
+from twin.effects import Drive, Effect, Loads, Signals, catalogue, named
 from twin.errors import DataError
 from twin.laws import Laws
 from twin.measurements import Channel, Recording, Trial
@@ -315,6 +316,70 @@ def test_a_wall_stands_where_it_is_said() -> None:
     assert wall[:3] @ point - wall[3] == pytest.approx(-1e-3)
     assert np.linalg.norm(wall[:3]) == pytest.approx(1.0)
     assert wall[4] == 100.0
+
+
+def test_strokes_are_sought_of_all_drives_that_come_so_far() -> None:
+    """Only where lengths command every tendon; of drives that all reach as far, all; of one that stays behind, not it."""
+    saturation, u = named("actuator_saturation"), 1e-2 * np.linspace(0.0, 1.0, 5)[:, None]
+    held = some_signals(n=5).with_(drives=(Drive.DISPLACEMENT,) * 3, displacement=u * np.ones(3))
+    starts = list(saturation.starts([held], 3))
+    assert starts
+    for start in starts:
+        assert 0.0 < start.values["stroke"] < 1e-2
+        assert start.free == ("stroke", "give", "loss_1", "loss_2", "loss_3")
+    behind = held.with_(displacement=u * [1.0, 0.1, 1.0])
+    assert {s.free for s in saturation.starts([behind], 3)} == {("stroke", "give", "loss_1", "loss_3")}
+    mixed = held.with_(drives=(Drive.DISPLACEMENT, Drive.DISPLACEMENT, Drive.TENSION))
+    assert not any("stroke" in s.free for s in saturation.starts([mixed], 3))
+
+
+@pytest.mark.parametrize("turns", [0.85, 1.0, 1.3, 3.0])
+def test_a_fit_finds_a_drums_turn_from_some_start_whatever_its_phase(turns: float) -> None:
+    """Of a drum half a millimetre off its centre, one turn of which takes up `turns` of the travel: least squares with the law's
+    own steps and bounds ends at its circumference from one of the starts at least. Of smaller drums, that turn more often, it may
+    not: at 0.7 of the travel in 9 of these 12 phases, at 0.5 in 2."""
+    effect, u = named("transmission_error"), np.linspace(0.0, 2e-2, 60)[:, None]
+    held = some_signals(n=60).with_(drives=(Drive.DISPLACEMENT,) * 3, displacement=u * [1.0, 0.0, 0.0])
+    starts, table = list(effect.starts([held], 3)), {p.name: p for p in effect.declared(3)}
+    assert all(s.free == ("turn", "sine_1", "cosine_1") for s in starts)
+    free = [table[n] for n in starts[0].free]
+    step, bounds = np.array([p.step for p in free]), ([p.low for p in free], [p.high for p in free])
+
+    def off(x: np.ndarray, seen: np.ndarray | float = 0.0) -> np.ndarray:
+        return (effect(dict(zip(starts[0].free, x, strict=True)), 3).drive(held).displacement[:, 0] - seen) / 5e-5
+
+    for phase in np.arange(12) * np.pi / 6.0:
+        truth = np.array([turns * 2e-2, 5e-4 * np.cos(phase), 5e-4 * np.sin(phase)])
+        seen = off(truth) * 5e-5
+        ends = [least_squares(off, list(s.values.values()), bounds=bounds, x_scale=step, args=(seen,)) for s in starts]
+        assert min(ends, key=lambda f: f.cost).x[0] == pytest.approx(truth[0], rel=1e-3), phase
+
+
+def test_springs_may_cool_as_fast_as_in_a_fans_wind_and_no_faster() -> None:
+    """Loss of the springs' wire of 0.51 mm, 50 K above air: forced by Churchill and Bernstein (1977), free by Churchill and Chu
+    (1975). Air that hardly moves, 0.25 m/s, doubles it; a fan's 2 m/s is the end of the range; both laws are good to some 10 %."""
+    d, nu, Pr, T, warmer = 5.1e-4, 1.8e-5, 0.70, 323.0, 50.0  # m, m^2/s of air at 50 degC
+    Ra = 9.81 / T * warmer * d**3 / nu**2 * Pr
+    free = (0.60 + 0.387 * Ra ** (1 / 6) / (1.0 + (0.559 / Pr) ** (9 / 16)) ** (8 / 27)) ** 2
+
+    def factor(speed: float) -> float:
+        Re = speed * d / nu
+        forced = 0.62 * Re**0.5 * Pr ** (1 / 3) / (1.0 + (0.4 / Pr) ** (2 / 3)) ** 0.25
+        return (0.3 + forced * (1.0 + (Re / 282000.0) ** 0.625) ** 0.8) / free
+
+    (still_air,) = (p for p in named("sma_cooling").declared(3) if p.name == "factor")
+    assert factor(0.25) == pytest.approx(2.0, rel=0.1)
+    assert still_air.high == pytest.approx(factor(2.0), rel=0.15)
+
+
+def test_what_may_have_either_sign_may_be_as_large_either_way() -> None:
+    """A day seen in a mirror, or counted the other way, is a day as well. Not so a draught, which carries off more heat, hardly
+    less, and a hysteresis, which is narrowed to none at most."""
+    one_way = {("sma_cooling", "forced"), ("sma_hysteresis", "width")}
+    for name, effect in catalogue().items():
+        for p in effect.declared(3):
+            if p.low < 0.0 < p.high and p.value == 0.0 and (name, p.name) not in one_way:
+                assert p.high == -p.low, (name, p.name)
 
 
 def test_fits_start_at_every_guess_and_at_each_tendon_alone_and_all() -> None:

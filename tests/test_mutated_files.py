@@ -6,6 +6,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+import pyarrow.parquet
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -95,3 +96,26 @@ def test_the_second_reader_sees_a_twin_and_a_set_that_are_not_the_file(tmp_path:
     (tmp_path / "set/measurements.toml").write_text(SET.replace("{suffix}", "csv").replace('"mm"', '"cm"'))
     with pytest.raises(Differs):
         check_set(tmp_path / "set", recording)
+
+
+def test_a_damaged_column_that_nobody_reads_hides_none_of_the_others(tmp_path: Path) -> None:
+    """It is named as left out, its page is never opened; the same damage to a column that is read is refused."""
+    for damaged in ("more", "tip_x"):
+        folder = tmp_path / damaged
+        write_set(folder, "parquet")
+        path = folder / "a.parquet"
+        table = pyarrow.parquet.read_table(path)
+        pyarrow.parquet.write_table(table.append_column("more", table.column("tip_x")), path)
+        group = pyarrow.parquet.read_metadata(path).row_group(0)
+        column = next(group.column(k) for k in range(group.num_columns) if group.column(k).path_in_schema == damaged)
+        data = bytearray(path.read_bytes())
+        at = column.dictionary_page_offset or column.data_page_offset
+        data[at : at + 8] = b"\xff" * 8
+        path.write_bytes(data)
+        if damaged == "tip_x":
+            with pytest.raises(TwinError, match="cannot be read as Parquet"):
+                read(folder)
+            continue
+        recording = read(folder)
+        assert any("'more'" in notice for notice in recording.notices)
+        check_set(folder, recording)

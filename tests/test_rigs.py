@@ -125,3 +125,29 @@ def test_the_groups_are_those_of_all_possible_ones_that_leave_least(seed: int) -
     assert (found_.one, found_.other) == (rest(other), other)
     price = 2 * np.log(400) + 16 * np.log(2)
     assert found_.fall == pytest.approx(left(tuple(range(8))) - least - price, rel=1e-6)
+
+
+def test_of_robots_that_scatter_the_search_nearly_always_finds_the_best_of_all_possible_groups() -> None:
+    """Trials that each want half as different a robot as the two groups do: a search from eight starts is no proof, but of 40 days
+    its groups leave as little as the best of all 119 on 36 at least (of 540 such days tried 5 % fell short; of searches that go
+    another way than down the sum of squares a quarter)."""
+    missed = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        J = rng.normal(size=(8, 50, 2))
+        wanted = np.where(np.isin(np.arange(8), (1, 4, 5))[:, None], [1.5, 0.5], [-0.5, 0.0]) + 0.5 * rng.normal(size=(8, 2))
+        z = np.einsum("knp,kp->kn", J, wanted) + rng.normal(size=(8, 50))
+        free = tuple(Free(None, Parameter(n, 0.0, "m", -10.0, 10.0, "by hand", scale=1.0)) for n in ("one", "two"))
+        fitted = Fit(Evaluation(Model(Twin.of("continuum"), free), {}, [], z.ravel()), J.reshape(-1, 2), 0.0)
+        made: Any = SimpleNamespace(inputs=[SimpleNamespace(time=np.zeros(50))] * 8, outputs=[None])
+        found_ = rigs(made, list(range(8)), fitted)
+
+        def told(group: tuple[int, ...], J: np.ndarray = J, z: np.ndarray = z) -> float:
+            """What a robot of its own takes off a group's sum of squares: that of its projection."""
+            Q = np.linalg.qr(J[list(group)].reshape(-1, 2))[0]
+            return float(((Q.T @ z[list(group)].ravel()) ** 2).sum())
+
+        groups = [g for n in (2, 3, 4) for g in combinations(range(8), n)]
+        best = max(told(g) + told(tuple(k for k in range(8) if k not in g)) for g in groups)
+        missed += found_ is None or told(found_.one) + told(found_.other) < best * (1.0 - 1e-6)
+    assert missed <= 4

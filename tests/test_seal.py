@@ -35,6 +35,15 @@ def test_blocks_keep_neighbours_together() -> None:
     assert 2.0 < width[0] / width[1] < 5.0  # sqrt(10) = 3.2, from 80 blocks known to some 15 %
 
 
+@pytest.mark.parametrize(("length", "alike"), [(12, 12), (19, 19), (20, 10), (40, 10)])
+def test_rows_that_err_alike_are_one_draw(length: int, alike: int) -> None:
+    """Trials that err alike throughout, shorter than two blocks, or ten rows at a time: known as well as one row for each of those,
+    to the last digit. Half as many blocks would be sqrt(2) wider, twice as many as much narrower."""
+    draws = np.random.default_rng(2).normal(size=80) ** 2
+    rows = np.repeat(draws, alike).reshape(-1, length)
+    assert interval(list(rows), 0) == pytest.approx(interval([np.array([x]) for x in draws], 0), rel=1e-12)
+
+
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
     """Trials 1 and 3 sealed; the final twin, "after", has no equilibrium on trial 3. Every twin is 1 mm off in x."""

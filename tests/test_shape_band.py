@@ -16,6 +16,7 @@ from twin.shape.band import ONE, PUSH, STRANGER, Bands, Behind, widened, widened
 from twin.shape.estimator import Estimator, Felt, Shapes, own_error
 from twin.shape.learned import at_level
 from twin.shape.physics import PRIOR, S, _left_open
+from twin.shape.sensor_fit import Known, fit_sensors
 from twin.twin import Twin
 
 FRAMES = 60
@@ -36,6 +37,24 @@ def test_what_a_sharp_strain_tells_is_not_left_open() -> None:
     """Of a point that moves with a_1 alone only the strain's own noise is left, 1 / 50^2."""
     G = np.array([[[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]])
     assert _left_open(G, np.array([[50.0, 0.0]]), np.array([40.0])) == pytest.approx(1.0 / 50.0**2, rel=0.01)
+
+
+def test_a_gross_reading_pulls_an_alignment_no_more_than_one_two_sigmas_off() -> None:
+    """Three of 300 resistances read a third too high. Least squares would follow them by 80 sigmas each; held to two each the fit
+    moves by (A'A)^-1 A' 2, A the slopes of one sensor's three numbers, to first order."""
+    twin, rng, sigma = Twin.of(load("finger")), np.random.default_rng(3), 2e-3
+    strain = 0.05 * rng.uniform(-1.0, 1.0, (300, 4))
+    resistance = 1000.0 * (1.0 + strain) ** 2
+    resistance[[10, 150, 250], 1] *= 1.33
+    found = fit_sensors(Known(strain, resistance, np.tile(sigma**2 * np.eye(4), (300, 1, 1))), twin)
+    e = strain[:, 1]
+    A = np.stack([np.full(300, 0.5), np.maximum(e, 0.0), np.minimum(e, 0.0)], axis=1) / sigma  # of ln R0, kappa+ and kappa-
+    A /= (1.0 + e)[:, None]
+    pulled = np.linalg.solve(A.T @ A + np.diag([0.12**-2, 0.2**-2, 0.2**-2]), A[[10, 150, 250]].sum(axis=0))
+    moved = np.log(found["sensors.resistance_2"].value / 1000.0)
+    assert moved == pytest.approx(2.0 * pulled[0], rel=0.15)
+    for other in (1, 3, 4):
+        assert found[f"sensors.resistance_{other}"].value == pytest.approx(1000.0, abs=0.1)
 
 
 def test_widths_between_and_beyond_levels() -> None:

@@ -39,6 +39,14 @@ def test_what_only_one_trial_shows_is_not_sealed(day: Bench, loads: dict[str, ob
         assert trial not in split(altered(day, trial, **loads), seed)[1]
 
 
+@pytest.mark.parametrize(("name", "less"), [("payload", 4e-7), ("gravity", 4e-4), ("force", 4e-4)])
+def test_what_no_scale_level_or_gauge_tells_is_no_condition_of_its_own(day: Bench, name: str, less: float) -> None:
+    """0.4 mg, 40 microradians and 0.4 mN: bench instruments read to a milligram, a tenth of a milliradian and a millinewton."""
+    plain = split(day, 0)
+    for trial in plain[1]:
+        assert split(altered(day, trial, **{name: getattr(day.inputs[trial].loads, name) + less}), 0) == plain
+
+
 def test_the_widest_command_and_the_warmest_trial_are_not_sealed(day: Bench) -> None:
     trial = split(day, 0)[1][0]
     inputs = list(day.inputs)

@@ -26,6 +26,11 @@ SAID = {
     "origin of the markers shifted": "shifted frame", "start in minutes": "overlapping trials", "a start missing": "missing start",
     "marker noise in m under mm": "declared noise", "marker noise in um under mm": "declared noise",
 }  # fmt: skip
+AXES = {  # by geometry: QUARTER takes x to y, the roll x to y, y to z and z to x
+    "mirrored marker frame": "x of the file is -x, y of the file is y, z of the file is z",
+    "marker frame turned by 90 degrees": "x of the file is -y, y of the file is x, z of the file is z",
+    "marker axes permuted": "x of the file is z, y of the file is x, z of the file is y",
+}
 
 
 def test_the_sample_raises_no_suspicion() -> None:
@@ -38,6 +43,8 @@ def test_a_mistake_is_refused_or_said(mistake: str, tmp_path: Path) -> None:
     assert found in ("refused", "said")
     if mistake in SAID:
         assert any(w.startswith(f"{SAID[mistake]}: ") for w in words)
+    if mistake in AXES:
+        assert any(AXES[mistake] in w for w in words)
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,13 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import RBFInterpolator
+from scipy.optimize import least_squares
 
 from twin.effects import named
 from twin.errors import DataError
@@ -17,8 +20,10 @@ from twin.factory import named_points
 from twin.measurements import Channel, Recording, read
 from twin.report.sections.under_hand import words
 from twin.robots import load
+from twin.shape.modal import Network
 from twin.shape.sensing import feeling
-from twin.shape.under_hand import UnderHand, under_hand
+from twin.shape.under_hand import MarkerFit, UnderHand, under_hand
+from twin.soft import SoftStatics
 from twin.soft.statics import turned
 from twin.twin import Twin
 
@@ -102,6 +107,39 @@ def test_markers_tell_it_too(day: Recording, built: Twin) -> None:
     assert found.trials == ("test_2.csv",)
     assert (found.after < TOLD * found.seen).all()
     assert lied.after[LYING] > 2.0 * TOLD * lied.seen[LYING]
+
+
+def test_the_shape_behind_markers_is_the_most_probable_one(day: Recording, built: Twin) -> None:
+    """Of markers with the noise their channels declare, two of them hidden: least squares over markers and habit, its slopes by
+    differences, ends at the same coordinates and with the same covariance."""
+    rng, net = np.random.default_rng(4), Network.of(built.robot)
+    fit = MarkerFit(with_markers(day, built, np.random.default_rng(0)), built, SoftStatics(feeling(built)), net)
+    true = rng.normal(size=len(fit.basis)) * net.modes.spread
+    y = fit.mean + true @ fit.basis + 3e-4 * rng.normal(size=len(fit.mean))
+    y[:6] = np.nan
+    root = np.linalg.cholesky(net.habit.inverse).T
+
+    def off(z: np.ndarray) -> np.ndarray:
+        return np.concatenate([(y - fit.mean - z @ fit.basis)[6:] / 3e-4, root @ net.habit(z)[0]])
+
+    best = least_squares(off, np.zeros(len(true)), x_scale=net.modes.spread, xtol=1e-12, ftol=1e-12)
+    found, covariance = fit(y)
+    sure = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
+    np.testing.assert_allclose(found, best.x, atol=0.02 * sure.max(), rtol=0)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), sure, rtol=0.02)
+
+
+def test_a_row_with_too_few_markers_shows_no_shape(day: Recording, built: Twin) -> None:
+    """Six points are enough, five and two coordinates of a sixth are not."""
+    filmed = with_markers(day, built, np.random.default_rng(0))
+    fit = MarkerFit(filmed, built, SoftStatics(feeling(built)), Network.of(built.robot))
+    places = np.full((3, len(fit.bench.outputs)), np.nan)
+    for row, seen in enumerate((18, 17, 30)):
+        places[row, fit.columns[:seen]] = fit.mean[:seen]
+    alone = replace(fit.bench.inputs[0], name="three rows")
+    fit.bench = replace(fit.bench, inputs=(alone,), measured=(places,))
+    sensed: Any = SimpleNamespace(name="three rows", time=np.array([0.0, 10.0, 20.0]))
+    assert fit.trial(sensed)[1] == [0, 2]
 
 
 def test_without_a_hand_or_a_view_there_is_nothing_to_say(day: Recording, built: Twin) -> None:

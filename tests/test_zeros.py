@@ -42,7 +42,12 @@ def calibrated(recording: Recording) -> tuple[list[str], dict[str, float]]:
     """What is said of zeros once the robot is calibrated, and by how much they jumped; no effect is sought."""
     twin = Twin.of("continuum")
     looked = looked_at(prepare(recording, twin.robot), twin, Settings(jobs=1))
-    study, base, _ = calibrate(looked.bench, twin, looked.sealed, looked.nominal, Settings(jobs=1), lambda words: None)
+    stages: list[str] = []
+    study, base, _ = calibrate(looked.bench, twin, looked.sealed, looked.nominal, Settings(jobs=1), stages.append)
+    jumped = [f"zeros that jump, {n}" for n, _ in enumerate(jumps_of(base.fit.model.twin), 1)]
+    assert stages[: 2 + len(jumped)] == ["noise", "calibration", *jumped]
+    # Derivatives are those at the solution: of them standard errors are made, and effects sought.
+    np.testing.assert_array_equal(study.objective.jacobian(base.fit.evaluation, [0])[:, 0], base.fit.J[:, 0])
     return words(study.bench, base.fit), {n: f.value or 0.0 for n, f in base.fit.fitted(Zeros.id).items()}
 
 

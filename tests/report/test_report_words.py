@@ -191,3 +191,17 @@ def test_loop_widths_are_drawn_against_the_load_measured_and_predicted() -> None
     # mm: the loop made is 2 mm a newton wide, its mean over pulls to 2, 2.2, ... N half of that; its ends, at rest, do not count
     np.testing.assert_allclose(calibrated.y, 2.0 * (1.0 + 0.1 * np.arange(5)), rtol=0.15)
     assert max(*measured.y, *after.y) < 0.15, "noise alone"
+    assert "(N m)" in drawn.figure.layout.xaxis.title.text
+    assert "(mm)" in drawn.figure.layout.yaxis.title.text
+
+
+@pytest.mark.parametrize(("apart", "two"), [(0.07, False), (0.15, True), (1.0, True)])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
+def test_loop_widths_are_drawn_of_loads_that_differ_whatever_their_size(size: float, apart: float, two: bool) -> None:
+    """A load set twice comes back within some per cent; two loads are a tenth of the larger apart or more: mN m or 100 N m."""
+    d = diagnosis()
+    torques = size * np.linspace(1.0 - apart, 1.0, len(d.bench.inputs))
+    held = [
+        replace(i, loads=replace(i.loads, torque=np.full(len(i.time), x))) for i, x in zip(d.bench.inputs, torques, strict=True)
+    ]
+    assert (widths.plot(replace(d, bench=replace(d.bench, inputs=tuple(held)))) is not None) == two

@@ -20,6 +20,8 @@ class Group:
 LAWS = "test_laws or transmission_error or says_what_it_is or off_places or misreads or hooks or parameters_have or begin_on_both"
 CONTROL = "not tracked and not less_of and not foreseen and not knows_of and not examples and not thousand and not takes_up"
 PLACES = "place_in_words or a_tip_alone or three_markers or bend or have_no_say"
+BY_NUMBERS = f"row or number or proposed or asked or lacks or {PLACES}"
+SUSPICIONS = "parts or sample or mistake or good_finger or unusual or not_pulled"
 WORDS = "told or said or nearest or wave or a_step_is or drift_between"
 TENSIONS = "made_of or nothing or made_its or grows or likeliest"
 IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
@@ -30,6 +32,9 @@ def _stage(name: str, *tests: str) -> Group:
 
 
 GROUPS = {
+    "saturation": Group(
+        ("twin/effects/actuator_saturation.py",), ("tests/test_laws.py", "tests/test_effects.py", "-k", "drive or saturation")
+    ),
     "effects": Group(
         ("twin/effects/[!_]*.py",),
         (
@@ -81,9 +86,20 @@ GROUPS = {
     "words": _stage("words", "tests/test_stages.py", "tests/test_describe.py", "-k", WORDS),
     "objective": _stage("objective", "tests/test_stages.py"),
     "pipeline": _stage("pipeline", "tests/test_stages.py", "tests/test_pipeline.py"),
-    "thresholds": _stage("thresholds", "tests/test_thresholds.py", "tests/test_describe.py", "-k", f"row or number or {PLACES}"),
+    "thresholds": _stage(
+        "thresholds", *(f"tests/test_{name}.py" for name in ("thresholds", "describe", "experiment", "design")), "-k", BY_NUMBERS
+    ),
     "between": Group(
         tuple(f"twin/diagnose/{name}.py" for name in ("look", "doubts", "conclusion", "study")), ("tests/test_stages.py",)
+    ),
+    "jumps": Group(
+        ("twin/diagnose/jumps.py", "twin/diagnose/zeros.py"),
+        ("tests/test_jumps.py", "tests/test_zeros.py", "-k", "test_jumps or moved_within or joints_zero"),
+    ),
+    "base": _stage("calibrate", "tests/test_zeros.py"),
+    "suspicions": Group(
+        ("twin/diagnose/suspicions/*.py",),
+        ("tests/test_suspicions_parts.py", "tests/test_suspicions.py", "tests/test_suspicions_silent.py", "-k", SUSPICIONS),
     ),
     "budget": _stage("budget", "tests/test_search.py", "-k", "time_is_up"),
     "seal": _stage("seal"),
@@ -98,13 +114,14 @@ GROUPS = {
         tuple(f"twin/shape/{name}.py" for name in ("training", "lesson", "weights", "judge", "folding")),
         ("tests/test_shape_parts.py", "tests/test_shape_training.py", "-k", "not killed"),
     ),
+    "under_hand": Group(("twin/shape/under_hand.py",), ("tests/test_under_hand.py",)),
     "shape": Group(
         ("twin/shape/*.py", "twin/soft/skin.py"),
         ("tests/test_shape_parts.py", "tests/test_shape_band.py", "tests/test_shape_strain.py", "-k", "not align"),
     ),
     "tip": Group(
         ("twin/control/tip.py",),
-        ("tests/test_control.py", "-k", "surface or tracked or knows_of or tip_of_an_arc or off_by_is_taken"),
+        ("tests/test_control.py", "-k", "steady or surface or tracked or knows_of or tip_of_an_arc or off_by_is_taken"),
     ),
     "control": Group(("twin/control/*.py",), ("tests/test_control.py", "tests/test_shape_control.py", "-k", CONTROL)),
     "tasks": Group(("twin/tasks/*.py",), ("tests/test_tasks.py", "-k", "judged or nothing or lists")),
@@ -122,6 +139,7 @@ GROUPS = {
     ),
     "robots": Group(("twin/robots/continuum.py",), ("tests/test_robots.py",)),
     "numbers": Group(("twin/report/numbers.py",), ("tests/report/test_report_words.py",)),
+    "widths": Group(("twin/report/widths.py",), ("tests/report/test_report_words.py", "-k", "widths")),
 }
 
 

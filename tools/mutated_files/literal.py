@@ -216,8 +216,10 @@ def vector(value: object, name: str) -> list[float]:
 
 def check_table(path: Path, channels: list[Any], trial: Any, notices: tuple[str, ...]) -> None:
     if path.suffix == ".parquet":
-        table = pyarrow.parquet.read_table(path)
-        columns = {name: [math.nan if v is None else v for v in table.column(name).to_pylist()] for name in table.column_names}
+        wanted = ["time", *(entry["name"] for entry in channels)]  # the pages of others may be damaged
+        table = pyarrow.parquet.read_table(path, columns=wanted)
+        columns: dict[str, list[Any]] = {name: [] for name in pyarrow.parquet.read_schema(path).names}
+        columns |= {name: [math.nan if v is None else v for v in table.column(name).to_pylist()] for name in table.column_names}
     else:
         rows = list(csv.reader(io.StringIO(text_of(path).rstrip()), strict=True))
         columns = {name.strip(): [row[k] for row in rows[1:]] for k, name in enumerate(rows[0])}

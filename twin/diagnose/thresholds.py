@@ -106,7 +106,6 @@ THICKER = _row(
     "THICKER", 1.25, "ratio", "of a body near its base, seen to described: 0.996 to 1.000 on ten finite element days",
     "python -m tools.mistakes SET (a finger's without markers)",
 )  # fmt: skip
-STUCK = _row("STUCK", 0.1, "of the noise", "a channel that scatters by less is not read", "judgement")
 MOVED = _row(
     "MOVED", 0.025, "of the motion described", "less, beside noise, is none: half the weakest gain that is called one",
     "derivation: 0.05 / 2",

@@ -81,7 +81,7 @@ def _shapes(recording: Recording, pushed: Sequence[Sensed], twin: Twin) -> Itera
     body, net = feeling(twin), Network.of(twin.robot)
     statics = SoftStatics(body)
     markers = MarkerFit(recording, twin, statics, net)
-    camera = side([c for c in clouds.values() if c is not None]) if any(clouds.values()) else np.zeros(3)
+    camera = side([c for c in clouds.values() if c is not None])
     fit = CloudFit(Skin.of(body), net, turned(body.turn), camera)
     for sensed in pushed:
         cloud = clouds[sensed.name]

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.bench import Bench, Inputs
-from twin.diagnose.thresholds import ALIVE, FITS, MOST, MOVED, SAMPLES, STUCK
+from twin.diagnose.thresholds import ALIVE, FITS, MOST, MOVED, SAMPLES
 from twin.effects import Loads
 from twin.errors import TwinError
 from twin.evaluate import TYPICAL, headline
@@ -78,7 +78,7 @@ class Case:
         noise = np.array([o.channel.noise or TYPICAL[o.group] for o in self.bench.outputs])
         there = [np.isfinite(c) for c in y.T]
         spread, most = (np.array([np.std(c[t]) if t.any() else np.nan for c, t in zip(v.T, there, strict=True)]) for v in (y, p))
-        still = (spread < STUCK * noise) | (np.sqrt(np.maximum(spread**2 - noise**2, 0.0)) < MOVED * most)
+        still = np.sqrt(np.maximum(spread**2 - noise**2, 0.0)) < MOVED * most
         return np.flatnonzero(still & (most > ALIVE * noise)).tolist()
 
     def few(self) -> list[int]:
