@@ -5,8 +5,8 @@ noise is how well a hold repeats, not how quiet the cameras are (0.01-0.2 mm): t
 pulled alike they differ by millimetres. That difference, 240 Hz holds against a cubic through the 200 Hz ones, is measured here
 and printed. It is the same in all rows of a hold, so each is declared sqrt(ROWS) times as noisy: a hold counts once.
 
-Markers were put on anew between the sessions (where both pulled alike marker 2 sits 8 mm elsewhere, whatever the pull): those of the
-second are markers 5 to 8.
+Markers were put on anew between the sessions (where both pulled alike marker 2 sits 8 mm elsewhere, whatever the pull): those of
+the second are markers 5 to 8.
 
 Base frame: diag(1, -1, -1) of the authors' robot frame, which is R (p - (base marker + o)).
 """

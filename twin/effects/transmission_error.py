@@ -9,7 +9,7 @@ import numpy as np
 from twin.effects.effect import Effect, Signals, Start
 from twin.quantities import Parameter
 
-TURNS = (1.0, 1.6)  # periods a fit starts from, of the largest travel: a few drive turns at most take up a robot's tendons
+TURNS = (0.5, 1.0, 1.6)  # periods a fit starts from, of the largest travel: two drive turns at most take up a robot's tendons
 MOVED = 1e-4  # m of travel below which nothing of a drive's error shows
 STEPS = 30  # of the inverse; each takes off the error's slope, below one where the drive runs forward at all
 
