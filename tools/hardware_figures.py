@@ -58,7 +58,7 @@ def draw_tentacle(folder: Path) -> None:
         axis.set(xlabel="x, mm", aspect="equal", xlim=(-40, 200))
         axis.set_title(f"{pulls[k, 0]:.1f} and {pulls[k, 1]:.1f} N", fontsize=9, loc="left")
     axes[0].set_ylabel("height, mm")
-    axes[0].legend(frameon=False, fontsize=7, loc="lower right")
+    axes[0].legend(frameon=False, fontsize=7, loc="upper right")
     figure.savefig(models_folder() / "tentacle/two_tendons.svg", metadata={"Date": None})
 
 
