@@ -49,7 +49,7 @@ REFUSED = {
     "half a disk": (WIRE, "disks   = 8", "disks = 8.5", ["structure: disks", "8.5"]),
     "too many disks": (WIRE, "disks   = 8", "disks = 9223372036854775807", ["structure: disks", "less than or equal to 200"]),
     "an unknown choice": (WIRE, 'markers = "disk"', 'markers = "tip"', ["structure: markers", "'tip'"]),
-    "a marker on no disk": (CAST, "markers     = [4, 9, 16, 24]", "markers = [4, 9, 16, 25]", ["markers", "1 to 24"]),
+    "a marker on no disk": (CAST, "markers     = [4, 9, 16, 24, ", "markers = [4, 9, 16, 25, ", ["markers", "1 to 24"]),
     "an end on no disk": (CAST, "tendons_end = 20", "tendons_end = 25", ["tendons_end", "1 to 24"]),
     "one tendon for a jaw": (JAW, "tendons = 2", "tendons = 1", ["structure: tendons", "2"]),
     "crossed in numbers": (JAW, "crossed = true", "crossed = 1", ["structure: crossed", "boolean"]),
