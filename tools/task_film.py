@@ -27,7 +27,7 @@ from twin.tasks import STEP, Trial, task
 WIDE, HIGH, STRIP = 400, 300, 6  # pixels of a film; pictures of a strip
 EACH = 4  # steps a picture: 12.5 of them a second, GIF counts hundredths
 COLOURS = 64
-LOOKED_AT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.085), 0.27, 35.0, 20.0
+LOOKED_AT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.085), 0.27, 120.0, 25.0
 LIGHT = 0.45  # of the headlight, from everywhere: the palm itself shades what it holds
 
 

@@ -44,11 +44,11 @@ class Cell:
     policy: str
     way: str
     case: str
-    seed: int
+    train_seed: int
 
     @property
     def file(self) -> str:
-        return f"{self.task}-{self.policy}-{self.way}-{self.case}-{self.seed}.json"
+        return f"{self.task}-{self.policy}-{self.way}-{self.case}-{self.train_seed}.json"
 
 
 def plan(data: Path, seeds: int) -> list[Cell]:
@@ -66,13 +66,13 @@ def plan(data: Path, seeds: int) -> list[Cell]:
 def score(cell: Cell, data: Path, trials: int, jobs: int) -> dict[str, Any]:
     folder = data / cell.task
     hand = OTHER if cell.case == "other" else read(folder)["seed"]
-    policy = learn(Lesson(cell.policy, cell.way, cell.seed), folder, print)
+    policy = learn(Lesson(cell.policy, cell.way, cell.train_seed), folder, print)
     drift = DRIFT if cell.case in ("drifting", "undone") else 0.0
     actor = Actor(task(cell.task), load("hand"), hand, cell.way, policy, drift, cell.case == "undone")
     outcomes = dict(actor.score(trials, TRIALS_OF, jobs))
     law = way(cell.way)
     data_hash = digest([law.shown(episode) for episode in lerobot.read_episodes(folder, law.columns)])
-    made_with = stamp(" ".join(sys.argv), TRIALS_OF, data_hash, ("torch", "diffusers"))
+    made_with = stamp(" ".join(["python -m tools.task_table", *sys.argv[1:]]), TRIALS_OF, data_hash, ("torch", "diffusers"))
     return {"format": FORMAT, **asdict(cell), "hand": hand, "trials": trials, "outcomes": outcomes, "provenance": made_with}
 
 

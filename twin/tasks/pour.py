@@ -13,7 +13,7 @@ FLOOR, FOOT = 0.143, 0.124  # m below the palm: the tray's floor, and the cup's 
 INNER, WALL, TALL = 0.010, 2e-3, 0.016  # m: half the cup's width within; half its walls' thickness; half its walls' height
 BASE = 2e-3  # m, half
 BALL = 4.5e-3  # m, radius
-HINGE = (-3e-3, 0.0, -4e-3)  # m of the middle of its floor: the cup leans on its rest, and past 27 degrees it falls
+HINGE = (-3e-3, 0.0, -4e-3)  # m of the middle of its floor: the cup leans on its rest, and past some 20 degrees it falls
 TRAY, RIM = (0.053, 0.045, 6e-3), 2e-3  # m, half its length, width and height; half its rim's thickness
 AHEAD = 0.027  # m from the hinge to the tray's middle
 
