@@ -156,15 +156,15 @@ def about_z(angle: float) -> Turn:
     return float(np.cos(angle / 2)), 0.0, 0.0, float(np.sin(angle / 2))
 
 
-def lifted(track: Track) -> Outcome:
-    """Of an object whose table has gone: it is where it was."""
+def lifted(track: Track, within: float = SUNK) -> Outcome:
+    """Of an object whose table has gone: it is where it was, to within some height (m)."""
     sunk = track.place[:, 2] - track.place[0, 2]
     if not track.reached:
         return Outcome.NOT_REACHED
     if sunk[-1] > FALLEN:
         return Outcome.DROPPED
     way = np.linalg.norm(np.ptp(track.place[track.last], axis=0))
-    return Outcome.SLIPPED if abs(sunk[-1]) > SUNK or way > SLIDES else Outcome.SUCCESS
+    return Outcome.SLIPPED if abs(sunk[-1]) > within or way > SLIDES else Outcome.SUCCESS
 
 
 @cache

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from twin.soft.scene import Part, Thing
-from twin.tasks.task import FALLEN, SLIDES, Outcome, Task, Track, about_z, block, eased, table
+from twin.tasks.task import Outcome, Task, Track, about_z, block, eased, lifted, table
 
 WANTED, BEGINS, TAKES = np.radians(32.0), 1.2, 0.9  # rad, s: out of the hooks from some 20 degrees on
 SUNK = 15e-3  # m
@@ -27,7 +27,6 @@ class Unscrew(Task):
     )
     seconds: ClassVar[float] = 3.7
     leaves: ClassVar[float | None] = 2.3
-    strength: ClassVar[float | tuple[float, ...]] = 0.9
 
     def things(self, rng: np.random.Generator) -> tuple[Thing, ...]:
         r, low = rng.uniform(0.020, 0.023), HALF - LUG[2]
@@ -44,13 +43,7 @@ class Unscrew(Task):
         return WANTED * eased((t - BEGINS) / TAKES)
 
     def judge(self, track: Track) -> Outcome:
-        sunk = track.place[:, 2] - track.place[0, 2]
-        if not track.reached:
-            return Outcome.NOT_REACHED
-        if sunk[-1] > FALLEN:
-            return Outcome.DROPPED
-        way = np.linalg.norm(np.ptp(track.place[track.last], axis=0))
-        return Outcome.SLIPPED if abs(sunk[-1]) > SUNK or way > SLIDES else Outcome.SUCCESS
+        return lifted(track, SUNK)
 
 
 def hook(r: float, azimuth: float) -> tuple[Part, Part]:
