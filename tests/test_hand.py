@@ -20,8 +20,9 @@ from twin.measurements import Channel, Recording, Trial, read
 from twin.robots import load
 from twin.robots.robot import models_folder
 from twin.soft import HandBody, HandDynamics, HandStatics, SoftStatics
-from twin.soft.scene import Scene, Sight, Thing
+from twin.soft.scene import Part, Scene, Sight, Thing
 from twin.soft.statics import turned
+from twin.soft.things import Places
 from twin.twin import Twin
 
 HANGING = np.array([0.0, 0.0, 9.81])
@@ -288,3 +289,46 @@ def test_what_cannot_be_is_refused() -> None:
         scene.step(np.array([[0.0, 0.0], [0.0, np.nan], [0.0, 0.0]]), 0.02)
     with pytest.raises(SolveError, match=r"finger 1 is lost at t = "):
         scene.step(np.array([[0.09, 0.0], [0.0, 0.0], [0.0, 0.0]]), 0.1)
+
+
+HINGED = Thing(
+    "cup", "box", (0.01, 0.012, 0.004), 0.02, (0.3, 0.1, 0.2), (0.8, 0.0, 0.6, 0.0), hinge=((0.02, 0.0, -0.01), (0.0, 2.0, 0.0)),
+    parts=(Part("sphere", (0.01,), (0.0, 0.01, 0.02), mass=0.01),),
+)  # fmt: skip
+
+
+def test_a_hinged_thing_is_where_mujoco_has_it() -> None:
+    """Place, turn and velocities, which are told from the angle alone."""
+    spec = mujoco.MjSpec()
+    HINGED.add(spec)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = 1.2, 3.0
+    mujoco.mj_forward(model, data)
+    speed = np.empty(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, 1, speed, 0)
+    place, turn, velocity = Places(model, [HINGED]).see(data)
+    np.testing.assert_allclose(place[0], data.xpos[1], atol=1e-12)
+    np.testing.assert_allclose(turn[0], data.xquat[1], atol=1e-12)
+    np.testing.assert_allclose(velocity[0, :3], speed[3:], atol=1e-12)
+    np.testing.assert_allclose(data.xmat[1].reshape(3, 3) @ velocity[0, 3:], speed[:3], atol=1e-12)
+
+
+def test_a_hinged_thing_swings_as_a_pendulum() -> None:
+    """Far from the fingers, by the hand's own steps: the period of small swings about its stable rest, from its masses, to 1 %."""
+    bob = Thing("bob", "sphere", (0.005,), 0.02, (0.3, 0.0, 0.1), hinge=((0.0, 0.0, -0.05), (0.0, 1.0, 0.0)))
+    scene = Scene(hand(), [bob], HANGING)
+    scene.data.qpos[-1] = 0.05
+    places = [scene.step(np.zeros((3, 2)), 0.01).place[0, 0] - 0.3 for _ in range(60)]
+    arm = 0.05 + 0.4 * 0.005**2 / 0.05  # of the simple pendulum that swings alike
+    crossed = np.flatnonzero(np.diff(np.sign(places)))[:2]
+    exact = [0.01 * (k + 1 + places[k] / (places[k] - places[k + 1])) for k in crossed]
+    assert exact[1] - exact[0] == pytest.approx(np.pi * np.sqrt(arm / 9.81), rel=0.01)
+
+
+def test_parts_must_leave_a_free_thing_balanced() -> None:
+    replace(HINGED, hinge=None, fixed=True)
+    with pytest.raises(DataError, match="balance them"):
+        replace(HINGED, hinge=None)
+    with pytest.raises(DataError, match="3 sizes"):
+        replace(HINGED, parts=(Part("box", (0.01,), (0.0, 0.0, 0.0)),))

@@ -13,6 +13,7 @@ from twin.effects import named
 from twin.errors import DataError, SolveError
 from twin.robots import load
 from twin.sensors import resistance
+from twin.soft.solid import Shape
 from twin.soft.statics import turned
 from twin.twin import Twin
 
@@ -163,3 +164,21 @@ def test_what_cannot_be_controlled_is_refused() -> None:
         ShapeController(drifting)
     with pytest.raises(DataError, match="every sensor"):
         StrainTracking(TWIN).step(np.zeros(4), np.array([1e3, np.nan, 1e3, 1e3]), 0.05)
+
+
+def test_a_finger_that_is_lost_is_not_led_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where not even the shape it stays at is found again, nothing is known of what its tendons do."""
+    finger = HeldFinger(TWIN)
+    finger.hold(np.array([1e-3, 0.0, 0.0, 0.0]))
+    there = finger.shortening.copy()
+
+    def lost(solid: object, shape: Shape, *rest: object) -> tuple[Shape, bool]:
+        shape.inverse = None
+        return shape, False
+
+    monkeypatch.setattr("twin.control.held.march", lost)
+    with pytest.raises(SolveError, match="no equilibrium on the way"):
+        finger.hold(np.array([2e-3, 0.0, 0.0, 0.0]))
+    np.testing.assert_array_equal(finger.shortening, there)
+    with pytest.raises(SolveError, match="start it anew"):
+        finger.response()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -19,7 +21,8 @@ from twin.learn.teach import Lesson
 from twin.learn.ways import ByStrain
 from twin.robots import load
 from twin.sensors import resistance
-from twin.tasks import Outcome, Track, Trial, task, tasks
+from twin.tasks import Outcome, Person, Track, Trial, task, tasks
+from twin.tasks.task import about_z
 
 HAND, FOUND = load("hand"), sorted(tasks())
 
@@ -31,6 +34,7 @@ def track(**changed: np.ndarray) -> Track:
         "place": np.tile([0.0, 0.0, 0.09], (151, 1)),
         "turn": np.tile([1.0, 0.0, 0.0, 0.0], (151, 1)),
         "touching": 9 * (time > 1.0),
+        "others": np.empty((151, 0, 3)),
     }
     return Track(time, **{**still, **changed})
 
@@ -55,7 +59,8 @@ def test_a_hand_that_does_nothing_does_not_reach(name: str) -> None:
     """Its things lie still until their table goes, and are the same for the same draw."""
     trial = Trial(task(name), body_of(HAND, {}), HAND.gravity, np.random.default_rng(3))
     assert trial.things == task(name).things(np.random.default_rng(3))
-    assert [t.fixed for t in trial.things] == [False, True]
+    assert not trial.things[0].fixed
+    assert [t.name for t in trial.things if t.fixed] == ["table"]
     slack = np.full_like(trial.seen.shortening, -15e-3)
     while trial.seen.time < 0.5:
         trial.pull(slack)
@@ -88,6 +93,56 @@ def test_what_is_turned_is_judged_by_its_angle() -> None:
         assert judge(track(turn=yawed(degrees))).value == outcome, degrees
     assert judge(track(turn=yawed(30), place=sunk(15e-3))) is Outcome.SLIPPED
     assert judge(track(turn=yawed(30), place=sunk(30e-3))) is Outcome.DROPPED
+
+
+def test_what_is_unscrewed_may_come_up_by_more() -> None:
+    judge = task("unscrew").judge
+    for amount, outcome in ((0.0, "success"), (-12e-3, "success"), (-20e-3, "slipped"), (40e-3, "dropped")):
+        assert judge(track(place=sunk(amount))).value == outcome, amount
+    assert judge(track(touching=np.zeros(151))) is Outcome.NOT_REACHED
+
+
+def test_hooks_hold_a_cap_that_is_not_turned() -> None:
+    """Pulled upwards by 0.5 N, three times its weight, it stays; turned out from under its hooks it goes."""
+    for turned, stays in ((0.0, True), (0.45, False)):
+        cap, neck = task("unscrew").things(np.random.default_rng(0))
+        spec = mujoco.MjSpec()
+        spec.option.gravity = [0.0, 0.0, 9.81 - 0.5 / cap.mass]
+        for thing in (replace(cap, turn=about_z(turned)), neck):
+            thing.add(spec)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 200)  # 0.4 s
+        assert (cap.place[2] - data.body("object").xpos[2] < 1e-3) == stays
+
+
+def test_what_is_inserted_is_judged_by_its_depth() -> None:
+    """The socket begins 16 mm from the palm's axis; a plug of 10 mm is 12 mm deep where its middle is at 14 mm."""
+    judge = task("insert").judge
+    for x, y, outcome in ((13e-3, 0.0, "success"), (15e-3, 0.0, "not reached"), (5e-3, 12e-3, "slipped")):
+        assert judge(track(place=np.tile([x, y, 0.087], (151, 1)))).value == outcome, (x, y)
+    lying = np.tile([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0], (151, 1))
+    assert judge(track(place=np.tile([5e-3, 0.0, 0.09], (151, 1)), turn=lying)) is Outcome.DROPPED
+
+
+def test_what_is_poured_is_judged_by_where_it_lies() -> None:
+    """Four balls on the tray's floor, one of them still in the upright cup, one beside the tray."""
+    pour = task("pour")
+    cup, *balls, _ = pour.things(np.random.default_rng(0))
+    place = np.tile(cup.place, (151, 1))
+    lying = np.array([[x, y, 0.1385] for x in (-0.04, -0.02) for y in (-0.01, 0.01)])
+    for first, outcome in ((lying[0], "success"), (balls[0].place, "not reached"), ([0.0, 0.06, 0.1385], "dropped")):
+        there = np.tile(np.vstack([first, lying[1:]]), (151, 1, 1))
+        assert pour.judge(track(place=place, others=there)).value == outcome
+
+
+def test_a_person_leaves_fingers_alone_that_are_given_no_force() -> None:
+    trial = Trial(task("insert"), body_of(HAND, {}), HAND.gravity, np.random.default_rng(3))
+    person = Person.draw(np.random.default_rng(4), 3, trial.task.strength)
+    for _ in range(5):
+        trial.push(person)
+    pushed = [np.abs(limb.force).max() > 0.0 for limb in trial.scene.moving.limbs]
+    assert pushed == [True, False, False]
 
 
 def test_a_wrong_name_lists_the_tasks() -> None:

@@ -3,26 +3,32 @@
     python -m tools.task_table --data DIR --out results/ [--seeds 1] [--trials 20] [--jobs 1] [--only hold-] [--table-only]
 
 DIR holds what `twin demonstrate TASK --n 50 --seed 1 --out DIR/TASK` made, of each task that is to be scored. Trials are those of
-seed 2000. A cell is a task, a way, a case and a training seed; one file each: an interrupted run goes on.
+seed 2000. A cell is a task, a way, a case and a training seed; one file each, with what became of its trials and what it was made
+with: an interrupted run goes on.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from twin.learn import lerobot
 from twin.learn.demonstrate import read, write_json
 from twin.learn.imitate import DRIFT, Actor, learn
-from twin.learn.teach import Lesson
+from twin.learn.teach import Lesson, digest
+from twin.learn.ways import way
+from twin.report import stamp
 from twin.robots import load
 from twin.tasks import Outcome, task, tasks
 
+FORMAT = "twin-task-cell/1"
 TRIALS_OF, OTHER = 2000, 2  # seeds
 CASES = {"shown": "the hand shown", "other": "another built hand", "drifting": "drifting", "undone": "drifting, undone"}
 WAYS = ("shape", "strain")
@@ -38,11 +44,11 @@ class Cell:
     policy: str
     way: str
     case: str
-    seed: int
+    train_seed: int
 
     @property
     def file(self) -> str:
-        return f"{self.task}-{self.policy}-{self.way}-{self.case}-{self.seed}.json"
+        return f"{self.task}-{self.policy}-{self.way}-{self.case}-{self.train_seed}.json"
 
 
 def plan(data: Path, seeds: int) -> list[Cell]:
@@ -60,10 +66,14 @@ def plan(data: Path, seeds: int) -> list[Cell]:
 def score(cell: Cell, data: Path, trials: int, jobs: int) -> dict[str, Any]:
     folder = data / cell.task
     hand = OTHER if cell.case == "other" else read(folder)["seed"]
-    policy = learn(Lesson(cell.policy, cell.way, cell.seed), folder, print)
+    policy = learn(Lesson(cell.policy, cell.way, cell.train_seed), folder, print)
     drift = DRIFT if cell.case in ("drifting", "undone") else 0.0
     actor = Actor(task(cell.task), load("hand"), hand, cell.way, policy, drift, cell.case == "undone")
-    return {"trials": trials, "outcomes": dict(actor.score(trials, TRIALS_OF, jobs))}
+    outcomes = dict(actor.score(trials, TRIALS_OF, jobs))
+    law = way(cell.way)
+    data_hash = digest([law.shown(episode) for episode in lerobot.read_episodes(folder, law.columns)])
+    made_with = stamp(" ".join(["python -m tools.task_table", *sys.argv[1:]]), TRIALS_OF, data_hash, ("torch", "diffusers"))
+    return {"format": FORMAT, **asdict(cell), "hand": hand, "trials": trials, "outcomes": outcomes, "provenance": made_with}
 
 
 def table(results: dict[Cell, Counter[str]]) -> str:

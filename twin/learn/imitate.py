@@ -11,7 +11,7 @@ Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078) learns a diffusion policy.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,7 +111,12 @@ class Actor:
     checked: bool = False
 
     def act(self, rng: np.random.Generator, share: float = 0.0) -> Trial:
-        """A trial to its end, at this share of the day. Where the twin knows no equilibrium, tendons stay where they are."""
+        """A trial to its end, at this share of the day."""
+        *_, trial = self.steps(rng, share)
+        return trial
+
+    def steps(self, rng: np.random.Generator, share: float = 0.0) -> Iterator[Trial]:
+        """A trial, step by step. Where the twin knows no equilibrium, tendons stay where they are."""
         values = built(self.robot, self.hand)
         with threadpool_limits(limits=1):
             hand, known = body_of(self.robot, values), aligned(self.robot, values, self.hand)
@@ -131,7 +136,7 @@ class Actor:
                 trial.pull(shortening)
                 felt = read_bench(trial.seen.resistance, RESISTANCE, rng) * gain
                 k += 1
-        return trial
+                yield trial
 
     def score(
         self, trials: int, seed: int, jobs: int, progress: Callable[[str], None] = lambda words: None

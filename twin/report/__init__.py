@@ -14,8 +14,8 @@ plots.py        the house style of the figures
 
 from twin.report.console import beforehand, console
 from twin.report.contents import contents
-from twin.report.provenance import provenance
+from twin.report.provenance import provenance, stamp
 from twin.report.sentence import sentence
 from twin.report.write import write
 
-__all__ = ["beforehand", "console", "contents", "provenance", "sentence", "write"]
+__all__ = ["beforehand", "console", "contents", "provenance", "sentence", "stamp", "write"]

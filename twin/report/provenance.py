@@ -15,14 +15,20 @@ PACKAGES = ("mujoco", "numpy", "scipy", "numba")
 
 
 def provenance(recording: Recording, settings: Settings, command: str) -> dict[str, Any]:
-    """Everything needed to repeat a diagnosis, as TOML and JSON can hold it; the date is UTC, ISO 8601."""
+    """Everything needed to repeat a diagnosis, as TOML and JSON can hold it."""
+    asked = {name: value for name, value in asdict(settings).items() if value is not None}
+    return {**stamp(command, settings.seed, recording.data_hash()), "settings": asked}
+
+
+def stamp(command: str, seed: int, data_hash: str, packages: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What any result comes from, with the versions of `packages` besides; the date is UTC, ISO 8601."""
+    versions = {p: _version(p) for p in (*PACKAGES, *packages)}
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
-        "seed": settings.seed,
-        "data_hash": recording.data_hash(),
-        "settings": {name: value for name, value in asdict(settings).items() if value is not None},
-        "versions": {"twin": _version("tendon-twin"), "python": platform.python_version(), **{p: _version(p) for p in PACKAGES}},
+        "seed": seed,
+        "data_hash": data_hash,
+        "versions": {"twin": _version("tendon-twin"), "python": platform.python_version(), **versions},
     }
 
 

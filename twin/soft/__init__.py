@@ -7,6 +7,7 @@ body.py      the finger as effects may edit it                  statics.py  a tr
 room.py      a body's arrays as the compiled solve takes them   solid.py    one equilibrium at a time
 flex.py      a body as MuJoCo moves and collides it             stepping.py between MuJoCo's steps
 dynamics.py  a trial in motion                                  hand.py     several fingers on one palm
+things.py    rigid things                                       scene.py    a hand among them
 """
 
 from twin.soft.body import SoftBody, skin_points, straight

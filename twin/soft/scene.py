@@ -15,58 +15,22 @@ from numpy.typing import ArrayLike
 from twin.body import Problem
 from twin.effects import Drive, Loads, Route
 from twin.errors import DataError, SolveError
-from twin.soft.flex import FINGER, THING
 from twin.soft.hand import HandBody, moving, stand
 from twin.soft.stepping import once
+from twin.soft.things import Part, Places, Thing, Turn, Vector
+
+__all__ = ["Part", "Scene", "Sight", "Thing", "Turn", "Vector"]
 
 # MuJoCo's impratio, with an elliptic cone: a ball of 15 g held by three fingers sinks by 0.2 mm/s, with its usual 1 by 4.
 STICKS = 20.0
 LONGEST = 2.5e-3  # s: half of it moves fingers that hold a ball by 0.01 mm, the ball by 0.04
-SETTLES = 4e-3  # s: MuJoCo's time constant of a contact; skin then sinks in by tenths of a millimetre
-SHAPES = {
-    "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
-    "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, 2),
-    "box": (mujoco.mjtGeom.mjGEOM_BOX, 3),
-}
-
-
-@dataclass(frozen=True)
-class Thing:
-    """A rigid body: `shape` is sphere (size: radius), cylinder (radius, half length) or box (three half lengths), m; `mass` kg, its
-    place (3,) m and how it is turned, (4,) w x y z, in the palm's frame; its coefficient of friction. One that is `fixed` stays."""
-
-    name: str
-    shape: str
-    size: tuple[float, ...]
-    mass: float
-    place: tuple[float, float, float]
-    turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    friction: float = 1.0
-    fixed: bool = False
-
-    def __post_init__(self) -> None:
-        if self.shape not in SHAPES:
-            raise DataError(f"thing {self.name!r}: no shape {self.shape!r}; allowed: {', '.join(SHAPES)}")
-        needed = SHAPES[self.shape][1]
-        if len(self.size) != needed or not min(self.size) > 0.0 or not self.mass > 0.0:
-            raise DataError(f"thing {self.name!r}: {needed} sizes and a mass above zero are needed of a {self.shape}")
-
-    def add(self, spec: mujoco.MjSpec) -> None:
-        body = spec.worldbody.add_body(name=self.name, pos=self.place, quat=self.turn)
-        if not self.fixed:
-            body.add_freejoint(name=self.name)
-        size = [*self.size, 0.0, 0.0][:3]
-        body.add_geom(
-            name=self.name, type=SHAPES[self.shape][0], size=size, mass=self.mass, friction=[self.friction, 5e-3, 1e-4],
-            contype=THING, conaffinity=THING | FINGER, priority=1, solref=[SETTLES, 1.0], rgba=[0.2, 0.45, 0.7, 1.0],
-        )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Sight:
     """An instant: time (s); shortenings of the tendons (finger, tendon) m; tensions (finger, tendon) N; nodes' displacements
     (finger, n_free, 3) m in each finger's own frame; strain (finger, sensor) and resistance of the cords, ohm; of each thing that
-    is free its place (thing, 3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the
+    moves its place (thing, 3) m, turn (thing, 4), velocity and angular velocity (thing, 6) m/s, rad/s; how many points of the
     hand touch something."""
 
     time: float
@@ -110,9 +74,7 @@ class Scene:
         self.spec, self.moving = spec, moving(started, spec)
         self.model, self.data = self.moving.model, self.moving.data
         self.model.opt.cone, self.model.opt.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, STICKS
-        joints = [self.model.joint(t.name) for t in things if not t.fixed]
-        self._at = np.array([j.qposadr[0] + np.arange(7) for j in joints], int).reshape(-1, 7)
-        self._speed = np.array([j.dofadr[0] + np.arange(6) for j in joints], int).reshape(-1, 6)
+        self._places = Places(self.model, things)
         self._pulled = np.zeros((len(started), tendons))
         self._kept = [self.data.qpos.copy(), self.model.body_pos.copy(), *(a.copy() for a in self._memory())]
 
@@ -146,9 +108,9 @@ class Scene:
         steps = max(1, round(seconds / self.moving.step))
         self.moving.run(self._pulled, told, steps)
         self._pulled = told.copy()
-        lost = ~np.isfinite(self.data.qpos[self._at]).all(axis=1)
+        lost = ~np.isfinite(self._places.see(self.data)[0]).all(axis=1)
         if lost.any():
-            name = [t.name for t in self.things if not t.fixed][int(np.argmax(lost))]
+            name = self._places.things[int(np.argmax(lost))].name
             raise SolveError(
                 f"thing {name!r} is lost at t = {self.data.time:.4g} s; slower servos, or a heavier thing, may keep it"
             )
@@ -171,7 +133,7 @@ class Scene:
         return Sight(
             float(data.time), self._pulled.copy(), np.stack([limb.tension for limb in hand.limbs]), nodes,
             np.concatenate([f["strain"] for f in felt]), np.concatenate([f["sensor"] for f in felt]),
-            data.qpos[self._at[:, :3]], data.qpos[self._at[:, 3:]], data.qvel[self._speed], self._touching(),
+            *self._places.see(data), self._touching(),
         )  # fmt: skip
 
     def _memory(self) -> list[np.ndarray]:

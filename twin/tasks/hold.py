@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from twin.soft.scene import Thing
-from twin.tasks.task import Outcome, Task, Track, lifted, table
+from twin.tasks.task import Outcome, Task, Track, about_z, lifted, table
 
 
 class Hold(Task):
@@ -26,7 +26,7 @@ class Hold(Task):
         half, (x, y) = size[-1], rng.uniform(-3e-3, 3e-3, 2)
         thing = Thing(
             "object", shape, size, rng.uniform(0.012, 0.02), (x, y, 0.088),
-            (float(np.cos(turn / 2)), 0.0, 0.0, float(np.sin(turn / 2))), rng.uniform(0.8, 1.2),
+            about_z(turn), rng.uniform(0.8, 1.2),
         )  # fmt: skip
         return thing, table(0.088 + half)
 

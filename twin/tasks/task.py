@@ -17,9 +17,10 @@ from functools import cache
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from twin.errors import UnknownNameError
-from twin.soft.scene import Sight, Thing
+from twin.soft.scene import Part, Sight, Thing, Turn, Vector
 
 STEP = 0.02  # s from look to look
 TABLE = "table"
@@ -41,12 +42,14 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Track:
-    """The object over time (n,) s: place (n, 3) m, turn (n, 4) w x y z, and how many points of the hand touch something (n,)."""
+    """The object over time (n,) s: place (n, 3) m, turn (n, 4) w x y z, how many points of the hand touch something (n,), and where
+    its other things are that move, (n, thing, 3) m."""
 
     time: np.ndarray
     place: np.ndarray
     turn: np.ndarray
     touching: np.ndarray
+    others: np.ndarray
 
     @property
     def reached(self) -> bool:
@@ -62,6 +65,10 @@ class Track:
         w, z = self.turn[:, 0], self.turn[:, 3]
         angle = np.unwrap(2.0 * np.arctan2(z, w))
         return angle - angle[0]
+
+    def upright(self) -> np.ndarray:
+        """(n,) the cosine of its tilt against the palm's axis."""
+        return 1.0 - 2.0 * (self.turn[:, 1] ** 2 + self.turn[:, 2] ** 2)
 
 
 @dataclass(frozen=True)
@@ -80,19 +87,18 @@ class Person:
     phase: np.ndarray
 
     @staticmethod
-    def draw(rng: np.random.Generator, fingers: int, force: float) -> Person:
-        """One of many, who pushes with some `force` (N)."""
+    def draw(rng: np.random.Generator, fingers: int, force: ArrayLike) -> Person:
+        """One of many, who pushes with some `force` (N), of all fingers or (f,)."""
         return Person(
             rng.uniform(0.075, 0.088, fingers), np.pi + rng.normal(0.0, 0.12, fingers), rng.uniform(8e-3, 14e-3, fingers),
-            force * rng.uniform(0.85, 1.15) * rng.uniform(0.95, 1.05, fingers), rng.uniform(0.8, 1.2), rng.uniform(0.01, 0.04),
-            rng.uniform(0.7, 3.0, 2), rng.uniform(0.0, 2.0 * np.pi, (fingers, 2)),
+            np.asarray(force) * rng.uniform(0.85, 1.15) * rng.uniform(0.95, 1.05, fingers), rng.uniform(0.8, 1.2),
+            rng.uniform(0.01, 0.04), rng.uniform(0.7, 3.0, 2), rng.uniform(0.0, 2.0 * np.pi, (fingers, 2)),
         )  # fmt: skip
 
     def squeeze(self, t: float) -> np.ndarray:
         """(f,) N inwards at time t (s)."""
-        x = min(1.0, t / self.closes)
         trembles = np.sin(2.0 * np.pi * self.rate * t + self.phase).sum(axis=1)
-        return self.force * x * x * (3.0 - 2.0 * x) * (1.0 + self.tremor * trembles)
+        return self.force * eased(t / self.closes) * (1.0 + self.tremor * trembles)
 
 
 class Task(ABC):
@@ -102,7 +108,7 @@ class Task(ABC):
     success: ClassVar[str]
     seconds: ClassVar[float]
     leaves: ClassVar[float | None] = None  # s: from when on the table sinks away, at SINKS
-    strength: ClassVar[float] = 0.9  # N, of a person's push on each finger
+    strength: ClassVar[float | tuple[float, ...]] = 0.9  # N, of a person's push on each finger; no force leaves a finger alone
 
     @classmethod
     def name(cls) -> str:
@@ -129,20 +135,36 @@ class Task(ABC):
         """What became of it."""
 
 
-def table(top: float) -> Thing:
-    """Its upper side `top` (m) below the palm."""
-    return Thing(TABLE, "box", (0.1, 0.1, HALF), 1.0, (0.0, 0.0, top + HALF), fixed=True)
+def eased(share: float) -> float:
+    """From 0 to 1 as `share` goes from 0 to 1, without a jerk at either end."""
+    x = min(1.0, max(0.0, share))
+    return x * x * (3.0 - 2.0 * x)
 
 
-def lifted(track: Track) -> Outcome:
-    """Of an object whose table has gone: it is where it was."""
+def table(top: float, *blocks: Part, friction: float = 1.0) -> Thing:
+    """Its upper side `top` (m) below the palm, and what stands on it."""
+    return Thing(TABLE, "box", (0.1, 0.1, HALF), 1.0, (0.0, 0.0, top + HALF), friction=friction, fixed=True, parts=blocks)
+
+
+def block(size: Vector, x: float, y: float, above: float = 0.0, yaw: float = 0.0, friction: float = 1.0) -> Part:
+    """A box of half lengths `size` (m) that stands on the table at x, y (m), or `above` it, turned by `yaw` (rad)."""
+    return Part("box", size, (x, y, -HALF - above - size[2]), about_z(yaw), friction=friction)
+
+
+def about_z(angle: float) -> Turn:
+    """w x y z."""
+    return float(np.cos(angle / 2)), 0.0, 0.0, float(np.sin(angle / 2))
+
+
+def lifted(track: Track, within: float = SUNK) -> Outcome:
+    """Of an object whose table has gone: it is where it was, to within some height (m)."""
     sunk = track.place[:, 2] - track.place[0, 2]
     if not track.reached:
         return Outcome.NOT_REACHED
     if sunk[-1] > FALLEN:
         return Outcome.DROPPED
     way = np.linalg.norm(np.ptp(track.place[track.last], axis=0))
-    return Outcome.SLIPPED if abs(sunk[-1]) > SUNK or way > SLIDES else Outcome.SUCCESS
+    return Outcome.SLIPPED if abs(sunk[-1]) > within or way > SLIDES else Outcome.SUCCESS
 
 
 @cache

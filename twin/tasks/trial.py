@@ -45,7 +45,7 @@ class Trial:
         """STEP s on under a person's hand, all tendons paid out."""
         inwards = person.squeeze(self.seen.time)
         self._aside = self.task.sideways(self._aside, self.seen, self.start)
-        force = np.column_stack([inwards, np.full(len(inwards), self._aside), np.zeros(len(inwards))])
+        force = np.column_stack([inwards, self._aside * (person.force > 0.0), np.zeros(len(inwards))])
         self.scene.press(np.stack([
             skin.force(Pushes(person.height[k : k + 1], person.azimuth[k : k + 1], person.width[k : k + 1], force[k : k + 1]))
             for k, skin in enumerate(self._skins)
@@ -56,7 +56,7 @@ class Trial:
         looks: list[Sight] = self._looks
         return Track(
             np.array([s.time for s in looks]), np.stack([s.place[0] for s in looks]), np.stack([s.turn[0] for s in looks]),
-            np.array([s.touching for s in looks]),
+            np.array([s.touching for s in looks]), np.stack([s.place[1:] for s in looks]),
         )  # fmt: skip
 
     def outcome(self) -> Outcome:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from twin.soft.scene import Thing
-from twin.tasks.task import Outcome, Task, Track, table
+from twin.tasks.task import Outcome, Task, Track, eased, table
 
 WANTED, WITHIN = np.radians(30.0), np.radians(10.0)
 BEGINS, TAKES = 1.3, 1.0  # s
@@ -29,13 +29,11 @@ class Turn(Task):
         return thing, table(0.110)
 
     def turns(self, t: float) -> float:
-        x = float(np.clip((t - BEGINS) / TAKES, 0.0, 1.0))
-        return WANTED * x * x * (3.0 - 2.0 * x)
+        return WANTED * eased((t - BEGINS) / TAKES)
 
     def judge(self, track: Track) -> Outcome:
-        yaw, last = track.yaw(), track.last
+        yaw, last, upright = track.yaw(), track.last, track.upright()
         away = np.linalg.norm(track.place - track.place[0], axis=1)
-        upright = 1.0 - 2.0 * (track.turn[:, 1] ** 2 + track.turn[:, 2] ** 2)
         if not track.reached:
             return Outcome.NOT_REACHED
         if away[-1] > 2.0 * AWAY or upright[-1] < np.cos(2.0 * TILTED):
