@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from twin.compiled import compiling
 from twin.equilibrium import elastic, hyperelastic, linear
 
 
@@ -90,3 +92,24 @@ def test_a_set_is_bent_by_the_rotation_vector_of_its_hinges(size: float, hand: f
         shifted = np.concatenate([[9.0], q])
         plain(elastic.bending)(shifted, 1, hand, found, D)
         np.testing.assert_allclose(found, phi(q), atol=1e-9)
+
+
+def test_it_is_told_while_anything_compiles_and_not_when_it_is_there() -> None:
+    @numba.njit
+    def inside(x: float) -> float:
+        return 2.0 * x
+
+    @numba.njit
+    def outside(x: float) -> float:
+        return inside(x) + 1.0
+
+    told: list[bool] = []
+    with compiling(told.append):
+        assert outside(1.0) == 3.0
+        assert told[:2] == [True, True], "the inner one compiles within the outer"
+        assert told[-2:] == [True, False], "it is over when the outer one is"
+        told.clear()
+        outside(2.0)
+    assert not told
+    outside(2)  # an integer: compiled anew
+    assert not told
