@@ -13,7 +13,7 @@ from rich.text import Text
 
 out = Console()
 err = Console(stderr=True)
-COMPILING = "compiling inner loops, once on this machine (a minute at most)"
+COMPILING = "compiling inner loops, once on this machine (half a minute or more)"
 
 
 def cores() -> int:

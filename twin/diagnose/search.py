@@ -35,7 +35,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
         fresh: Known = {}
         for member in ahead:
             lacks = patterns.beside(member.effects)
-            # Patterns depend little on what is already fitted (gains differ by 1 %): the leading set's alone are taken anew, of
+            # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
             # effects that promise anything by the base's; the others' are the base's.
             if member is beam[0] and member is not base:
                 promise = rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))

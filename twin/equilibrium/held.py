@@ -17,8 +17,9 @@ FINE = 1e-7  # rad, where tensions are sought: a rough shape has no sharp ones
 
 @part
 def sought(now, tol):
-    """The shape whose tendons have the lengths and temperatures wanted; remembered. Returns its status."""
+    """A step of the start: the shape whose tendons have the lengths and temperatures wanted; remembered. Returns its status."""
     state, held = now.state, now.held
+    assign(now.last, state.q)
     status = reach(now.at, state, now.factors, held, now.last, now.sought, min(tol, FINE))
     remember(held, state.s, state.T)
     return status
@@ -30,7 +31,6 @@ def weigh_on_springs(now, driving, tol):
     started = 1
     for k in range(1, RAMP + 1):
         soften(now, driving, 0, k / RAMP)
-        assign(now.last, now.state.q)
         if sought(now, tol) == 0:
             started = 0
     return started
@@ -61,7 +61,6 @@ def first_pull(now, driving, tol, started):
     """The first displacements and tensions, in equal steps. Returns the status of the start."""
     for k in range(RAMP + 1):
         command(now, driving, 0, k / RAMP)
-        assign(now.last, now.state.q)
         if sought(now, tol) == 0:
             started = 0
     return started
