@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.test_equilibrium import SIDEWAYS, swept
 from twin.body import Problem
-from twin.effects import Loads, Route, catalogue
+from twin.effects import Drive, Loads, Route, catalogue
+from twin.effects.contact import obstacle
 from twin.equilibrium import Equilibrium
 from twin.equilibrium.chain import State, balance
 from twin.equilibrium.elastic import BEAM_COLUMN, COUPLING
@@ -67,8 +68,14 @@ class Energy:
         d = self.at(q)
         tip = d.site(self.body.tip).xpos
         height = self.model.body_mass @ (d.xipos @ loads.gravity) + loads.payload * tip @ loads.gravity + loads.force @ tip
-        behind = [max(0.0, loads.wall[3] - d.site(n).xpos @ loads.wall[:3]) for n in self.body.disks] if loads.wall[4] else [0.0]
-        return float(0.5 * loads.wall[4] * np.square(behind).sum() - height)
+        normal, across, curvature = loads.wall[:3], loads.wall[5:8], loads.wall[9]
+        disks = np.array([d.site(n).xpos for n in self.body.disks])
+        if curvature:  # how far from the post's axis, a radius behind its surface
+            centre = (loads.wall[3] - 1.0 / curvature) * normal + loads.wall[8] * across
+            behind = 1.0 / curvature - np.linalg.norm(np.cross(disks - centre, np.cross(normal, across)), axis=1)
+        else:
+            behind = loads.wall[3] - disks @ normal
+        return float(0.5 * loads.wall[4] * np.square(np.maximum(behind, 0.0)).sum() - height)
 
     def __call__(self, q: np.ndarray, rest: np.ndarray, tension: np.ndarray, loads: Loads) -> float:
         return self.elastic(q, rest, tension.sum()) + float(tension @ self.segments(q).sum(axis=1)) + self.loads(q, loads)
@@ -79,7 +86,8 @@ def slope(f: Callable[[np.ndarray], np.ndarray | float], q: np.ndarray, step: fl
     return np.stack([(np.asarray(f(q + e)) - np.asarray(f(q - e))) / (2 * step) for e in step * np.eye(q.size)])
 
 
-WALL = np.array([-1.0, 0.0, 0.0, -0.02, 300.0])
+WALL = obstacle((-1.0, 0.0, 0.0), -0.02, 300.0)
+POST = obstacle((-0.8, -0.6, 0.0), -0.02, 300.0, place=0.07, curvature=40.0)  # across the robot, of 25 mm radius
 
 
 def edited(**effects: dict[str, float]) -> HingeChain:
@@ -89,12 +97,13 @@ def edited(**effects: dict[str, float]) -> HingeChain:
     return body
 
 
+@pytest.mark.parametrize("wall", [WALL, POST], ids=["wall", "post"])
 @pytest.mark.parametrize("turned", [False, True], ids=["plain", "turned hinges"])
-def test_the_residual_is_the_slope_of_the_energy(turned: bool) -> None:
+def test_the_residual_is_the_slope_of_the_energy(turned: bool, wall: np.ndarray) -> None:
     body = edited(stiffness_asymmetry={"along": 0.2, "across": -0.3}) if turned else edited()
     energy, equilibrium = Energy(body), Equilibrium(body)
     rng = np.random.default_rng(1)
-    loads = Loads(np.array([3.0, -5.0, 7.0]), 0.02, np.array([0.02, 0.01, -0.03]), WALL)
+    loads = Loads(np.array([3.0, -5.0, 7.0]), 0.02, np.array([0.02, 0.01, -0.03]), wall)
     for size in (0.02, 0.15, 0.4):  # rad: in the series, at 4 N, and beyond anything a tendon can do
         q, rest, T = rng.normal(0, size, 48), rng.normal(0, 0.02, 48), rng.uniform(0, 4, 3)
         r = residual(equilibrium, q, rest, T, loads, Route())[0]
@@ -114,11 +123,11 @@ def residual(e: Equilibrium, q, rest, T, loads: Loads, route: Route, z0=None, s0
     return r, J, z, s
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.3])
-def test_the_tangent_is_the_slope_of_the_residual(mu: float) -> None:
+@pytest.mark.parametrize(("mu", "wall"), [(0.0, WALL), (0.3, WALL), (0.3, POST)], ids=["wall", "rubbing", "post"])
+def test_the_tangent_is_the_slope_of_the_residual(mu: float, wall: np.ndarray) -> None:
     e = Equilibrium(edited(stiffness_asymmetry={"along": 0.2, "across": -0.3}))
     rng = np.random.default_rng(2)
-    loads = Loads(np.array([3.0, -5.0, 7.0]), 0.02, np.array([0.02, 0.01, -0.03]), WALL)
+    loads = Loads(np.array([3.0, -5.0, 7.0]), 0.02, np.array([0.02, 0.01, -0.03]), wall)
     for size in (0.03, 0.15):
         q, rest, T = rng.normal(0, size, 48), rng.normal(0, 0.02, 48), rng.uniform(0, 4, 3)
         s0 = residual(e, q, rest, T, loads, Route())[3]
@@ -145,6 +154,23 @@ def test_what_a_solution_keeps_is_its_tangents_factors(mu: float) -> None:
         J = residual(e, path.q[i], np.zeros(48), T[i], loads, route, there.slip, there.distal, tangent=True)[1]
         LU = (np.tril(path.LU[i], -1) + np.eye(48)) @ np.triu(path.LU[i])
         np.testing.assert_allclose(LU, J, rtol=0, atol=1e-6)  # N m/rad of up to 0.3: as the tangent against its differences
+
+
+@pytest.mark.parametrize("drive", [Drive.TENSION, Drive.DISPLACEMENT], ids=["tension", "length"])
+def test_a_post_is_met_and_not_jumped(drive: Drive) -> None:
+    """A tip that a post stops stays before it also where a row of the log moves it further than the post is thick."""
+    e = Equilibrium(edited())
+    post = Loads(np.zeros(3), wall=obstacle((-1.0, 0.0, 0.0), -0.03, 3e3, place=0.11, curvature=100.0))
+    full = np.array([3.0, 0.0, 0.0]) if drive is Drive.TENSION else np.array([8e-3, -8e-3, -8e-3])  # m: two slack
+    share = {n: np.linspace(0.0, 1.0, n)[:, None] for n in (3, 61)}
+    coarse, fine = (
+        e.solve(Problem(np.arange(float(n)), s * full + (1 - s) * np.minimum(full, 0.0), post, drives=(drive,) * 3))
+        for n, s in share.items()
+    )
+    free = e.solve(Problem(np.arange(61.0), share[61] * full, Loads(np.zeros(3)), drives=(drive,) * 3))
+    assert free.markers[-1, -1, 0] > 0.05  # m: past the whole post
+    assert fine.markers[-1, -1, 0] < 0.04
+    np.testing.assert_allclose(coarse.markers[-1], fine.markers[-1], rtol=0, atol=1e-6)  # m: no memory; both solved to 1e-7 rad
 
 
 def test_a_solution_is_a_minimum_of_the_energy() -> None:

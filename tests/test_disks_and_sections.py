@@ -32,6 +32,7 @@ from tools.bench.rod import solve as rod_solve
 from twin.body import Problem
 from twin.dynamics import Dynamics
 from twin.effects import Loads, Route, catalogue
+from twin.effects.contact import obstacle
 from twin.equilibrium import Equilibrium
 from twin.equilibrium.chain import State, balance
 from twin.equilibrium.newton import place
@@ -211,7 +212,7 @@ def test_the_tangent_is_the_slope_of_the_residual(mu: float, tmp_path: Path) -> 
     e = Equilibrium(everything(tmp_path).build())
     nv, shape = e.model.nv, (3, e.chain.hole.shape[1] - 1)
     rng = np.random.default_rng(2)
-    wall = np.array([-1.0, 0.0, 0.0, -0.02, 300.0])
+    wall = obstacle((-1.0, 0.0, 0.0), -0.02, 300.0)
     loads = Loads(np.array([3.0, -5.0, 7.0]), 0.02, np.array([0.02, 0.01, -0.03]), wall)
     q, rest, T = rng.normal(0, 0.1, nv), rng.normal(0, 0.02, nv), rng.uniform(0.5, 4, 3)
     under = e.statics(Problem(np.zeros(1), T[None], loads, Route(mu, 4e-4)))._replace(rest=rest)

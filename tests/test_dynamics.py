@@ -17,7 +17,9 @@ from twin.bench import prepare
 from twin.body import Path, Problem
 from twin.dynamics import Dynamics
 from twin.effects import Loads, Push, Route, catalogue
+from twin.effects.contact import obstacle
 from twin.equilibrium import Equilibrium
+from twin.errors import SolveError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
 from twin.twin import Twin, is_dynamic
@@ -90,7 +92,7 @@ def test_with_friction_it_settles_to_the_static_shape_of_a_slow_pull(loads: Load
     assert np.all(slow / slower > 3.0)
 
 
-OBSTACLE = (-1.0, 0.0, 0.0, -0.03)  # a wall across the x axis, 30 mm away
+OBSTACLE = ((-1.0, 0.0, 0.0), -0.03)  # a wall across the x axis, 30 mm away
 STIFFEST = next(p.high for p in catalogue()["contact"].parameters if p.name == "stiffness")
 
 
@@ -100,13 +102,19 @@ STIFFEST = next(p.high for p in catalogue()["contact"].parameters if p.name == "
     ids=["foam", "soft robot", "struck steel"],
 )
 def test_it_settles_against_a_wall(stiffness: float, ramp: float, softness: float) -> None:
-    loads = Loads(HANGING, 0.01, np.array([0.0, 0.03, 0.0]), np.array([*OBSTACLE, stiffness]))
+    loads = Loads(HANGING, 0.01, np.array([0.0, 0.03, 0.0]), obstacle(*OBSTACLE, stiffness))
     t, T, _ = ramps([(0, 0, 0), (2.0, 0.5, 0)], ramp, hold=3.0)
     soft = np.full(t.size, softness)
     dynamic = robot(damping=0.03).solve(Problem(t, T, loads, Route(), stiffness=soft))
     static, free = (statics().solve(Problem(t, T, x, stiffness=soft)) for x in (loads, Loads(HANGING, 0.01)))
     assert np.linalg.norm(tips(static)[-1] - tips(free)[-1]) > 5e-3  # m: wall and force are felt
     np.testing.assert_allclose(dynamic.markers[-1], static.markers[-1], rtol=0, atol=1e-6)  # m: no memory, as above
+
+
+def test_a_round_post_is_refused() -> None:
+    post = Loads(HANGING, wall=obstacle(*OBSTACLE, 200.0, place=0.07, curvature=50.0))
+    with pytest.raises(SolveError, match="post is not stepped here; use static equilibria"):
+        robot().solve(Problem(np.arange(3.0), np.zeros((3, 3)), post))
 
 
 def test_it_starts_at_rest_in_equilibrium() -> None:

@@ -12,12 +12,15 @@ from hypothesis import strategies as st
 from tools.bench.finger.equilibria import Finger, equilibrium
 from twin.body import DIRECT, NOT_FOUND, Problem
 from twin.effects import Drive, Loads, Push, Route, Signals, named
+from twin.effects.contact import obstacle
 from twin.robots import load
 from twin.sensors import Cords, resistance, strain
 from twin.soft import SoftBody, SoftPath, SoftStatics
 from twin.soft.room import parts_of
 from twin.soft.silicone import Tangent, forces, stiffness
 from twin.soft.statics import turned
+from twin.soft.wall import Skin as Pressed
+from twin.soft.wall import press
 
 HANGING = np.array([0.0, 0.0, 9.81])
 TENSION, HELD = (Drive.TENSION,) * 4, (Drive.DISPLACEMENT,) * 4
@@ -206,7 +209,7 @@ def test_a_neighbour_s_answers_lead_to_the_same_shapes() -> None:
 
 
 def test_a_wall_holds_the_skin_back() -> None:
-    loads = Loads(HANGING, wall=np.array([-1.0, 0.0, 0.0, -0.02, 2e3]))
+    loads = Loads(HANGING, wall=obstacle((-1.0, 0.0, 0.0), -0.02, 2e3))
     free, held = (
         solve(body(), pulled(0, 1e-3 * np.arange(1.0, 9.0))),
         solve(body(), pulled(0, 1e-3 * np.arange(1.0, 9.0)), loads=loads),
@@ -215,6 +218,32 @@ def test_a_wall_holds_the_skin_back() -> None:
     np.testing.assert_allclose(free.markers[skin < 0.015], held.markers[skin < 0.015], atol=1e-6)
     assert tip(held)[-1, 0] + 0.008 < 0.0225  # of 2 kN/m a ring, pressed with some newtons
     assert tip(free)[-1, 0] + 0.008 > 0.03
+
+
+def test_a_post_presses_the_skin_down_its_energys_slope() -> None:
+    """k share depth^2 / 2 a point, by its distance from the post's axis: the force is its slope, the tangent the force's."""
+    rng = np.random.default_rng(3)
+    skin = Pressed(rng.normal((0.02, 0.0, 0.05), 4e-3, (5, 3)), rng.uniform(0.2, 1.0, (5, 2)), rng.uniform(0.5, 1.0, 5))
+    wall = obstacle((-1.0, 0.0, 0.0), -0.015, 2e3, place=0.048, curvature=60.0)
+    centre = np.array([0.015 + 1 / 60, 0.0, 0.048])
+
+    def energy(u: np.ndarray) -> float:
+        away = skin.rest + skin.weights @ u.reshape(2, 3) - centre
+        depth = np.maximum(1 / 60 - np.hypot(away[:, 0], away[:, 2]), 0.0)
+        return float(0.5 * wall[4] * skin.share @ depth**2) / 3.0
+
+    def force(u: np.ndarray) -> np.ndarray:
+        r = np.zeros(6)
+        press(skin, u.reshape(2, 3), wall, 3.0, r, np.empty((0, 0)), False)
+        return r
+
+    u, K, h = rng.normal(0.0, 1e-3, 6), np.zeros((6, 6)), 1e-6
+    press(skin, u.reshape(2, 3), wall, 3.0, np.zeros(6), K, True)
+    steps = h * np.eye(6)
+    assert np.abs(force(u)).max() > 0.5  # N: it is pressed
+    # Differences of 0.01 J at 1e-6 m are rounded by 1e-12 N; third derivatives k / R are 4e4 J/m^3, times 1e-12. No kink is near.
+    np.testing.assert_allclose(force(u), [(energy(u + e) - energy(u - e)) / (2 * h) for e in steps], atol=1e-7)
+    np.testing.assert_allclose(K, [(force(u + e) - force(u - e)) / (2 * h) for e in steps], atol=1e-3)
 
 
 def test_a_push_on_the_skin_and_a_force_at_the_tip_are_reciprocal() -> None:

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from tests.test_effects import some_signals
 from twin.bench import prepare
+from twin.compiled import jit
 from twin.effects import Drive, Effect, Loads, Signals, catalogue, named
+from twin.effects.contact import seen_from, touch
 from twin.errors import DataError
 from twin.laws import Laws
 from twin.measurements import Channel, Recording, Trial
@@ -318,6 +321,34 @@ def test_a_wall_stands_where_it_is_said() -> None:
     assert wall[4] == 100.0
 
 
+def test_a_post_stands_where_it_is_said() -> None:
+    """Round, of 20 mm, across the direction in which it stands: by the distance of a point from its axis, in any frame."""
+    post = (
+        law("contact", azimuth=0.5, distance=0.03, stiffness=100.0, curvature=50.0, height=0.07).surround(Loads(np.zeros(3))).wall
+    )
+    out, along = np.array([np.cos(0.5), np.sin(0.5), 0.0]), np.array([-np.sin(0.5), np.cos(0.5), 0.0])
+    rng = np.random.default_rng(0)
+    points = 0.05 * out + [0.0, 0.0, 0.07] + rng.normal(0.0, 0.02, (20, 3))
+    turn, place = Rotation.from_rotvec([0.3, -0.2, 0.9]).as_matrix(), np.array([0.01, -0.02, 0.03])
+    moved = seen_from(post, turn, place)
+    for x in points:
+        d = x - 0.05 * out - [0.0, 0.0, 0.07]
+        d -= d @ along * along
+        gap, normal, across, bend = _touched(post, x)
+        assert gap == pytest.approx(np.linalg.norm(d) - 0.02, abs=1e-15)
+        np.testing.assert_allclose(normal, d / np.linalg.norm(d), atol=1e-12)
+        assert np.dot(across, normal) == pytest.approx(np.dot(across, along), abs=1e-12)
+        assert bend == pytest.approx(1.0 / np.linalg.norm(d))
+        there = _touched(moved, (x - place) @ turn)
+        assert there[0] == pytest.approx(gap, abs=1e-15)
+        np.testing.assert_allclose(turn @ there[1], normal, atol=1e-12)
+
+
+@jit
+def _touched(wall, x):
+    return touch(wall, x)
+
+
 def test_strokes_are_sought_of_all_drives_that_come_so_far() -> None:
     """Only where lengths command every tendon; of drives that all reach as far, all; of one that stays behind, not it."""
     saturation, u = named("actuator_saturation"), 1e-2 * np.linspace(0.0, 1.0, 5)[:, None]
@@ -419,3 +450,10 @@ def test_springs_and_drives_are_sought_where_they_are() -> None:
         towards = np.array([np.cos(start.values["azimuth"]), np.sin(start.values["azimuth"])])
         beyond = ((reached @ towards).max(axis=1) > start.values["distance"]).mean()
         assert 0.0 < beyond < 0.5  # touched in some samples, not in most
+        assert not {"curvature", "height"} & set(start.free)
+        wall = law("contact", **start.values)
+        for post in wall.fuller_starts([still]):
+            assert {"distance", "curvature", "height"} == set(post)
+            nearest = np.abs(still.markers[..., 2] - post["height"]).min(axis=0).argmin()
+            touched = (reached[:, nearest] @ towards > post["distance"]).mean()
+            assert touched == pytest.approx(beyond, abs=1.5 / len(reached))  # as often as the wall, to a sample

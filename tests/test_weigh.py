@@ -42,10 +42,13 @@ def calibrated(*effects: str) -> Model:
     return model
 
 
+HERE = SimpleNamespace(traces={})
+
+
 def weighed(model: Model, score: float = 0.0) -> Any:
     """J names every parameter by its column."""
     J = np.tile(np.arange(float(len(model.free))), (2, 1))
-    return Weighed(SimpleNamespace(model=model, J=J, evaluation="here"), score, None)  # type: ignore[arg-type]
+    return Weighed(SimpleNamespace(model=model, J=J, evaluation=HERE), score, None)  # type: ignore[arg-type]
 
 
 class Fits:
@@ -80,7 +83,7 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     ((model, how),) = fits.asked
     assert model.twin.effects[-1]["mu"] == 0.1
     assert [f.label for f in model.free[len(member.fit.model.free) :]] == ["tendon_friction.mu"]
-    assert how == {"near": "here", "J": member.fit.J, "tolerance": ROUGHLY, "beat": 7.0}
+    assert how == {"near": HERE, "J": member.fit.J, "tolerance": ROUGHLY, "beat": 7.0}
     Fits(monkeypatch, fails=1)
     assert extended(study(), member, "tendon_friction", Start({"mu": 0.1}, ("mu",))) is None
 
@@ -102,6 +105,17 @@ def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.Monke
         own = [i for i, f in enumerate(member.fit.model.free) if f.effect is None]
         np.testing.assert_array_equal(how["J"], member.fit.J[:, own])
     assert said == 2 * [f"fuller law of {CREEP}"]
+
+
+def test_a_fuller_law_is_fitted_from_each_start_and_the_best_fit_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    member, fits = weighed(calibrated(CREEP), score=10.0), Fits(monkeypatch, 30.0)
+    starts = [{"amplitude_2": x, "time_2": 40.0} for x in (0.01, 0.02, 0.03)]
+    monkeypatch.setattr(catalogue()[CREEP], "fuller_starts", lambda law, predicted: iter(starts))
+    scores = iter((30.0, 50.0, 40.0))
+    monkeypatch.setattr(stage, "weigh", lambda study, model: weighed(model, next(scores)))
+    found = fuller(study(), member, (CREEP,), 12.0)
+    assert [next(e for e in model.twin.effects if e.id == CREEP)["amplitude_2"] for model, _ in fits.asked] == [0.01, 0.02, 0.03]
+    assert found.score == 50.0
 
 
 def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:

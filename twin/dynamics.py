@@ -191,8 +191,10 @@ class Moving:
 
     def __init__(self, dynamics: Dynamics, problem: Problem) -> None:
         """At rest in equilibrium under the problem's first commands. The body's stiffness counts with its mean: temperature changes
-        little in a fast trial. Raises SolveError where there is no such equilibrium."""
+        little in a fast trial. Raises SolveError where there is no such equilibrium, and for a round post."""
         loads, route = problem.loads, problem.route
+        if loads.wall[4] > 0.0 and loads.wall[9] > 0.0:
+            raise SolveError("motion against a round post is not stepped here; use static equilibria, or a contact of curvature 0")
         scale = 1.0 if problem.stiffness is None else float(np.mean(problem.stiffness))
         amplitude = np.array(problem.creep.amplitude, float)
         delayed = np.zeros((amplitude.size, dynamics.n_slow)) if problem.delayed is None else problem.delayed

@@ -59,16 +59,17 @@ def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float
         if not study.budget.allows(f"the fuller law of {effect}"):
             continue
         study.progress(f"fuller law of {effect}")
-        table = {p.name: p for p in catalogue()[effect].declared(n_tendon)}
-        law = next(e for e in found.fit.model.twin.effects if e.id == effect)
-        values = {**law.values, **{n: table[n].value + (0.0 if n in law.shape else table[n].step) for n in richer}}
-        model = found.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
-        try:
-            fuller = weigh(study, fit(study.objective, model, J=_own(found.fit)))
-        except SolveError:
-            continue
-        if fuller.score > found.score + accept:
-            found = fuller
+        plain = found
+        law = next(e for e in plain.fit.model.twin.effects if e.id == effect)
+        for start in law.fuller_starts([t.true for t in plain.fit.evaluation.traces.values()]):
+            values = {**law.values, **start}
+            model = plain.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
+            try:
+                fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit)))
+            except SolveError:
+                continue
+            if fuller.score > max(found.score, plain.score + accept):
+                found = fuller
     return found
 
 

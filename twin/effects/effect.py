@@ -70,13 +70,13 @@ class Push:
 
 @dataclass(frozen=True)
 class Loads:
-    """Surroundings of one trial: gravity (3,) m/s^2; payload (kg) and force (3,) N at the tip; a wall (5,): normal, offset (m),
-    stiffness (N/m); torque (n,) or (1,) N m on a jaw's hinge, along its positive angle; a push anywhere."""
+    """Surroundings of one trial: gravity (3,) m/s^2; payload (kg) and force (3,) N at the tip; a wall or a post (10,) as
+    `twin.effects.contact.obstacle` makes it; torque (n,) or (1,) N m on a jaw's hinge, along its positive angle; a push."""
 
     gravity: np.ndarray
     payload: float = 0.0
     force: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    wall: np.ndarray = field(default_factory=lambda: np.zeros(5))
+    wall: np.ndarray = field(default_factory=lambda: np.zeros(10))
     torque: np.ndarray = field(default_factory=lambda: np.zeros(1))
     push: Push | None = None
 
@@ -208,6 +208,11 @@ class Effect(ABC):
             single = [{f"{p.name}_{i}": p.value + p.step for p in kind} for i in tendons]
             for values in (*single, {k: v for s in single for k, v in s.items()}):
                 yield Start(values, tuple(values))
+
+    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Values]:
+        """Values of the fuller law from which a fit of it may begin, where this is the plain one; `predicted` is with it."""
+        table = {p.name: p for p in self.declared(self.n_tendon)}
+        yield {n: table[n].value + (0.0 if n in self.shape else table[n].step) for n in self.richer}
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]

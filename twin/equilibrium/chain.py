@@ -1,7 +1,7 @@
 """The balance of forces of a chain of hinges (and slides) pulled by tendons, and its exact tangent.
 
 Energy of the chain without friction, with elastic energy E_el (elastic.py), tendon segments l_d under tension T_d,
-masses m at x, dead forces F at the tip and P at a disk, and disks at a distance `gap` from a wall of stiffness k:
+masses m at x, dead forces F at the tip and P at a disk, and disks at a distance `gap` from a wall or post of stiffness k:
 
     E(q) = E_el(q) + sum_d T_d l_d(q) - sum m g.x - F.x_tip - P.x_disk + 1/2 k sum max(0, -gap)^2
 
@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.compiled import assign, cross, dot, inner, jit, put
+from twin.effects.contact import touch
 from twin.effects.tendon_friction import slip_state, turn
 from twin.equilibrium.elastic import springs
 
@@ -58,7 +59,7 @@ class Law(NamedTuple):
 
     mu: float  # tendon friction coefficient; 0: none
     presliding: float  # m of travel from sticking to sliding
-    wall: np.ndarray  # (5,) normal towards the free side, offset (m), stiffness (N/m; 0: no wall)
+    wall: np.ndarray  # (10,) of `Loads`: normal towards the free side, offset (m), stiffness (N/m; 0: no wall), ...
 
 
 class Load(NamedTuple):
@@ -201,11 +202,11 @@ def push_force(chain, load, r, J):
 
 @inner
 def wall_force(chain, wall, r, J):
-    """Penalty force k max(0, -gap) along the wall's normal at each disk centre, added to r and, unless it is empty, J."""
-    normal, stiffness = (wall[0], wall[1], wall[2]), wall[4]
+    """Penalty force k max(0, -gap) along the gap's gradient at each disk centre, added to r and, unless it is empty, J."""
+    stiffness = wall[4]
     for k in range(chain.disk.shape[0]):
         x = chain.site[chain.disk[k]]
-        gap = dot(normal, x) - wall[3]
+        gap, normal, across, bend = touch(wall, x)
         if gap >= 0.0:
             continue
         f = -stiffness * gap
@@ -217,8 +218,9 @@ def wall_force(chain, wall, r, J):
         if J.size:
             for j in range(n):
                 b = turned(chain, j, normal)  # normal . (a_j x X_i) = -(a_j x normal) . X_i
+                push, slip = stiffness * dot(normal, X[j]), f * bend * dot(across, X[j])
                 for i in range(j, n):
-                    h = f * dot(b, X[i]) + stiffness * dot(normal, X[i]) * dot(normal, X[j])
+                    h = f * dot(b, X[i]) + push * dot(normal, X[i]) - slip * dot(across, X[i])
                     J[i, j] += h
                     if i > j:
                         J[j, i] += h

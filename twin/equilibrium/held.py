@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from twin.compiled import assign, jit, part
 from twin.equilibrium.lengths import hold_once, move, reach, remember, tangent
-from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, weigh
+from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, wary, weigh
 from twin.springs.heat import heated
 
 FINE = 1e-7  # rad, where tensions are sought: a rough shape has no sharp ones
@@ -20,7 +20,7 @@ def sought(now, tol):
     """A step of the start: the shape whose tendons have the lengths and temperatures wanted; remembered. Returns its status."""
     state, held = now.state, now.held
     assign(now.last, state.q)
-    status = reach(now.at, state, now.factors, held, now.last, now.sought, min(tol, FINE))
+    status = reach(now.at, state, now.factors, held, now.last, now.sought, min(tol, FINE), now.at.law.wall[9] > 0.0)
     remember(held, state.s, state.T)
     return status
 
@@ -117,7 +117,7 @@ def settled(now, near, how):
         move(now.held, now.sought, now.sought, 1.0)
         status = hold_once(now.at, now.state, now.factors, now.held)
     else:
-        status = reach(now.at, now.state, now.factors, now.held, now.last, now.sought, min(how.tol, FINE))
+        status = reach(now.at, now.state, now.factors, now.held, now.last, now.sought, min(how.tol, FINE), wary(now, near))
     if status == 0:
         assign(now.state.q, now.last)
     return status

@@ -22,7 +22,7 @@ from twin.compiled import assign, dot, inner, jit
 from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, copied, lever, settle
 from twin.equilibrium.linear import factorise, substitute
-from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, commit, place
+from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, allowed, commit, place
 from twin.springs.force import piece
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
@@ -33,6 +33,7 @@ COMPRESSION = 1e-6
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
 STEPS = 40
 SMALLEST = 1e-3  # of a jump
+WARY = 2e-4  # m: a part of it by a post, before which the robot may be caught; its tip moves by some 3 mm
 
 
 class Held(NamedTuple):
@@ -185,11 +186,11 @@ class Sought(NamedTuple):
 
 
 @jit
-def reach(at, state, factors, held, last, sought, tol):
+def reach(at, state, factors, held, last, sought, tol, wary):
     """Equilibrium with the tendons that motors and springs hold as `sought`, and all tensions.
 
     Where the guess state.q does not lead there the jump is made from the shape `last`, which was at held.free and held.temperature,
-    in ever smaller parts if need be. held.free and held.temperature follow.
+    in ever smaller parts if need be, or at once in such as `WARY` says. held.free and held.temperature follow.
 
     Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits the slip; with parts, after each. The springs'
     memory is left to `remember`.
@@ -197,9 +198,13 @@ def reach(at, state, factors, held, last, sought, tol):
     T, fresh = state.T, factors.fresh
     q0, T0, T1, was = last.copy(), T.copy(), T.copy(), Sought(held.free.copy(), held.temperature.copy())
     move(held, was, sought, 1.0)
-    if hold(at, state, factors, held, tol) == 1:
+    if not wary and hold(at, state, factors, held, tol) == 1:
         return 1
-    done, part = 0.0, 1.0
+    longest = 0.0
+    for t in range(T.size):
+        longest = max(longest, abs(held.free[t] - was.free[t]) if held.which[t] and not held.by_spring[t] else 0.0)
+    whole = min(1.0, WARY / longest) if wary and longest > 0.0 else 1.0
+    done, part = 0.0, whole
     while done < 1.0:
         move(held, was, sought, done + part)
         assign(T, T0)
@@ -207,7 +212,7 @@ def reach(at, state, factors, held, last, sought, tol):
         fresh[0] = False
         if hold(at, state, factors, held, tol) == 1:
             done += part
-            part = min(2.0 * part, 1.0 - done)
+            part = min(2.0 * part, whole, 1.0 - done)
             assign(q0, state.q)
             assign(T0, T)
         else:
@@ -216,7 +221,7 @@ def reach(at, state, factors, held, last, sought, tol):
                 move(held, was, sought, 1.0)
                 assign(T, T1)
                 return 0
-    return 2
+    return 1 if wary else 2
 
 
 @inner
@@ -333,8 +338,10 @@ def hold(at, state, factors, held, tol):
             return 0
         assign(end.q, state.q)
         assign(end.T, state.T)
-        if longest > LONGEST_STEP:
-            step = LONGEST_STEP / longest
+        for i in range(r.size):
+            r[i] = end.q[i] - start.q[i]
+        step = allowed(at, r, longest)
+        if step < 1.0:
             between(state, start, end, step)
     return 0
 

@@ -17,6 +17,7 @@ from twin.equilibrium.linear import substitute
 from twin.equilibrium.newton import is_minimum, newton, place, solve, still
 
 STRIDE = 0.75  # N: the largest part; 0.75 against 0.02 moves the tip by some 0.1 mm at most (tests/test_kinematics.py)
+WARY = 0.1  # N: the same by a post, where the robot may be caught before it or come to lie behind it; its tip moves by some 3 mm
 SHORTEST = 1.0 / 16.0  # of a part: below it the robot is let go where it wants
 TRIALS = 25  # Gauss-Newton steps of `seek`
 CORRECTIONS = 12  # of its answer, the way there considered
@@ -68,20 +69,21 @@ def pull(at, state, factors, goal, stride, tol):
 
 
 @part
-def onward(at, state, factors, T0, q0, tol):
-    """Equilibrium at the state's tensions from its guess q; where Newton does not lead there, from (T0, q0) before by `pull`.
+def onward(at, state, factors, T0, q0, tol, wary):
+    """Equilibrium at the state's tensions from its guess q; where Newton does not lead there, or `wary`, from (T0, q0) before by
+    `pull`.
 
     Short pre-sliding and large steps from sample to sample leave Newton no way, and what a robot let go of does on its own is not
     what a pulled one does. Returns 1, 2 where it was pulled, 0 where lost.
     """
-    if newton(at, state, factors, still(q0), tol) > 0:
+    if not wary and newton(at, state, factors, still(q0), tol) > 0:
         return 1
     wanted = copied(state)
     assign(state.T, T0)
     assign(state.q, q0)
     factors.fresh[0] = False
-    if pull(at, state, factors, wanted.T, STRIDE, tol) == 1:
-        return 2
+    if pull(at, state, factors, wanted.T, WARY if wary else STRIDE, tol) == 1:
+        return 1 if wary else 2
     become(state, wanted)  # it snaps over on the way
     assign(state.q, q0)
     factors.fresh[0] = False

@@ -17,13 +17,14 @@ import numpy as np
 from twin.compiled import assign, dot, inner, jit, part
 from twin.effects.tendon_friction import slip_state
 from twin.engine import mj_com_pos, mj_kinematics
-from twin.equilibrium.chain import balance, become, copied, settle
+from twin.equilibrium.chain import balance, become, copied, lever, settle
 from twin.equilibrium.linear import factorise, substitute
 
 CONTRACTION = 0.25  # a chord step that shrinks the residual less than this asks for a fresh tangent
 GROWTH = 3.0  # a Newton step that lets the residual grow more than this is halved
 LOST = 1e9  # rad: a residual beyond it is a diverged step
 LONGEST_STEP = 0.5  # rad, of any hinge
+CLOSE = 0.25  # of a post's radius, the furthest that a step takes a disk: a longer one may land behind the post
 NEWTON_STEPS = 30
 KINKED = 3  # steps with a fresh tangent that do not halve the residual: it goes round a kink of friction or a wall, so shorter ones
 SHORTER = 0.6  # of those; of 60 pulls at mu 0.25 three meet a failure, with half steps 23 (they go round too), with full ones 26
@@ -104,6 +105,21 @@ def stride(LU, r, q, unit, mix, steps):
 
 
 @inner
+def allowed(at, dq, longest):
+    """How much of a step dq from where the chain is placed may be taken; its longest change is `longest` (rad)."""
+    chain, curvature, share = at.chain, at.law.wall[9], min(1.0, LONGEST_STEP / longest)
+    if curvature > 0.0:
+        for k in range(chain.disk.size):
+            x, moved = chain.site[chain.disk[k]], np.zeros(3)
+            for i in range(chain.below[k]):
+                v = lever(chain, i, x)
+                for a in range(3):
+                    moved[a] += v[a] * dq[i]
+            share = min(share, CLOSE / (1e-9 + curvature * np.sqrt(dot(moved, moved))))
+    return share
+
+
+@inner
 def newton(at, state, factors, flow, tol):
     """Solve r(q) + rate K (q - anchor) = 0 from state.q. Returns the iterations, negative where it failed.
 
@@ -147,7 +163,7 @@ def newton(at, state, factors, flow, tol):
                 return -it
         have, before = True, size
         longest = stride(LU, r, q, chain.unit, mix and not tangent, steps)
-        step = min(1.0, LONGEST_STEP / longest) * (SHORTER if slow > KINKED else 1.0)
+        step = allowed(at, steps.dq, longest) * (SHORTER if slow > KINKED else 1.0)
         mix = step == 1.0
         for i in range(nv):
             q[i] += step * steps.dq[i]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from twin.compiled import assign, jit, part
 from twin.equilibrium.move import onward
 from twin.equilibrium.newton import is_minimum, step_once
-from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, weigh
+from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, wary, weigh
 
 RAMP_TOLERANCE = 1e-6  # rad
 
@@ -34,7 +34,7 @@ def begin(now, driving, near, tol):
         for k in range(1, steps + 1):
             tensions(now, driving, 0, k / steps, (k - 1) / steps)
             assign(now.last, now.state.q)
-            if onward(now.at, now.state, now.factors, now.T1, now.last, RAMP_TOLERANCE) == 0:
+            if onward(now.at, now.state, now.factors, now.T1, now.last, RAMP_TOLERANCE, wary(now, near)) == 0:
                 started = 0
     assign(now.last, now.state.q)
     assign(now.second, now.state.q)
@@ -50,7 +50,7 @@ def settled(now, near, how):
     if how.once and near.q.size > 0 and not now.at.law.mu > 0.0:
         status = step_once(now.at, now.state, now.factors.LU)
     else:
-        status = onward(now.at, now.state, now.factors, now.T1, now.last, how.tol)
+        status = onward(now.at, now.state, now.factors, now.T1, now.last, how.tol, wary(now, near))
     if status == 0:
         assign(now.state.q, now.last)
     return status

@@ -185,9 +185,15 @@ def relax(now, slow, dt):
 
 
 @part
+def wary(now, near):
+    """Whether a post may lie between the last shape and the next, and no neighbour tells on which side of it that is."""
+    return now.at.law.wall[9] > 0.0 and near.q.size == 0
+
+
+@part
 def guess(now, near, i):
     """A first shape for sample i: a neighbour's, else extrapolated from the two before."""
-    q, factors = now.state.q, now.factors
+    q, factors, further = now.state.q, now.factors, 0.0 if wary(now, near) else 1.0
     if near.q.size:
         assign(q, near.q[i])
         for k in range(q.size):
@@ -195,7 +201,7 @@ def guess(now, near, i):
         factors.fresh[0] = True
     else:
         for k in range(q.size):
-            q[k] = 2.0 * now.last[k] - now.second[k]
+            q[k] = now.last[k] + further * (now.last[k] - now.second[k])
     assign(now.second, now.last)
 
 

@@ -70,7 +70,8 @@ class HeatedRobot(LoadedRobot):
         for t in range(self.n_tendon):
             self.warm[t] = heated(self.held.spring, t, self.warm[t], self.held.elongation[t], current[t], self.temperature, dt)
         sought = Sought(self.held.free.copy(), self.warm)
-        found = reach(self.statics, self.now, self.factors, self.held, self.now.q.copy(), sought, TOLERANCE)
+        post = bool(self.law.wall[9] > 0.0)
+        found = reach(self.statics, self.now, self.factors, self.held, self.now.q.copy(), sought, TOLERANCE, post)
         if found == 0:
             raise SolveError("springs and body find no equilibrium; are the currents what was meant?")
         remember(self.held, self.now.s, self.now.T)

@@ -49,7 +49,8 @@ class LoadedRobot:
         loads = laws.surround(loads or Loads(twin.robot.gravity))
         self.softness = 1.0 / float(laws.stiffness(np.full(1, temperature), np.zeros(1))[0])
         self.loads, self.temperature, self.route = loads, temperature, laws.route
-        wall = np.array(loads.wall, float) * np.array([1, 1, 1, 1, self.softness])
+        wall = np.array(loads.wall, float)
+        wall[4] *= self.softness
         self.law = Law(float(self.route.mu), float(self.route.presliding), wall)
         self.load = self.solver.load(loads, self.softness)
         self.n_tendon = twin.robot.n_tendon

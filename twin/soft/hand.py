@@ -15,6 +15,7 @@ import numpy as np
 
 from twin.body import Body, Path, Problem
 from twin.effects import Loads
+from twin.effects.contact import seen_from
 from twin.soft.body import SoftBody
 from twin.soft.dynamics import Moving, Started, followed, step_for
 from twin.soft.flex import flex
@@ -49,7 +50,7 @@ class HandBody(Body):
     def felt(self, k: int, loads: Loads) -> Loads:
         """As finger k (from 0) has them, in its own frame."""
         turn, n = self.turns[k], len(self.fingers)
-        wall = np.concatenate([loads.wall[:3] @ turn, [loads.wall[3] - loads.wall[:3] @ self.places[k]], loads.wall[4:]])
+        wall = seen_from(loads.wall, turn, self.places[k])
         push = loads.push if loads.push is not None and loads.push.finger == k else None
         if push is not None:
             push = replace(push, force=push.force @ turn, azimuth=push.azimuth - np.arctan2(turn[1, 0], turn[0, 0]))

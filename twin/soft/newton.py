@@ -42,7 +42,7 @@ class Parts(NamedTuple):
 
 class Way(NamedTuple):
     """What is asked at each sample: tensions and free lengths (n, t) and which tendons are `held`; stretch (n, t) m/N; forces
-    (n_free, 3) N, wall (5,) and the stiffness (n,) they count over; friction and pre-sliding; times (n,) s, amplitude and time
+    (n_free, 3) N, wall (10,) and the stiffness (n,) they count over; friction and pre-sliding; times (n,) s, amplitude and time
     (k,) of creep; the step (m) that counts as none, whether one step is all that is taken, and whether its tangent is wanted."""
 
     tension: np.ndarray

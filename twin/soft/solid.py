@@ -28,7 +28,7 @@ class Pull(NamedTuple):
 
 
 class Burden(NamedTuple):
-    """Forces on the free nodes (n_free, 3) N, and a wall (5,) as in `Loads`."""
+    """Forces on the free nodes (n_free, 3) N, and a wall (10,) as in `Loads`."""
 
     force: np.ndarray
     wall: np.ndarray

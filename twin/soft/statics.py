@@ -12,6 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
 from twin.effects import Drive, Loads
+from twin.effects.contact import seen_from
 from twin.errors import SolveError
 from twin.sensors import resistance
 from twin.soft.body import SoftBody
@@ -161,7 +162,7 @@ class Trial:
         loads, turn = problem.loads, turned(body.turn)
         weight = np.outer(body.lattice.volume, body.density * loads.gravity @ turn)
         self.force = weight + np.outer(statics.tip, loads.payload * loads.gravity @ turn) + statics.pressed(loads)
-        self.wall = np.concatenate([loads.wall[:3] @ turn, loads.wall[3:]])
+        self.wall = seen_from(loads.wall, turn, np.zeros(3))
         self.held = problem.which(Drive.DISPLACEMENT)
         self.scale = np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float)
         k = len(problem.creep.amplitude)

@@ -1,4 +1,4 @@
-"""A soft flat wall that the skin presses: F = stiffness share max(0, depth) at each point of the skin, along the wall's normal.
+"""A soft wall or post that the skin presses: F = stiffness share max(0, depth) at each point of the skin, along its normal there.
 
 The shares of the points around one height add up to one, so that `stiffness` (N/m) is that of one ring pressed all round.
 """
@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.compiled import jit
+from twin.effects.contact import touch
 
 
 class Skin(NamedTuple):
@@ -22,11 +23,12 @@ class Skin(NamedTuple):
 
 @jit
 def press(skin, u, wall, scale, r, K, tangent):
-    """Take the wall's push (5,): normal, offset (m), stiffness (N/m), from the residual r (n,) or, with `tangent`, add its tangent
-    to K (n, n); both over the body's stiffness, `scale`."""
+    """Take the push of a wall (10,), as in `Loads`, from the residual r (n,) or, with `tangent`, add its tangent to K (n, n); both
+    over the body's stiffness, `scale`."""
     x = skin.rest + np.dot(skin.weights, u)
     for m in range(len(x)):
-        depth = wall[3] - (x[m, 0] * wall[0] + x[m, 1] * wall[1] + x[m, 2] * wall[2])
+        gap, normal, across, bend = touch(wall, x[m])
+        depth = -gap
         if depth <= 0.0:
             continue
         k = wall[4] * skin.share[m] / scale
@@ -36,8 +38,9 @@ def press(skin, u, wall, scale, r, K, tangent):
                 continue
             for i in range(3):
                 if not tangent:
-                    r[3 * a + i] -= k * depth * w * wall[i]
+                    r[3 * a + i] -= k * depth * w * normal[i]
                     continue
                 for b in range(skin.weights.shape[1]):
                     for j in range(3):
-                        K[3 * a + i, 3 * b + j] += k * w * wall[i] * skin.weights[m, b] * wall[j]
+                        stiff = normal[i] * normal[j] - depth * bend * across[i] * across[j]
+                        K[3 * a + i, 3 * b + j] += k * w * skin.weights[m, b] * stiff
