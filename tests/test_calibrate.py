@@ -20,6 +20,7 @@ from twin.diagnose import Settings, calibration
 from twin.diagnose.doubts import strained, unlikely
 from twin.diagnose.ranking import projected
 from twin.diagnose.split import split
+from twin.effects import catalogue
 from twin.information import solve, untold
 from twin.measurements import Recording, read
 from twin.quantities import Parameter
@@ -340,6 +341,26 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     # Mean square of the error over its standard error: one, known to sqrt(2 / 1600), less 4 % for the widening.
     pull = np.array([([f.model.value(p) for p in FREE] - true) / f.std() for true, f in days])
     assert 0.86 < np.mean(pull**2) < 1.06
+
+
+def test_an_amplitude_is_no_better_known_than_the_form_of_its_law() -> None:
+    """2 % of how far it is from OFF, beside the data's error; of where a wall stands, and of the robot's own, nothing."""
+    free = (
+        *(Free("contact", p) for p in catalogue()["contact"].parameters[:3]),
+        *(Free("load_cell_gain", p) for p in catalogue()["load_cell_gain"].declared(3)[:1]),
+        FREE[0],
+    )
+    wall = catalogue()["contact"]({"stiffness": 300.0, "azimuth": 2.0, "distance": 0.03})
+    twin = replace(Twin.of(ROBOT), effects=(wall, catalogue()["load_cell_gain"]({"gain_1": 1.1})))
+    A = 1e3 * np.random.default_rng(3).normal(size=(100, 5))
+    model = Model(twin, free)
+    found = Fit(Evaluation(model, {}, [], np.zeros(100)), A, 0.0)
+    surely = dict(zip([f.label for f in free], found.std(), strict=True))
+    assert found.fitted("contact")["stiffness"].std == pytest.approx(np.hypot(surely["contact.stiffness"], 6.0))
+    assert found.fitted("load_cell_gain")["gain_1"].std == pytest.approx(np.hypot(surely["load_cell_gain.gain_1"], 2e-3))
+    for name in ("azimuth", "distance"):
+        assert found.fitted("contact")[name].std == surely[f"contact.{name}"]
+    assert found.fitted(None)["p0"].std == surely["p0"]
 
 
 def test_intervals_hold_where_the_noise_is_larger_than_it_was_taken_for() -> None:

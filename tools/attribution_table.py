@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tools.compared import KNOWN
+
 CLASSES = ({"base_tilt", "camera_misalignment"}, {"time_delay", "actuator_lag"})  # effects such data hardly tell apart
 SURE = 0.9  # a claim at this probability or more must be right nine times of ten
 CLOSE = 0.15  # relative error of an effect's parameters
@@ -43,6 +45,17 @@ def made(r: dict) -> bool:
     return all(s >= 0.5 * r["amplitude"] for s in r["sigmas"])
 
 
+def held(r: dict) -> list[bool]:
+    """Of each claimed parameter that bench and twin share, whether its 90 % interval, 1.645 standard errors either way, holds."""
+    out = []
+    for t in r.get("truth", []):
+        found = r.get("parameters", {}).get(t["id"], {})
+        known = KNOWN[t["id"]](t["parameters"]) if t["id"] in KNOWN else {}
+        told = {n: (value, *found[n]) for n, value in known.items() if n in found and found[n][1]}
+        out += [abs(x - value) < 1.645 * std for value, x, std in told.values()]
+    return out
+
+
 def table(every: list[dict]) -> str:
     rows = [r for r in every if made(r)]
     of = {k: [r for r in rows if r["kind"] == k] for k in ("none", "one", "pair", "unknown")}
@@ -71,6 +84,7 @@ def table(every: list[dict]) -> str:
     ]
     apart = [x <= CLOSE for r in rows for x in r.get("apart", {}).values()]
     lines.append(f"parameters within {100 * CLOSE:.0f} %, same law            {share(apart)}")
+    lines.append(f"90 % intervals that hold the truth          {share([x for r in rows for x in held(r)])}")
     if ratio:
         lines.append(
             f"sealed after / floor                        median {np.median(ratio):.3f}, 90 % {np.quantile(ratio, 0.9):.3f}"

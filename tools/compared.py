@@ -94,6 +94,21 @@ COMPARED: dict[str, Compare] = {
 }  # fmt: skip
 
 
+# effect -> the twin's parameters that mean what one of the bench's does, and their true values (SI), of its fields as written down
+KNOWN: dict[str, Callable[[dict[str, Any]], dict[str, float]]] = {
+    "tendon_friction": lambda t: {"mu": 0.1 * t["strength"]},
+    "stiffness_gradient": lambda t: {"gradient": 0.2 * t["strength"] * t["sign"]},
+    "tip_payload": lambda t: {"mass": 1e-3 * t["strength"]},
+    "time_delay": lambda t: {"delay": 0.1 * t["strength"]},
+    "temperature_softening": lambda t: {"rate": 0.005 * t["strength"]},
+    "tendon_elasticity": lambda t: {"stretch": 5e-5 * t["strength"]},
+    "tendon_routing": lambda t: {f"angle_{t['tendon'] + 1}": np.radians(3.0) * t["strength"] * t["around"]},
+    "camera_misalignment": lambda t: {
+        f"turn_{a}": float(np.radians(0.7 * t["strength"]) * x) for a, x in zip("xyz", t["axis"], strict=True)
+    },
+}  # fmt: skip
+
+
 def _differ(x: np.ndarray) -> np.ndarray:
     return x - x.mean()
 
