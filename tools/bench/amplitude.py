@@ -23,7 +23,7 @@ CLOSE = 0.03  # relative error of the amplitude that is good enough
 PLAUSIBLE = 2.0  # prior standard deviations that a refit may use
 
 
-def _stack(logs: Sequence[Log], seen_in: str) -> np.ndarray:
+def stack(logs: Sequence[Log], seen_in: str) -> np.ndarray:
     field = {"marker": "markers", "displacement": "displacement", "tension": "tension"}[seen_in]
     return np.concatenate([getattr(log, field).ravel() for log in logs])
 
@@ -59,15 +59,15 @@ class Scale:
     def moves(self, seen_in: str) -> np.ndarray:
         """Change (n, p) of the output, in sigmas, per prior deviation of each nuisance parameter."""
         day = self.thinned()
-        at = _stack(run(self.rod, [], day), seen_in)
-        moved = [(_stack(run(rod, [], day), seen_in) - at) / part for rod, part in _nuisances(self.rod)]
+        at = stack(run(self.rod, [], day), seen_in)
+        moved = [(stack(run(rod, [], day), seen_in) - at) / part for rod, part in _nuisances(self.rod)]
         return np.stack(moved, axis=1) / self.sigma(seen_in)
 
     def amplitude(self, effects: Sequence[Effect], seen_in: str, moves: np.ndarray) -> float:
         """RMS residual over sigma after the linear refit."""
         day = self.thinned()
         logs = run(self.rod, effects, day)
-        residual = _stack(logs, seen_in) - _stack(as_described(self.rod, logs, day), seen_in)
+        residual = stack(logs, seen_in) - stack(as_described(self.rod, logs, day), seen_in)
         residual /= self.sigma(seen_in)
         refit = lsq_linear(moves, residual, bounds=(-PLAUSIBLE, PLAUSIBLE)).x
         return float(np.sqrt(np.mean((residual - moves @ refit) ** 2)))

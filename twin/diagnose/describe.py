@@ -10,6 +10,7 @@ from twin.diagnose.beyond import beyond
 from twin.diagnose.doubts import unlikely
 from twin.diagnose.gate import Gated
 from twin.diagnose.judge import Judgement
+from twin.diagnose.leaps import leaps
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.places import where
@@ -42,7 +43,8 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     z = final.fit.z.reshape(final.discrepancy.mean.shape)
     rebuilt = (mixed(study.bench, judged.rigs).strip(),) if judged.rigs else ()
     far = tuple(b.words() for b in beyond(study, final, gated))
-    notices = (*unlikely(final.fit), *judged.signs.strained, *rebuilt, *far)
+    late = leaps(study.bench, study.trials, final.fit)
+    notices = (*unlikely(final.fit), *judged.signs.strained, *late, *rebuilt, *far)
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)
 
 

@@ -261,6 +261,13 @@ WARM = _row(
 PULLED = _row("PULLED", 0.2, "of the largest command", "a tendon that moves by less was not pulled", "judgement")
 STILL = _row("STILL", 0.02, "of the largest command", "a change from row to row that is none", "judgement: as MEETS")
 ONE_WAY = _row("ONE_WAY", 0.2, "of the loading", "less unloading than that is none", "judgement")
+LEAP = _row(
+    "LEAP", 0.3, "of a command's range", "within one row: a motion is drawn by ten rows or more, a step by one or two", "judgement"
+)  # fmt: skip
+LEFT_THERE = _row(
+    "LEFT_THERE", 1.5, "ratio", "of what is left after leaps to what is left elsewhere: 1 where it is noise, to 5 % from 200 rows",
+    "python -m tools.rows_tell 70066 70043 70030",
+)  # fmt: skip
 DOUBTFUL = _row(
     "DOUBTFUL",
     3.0,
