@@ -14,9 +14,10 @@ import pytest
 from twin import cli
 from twin.errors import DataError, UnknownNameError
 from twin.learn import lerobot
-from twin.learn.demonstrate import ATTEMPTS, FPS, Order, body_of, demonstrate, read
+from twin.learn.demonstrate import ATTEMPTS, Order, body_of, demonstrate, read
 from twin.learn.hands import LEFT, Eye, aligned, built, fingers
 from twin.learn.imitate import AHEAD, PRESS, Actor, Nearest, learn
+from twin.learn.kept import FPS
 from twin.learn.teach import Lesson
 from twin.learn.ways import ByStrain
 from twin.robots import load

@@ -1,8 +1,8 @@
 """What is wanted of a finger, and what troubles it, without end; all of it by the seed and the time alone.
 
-Wanted shapes are another finger's (other E, clamped alike), which goes from one drawn command to the next: MOVES s on the way, RESTS s
-there. Commands are of the factory's free motion: a bend of up to BEND, and co-contraction of up to PRETENSION. Pushes are patches on
-the skin as the factory draws them, one after the other. Each cord drifts at a rate of its own, and readings are noisy.
+Wanted shapes are another finger's (other E, clamped alike), which goes from one drawn command to the next: MOVES s on the way,
+RESTS s there. Commands are of the factory's free motion: a bend of up to BEND, and co-contraction of up to PRETENSION. Pushes are
+patches on the skin as the factory draws them, one after the other. Each cord drifts at a rate of its own, and readings are noisy.
 """
 
 from __future__ import annotations

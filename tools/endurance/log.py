@@ -1,7 +1,7 @@
 """What is kept of hours: a line a minute in minutes.jsonl, the state to go on from in state.npz, where it comes from in run.json.
 
-The line is written before the state, and lines beyond the state's time are dropped when a run goes on: whatever stops it, the minutes
-that are there are those of one run.
+The line is written before the state, and lines beyond the state's time are dropped when a run goes on: whatever stops it, the
+minutes that are there are those of one run.
 """
 
 from __future__ import annotations

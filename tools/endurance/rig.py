@@ -1,14 +1,14 @@
 """A finger that MuJoCo steps, its controller, and what is looked at in every step of both.
 
-    lost       the finger's motion: a cell inside out, a node that is not finite or faster than any; it cannot go on
+    lost       the finger's motion: a cell inside out, a node not finite or faster than any; it cannot go on
     nan        a number of the state, of the readings or of the commands that is not finite
     rate       a tendon told to go faster than the controller's limit
     most       the controller's tension of a tendon above its limit by more than OVER
     no answer  the controller found no equilibrium: the tendons then stay, which is no fault
 
 The finger's E, R0, kappa and mounting are drawn by the seed and its tendons rub; the controller's twin is what an alignment would
-leave of it (`twin/learn/hands.py`), E as described, without friction. Both run as a hand does its tasks: a look, a control step, and
-STEP s of motion in steps of 4 ms. A tension is limited by a tangent: while the finger moves the twin's own ends that little
+leave of it (`twin/learn/hands.py`), E as described, without friction. Both run as a hand does its tasks: a look, a control step,
+and STEP s of motion in steps of 4 ms. A tension is limited by a tangent: while the finger moves the twin's own ends that little
 above it by which it is curved, OVER being a hundredth of the limit.
 """
 
