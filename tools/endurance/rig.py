@@ -35,7 +35,7 @@ from twin.soft.statics import turned
 from twin.tasks import STEP
 from twin.twin import Twin
 
-OVER = 0.01  # of the most pull
+OVER = 0.01  # of the most pull: 22 mN; what is above 10 mN the controller pays out again, by a tangent too
 ROUNDING = 1e-9
 FRICTION = 0.1  # of the plant's tendons, by Capstan's law
 STRIDE = 1e-3  # m by which tendons are taken back to where they were
