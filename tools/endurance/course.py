@@ -41,7 +41,7 @@ class Course:
         self._azimuth = np.arctan2(body.paths[:, 0, 1], body.paths[:, 0, 0])
         self._rates = self._drawn(0, 0).uniform(-DRIFT, DRIFT, len(body.cord_paths)) / TEN_HOURS
         self._rows: dict[int, np.ndarray] = {}
-        self._noise, self._minute = self._drawn(3, 0), 0
+        self._noise, self._second = self._drawn(3, 0), 0
         self.unshown = 0  # rows at which the other finger had no equilibrium
 
     def _drawn(self, kind: int, k: int) -> np.random.Generator:
@@ -91,6 +91,6 @@ class Course:
 
     def read(self, true: np.ndarray, time: float) -> np.ndarray:
         """(s,) ohm as cords of `true` resistance read."""
-        if (minute := int(time / MINUTE + 1e-9)) != self._minute:
-            self._noise, self._minute = self._drawn(3, minute), minute
+        if (second := int(time + 1e-9)) != self._second:  # so that who goes on at a whole second reads the same
+            self._noise, self._second = self._drawn(3, second), second
         return read_bench(true * (1.0 + self._rates * time), RESISTANCE, self._noise)

@@ -23,6 +23,7 @@ from twin.report import stamp
 
 MINUTES, STATE, RUN = "minutes.jsonl", "state.npz", "run.json"
 MM = 1e3
+NOTHING = Look(*(float("nan"),) * len(Look._fields))  # of a minute that was lost in its first step
 Line = dict[str, Any]
 
 
@@ -30,7 +31,7 @@ def line(looks: Sequence[Look], rig: Rig, wall: float) -> Line:
     """Of a minute: simulated hours until now; distances, mm, in free air (`free`) and over all, mean and largest; the largest and
     least tensions (N), shortening (mm) and share of the rate allowed; faults since the first step; memory, MB; hours of the clock
     since the first step, and which process it was."""
-    error, pushed, twin, plant, shortening, rate, least = np.array(looks, float).T
+    error, pushed, twin, plant, shortening, rate, least = np.array(looks or [NOTHING], float).T
     free = error[pushed == 0.0]
     return {
         "hours": rig.time / 3600.0, "error": MM * error.mean(), "error_most": MM * error.max(),
@@ -87,23 +88,29 @@ def read(folder: Path) -> list[Line]:
 def table(minutes: Sequence[Line]) -> str:
     """Markdown: what was looked for, and what was seen."""
     last, faults = minutes[-1], minutes[-1]["faults"]
-    hour = {"first": [m for m in minutes if m["hours"] <= 1.0], "last": [m for m in minutes if m["hours"] > last["hours"] - 1.0]}
-    free = {when: np.mean([m["free"] for m in rows if m["free"] is not None]) for when, rows in hour.items()}
-    whole = {when: np.mean([m["error"] for m in rows]) for when, rows in hour.items()}
+    hour = [m for m in minutes if m["hours"] <= 1.0], [m for m in minutes if m["hours"] > last["hours"] - 1.0]
+
+    def each(name: str, of: Sequence[Line] = minutes) -> np.ndarray:
+        return np.array([m[name] for m in of if m[name] is not None and np.isfinite(m[name])] or [np.nan])
+
+    def hours(name: str) -> str:
+        first, end = (each(name, of).mean() for of in hour)
+        return f"{first:.3f}, {end:.3f}"
+
     rows = {
         "hours simulated (of the clock)": f"{last['hours']:.2f} ({last['wall'] / 3600.0:.2f})",
         "not finite, motion lost": f"{faults.get('nan', 0)}, {faults.get('lost', 0)}",
         "limits broken: rate, most pull": f"{faults.get('rate', 0)}, {faults.get('most', 0)}",
-        "largest share of the rate": f"{max(m['rate'] for m in minutes):.2f}",
-        "pull by the twin, N": f"{min(m['least'] for m in minutes):.3f} to {max(m['tension'] for m in minutes):.3f}",
-        "largest pull of the plant, N": f"{max(m['plant_tension'] for m in minutes):.3f}",
-        "largest shortening, mm": f"{max(m['shortening'] for m in minutes):.2f}",
+        "largest share of the rate": f"{each('rate').max():.2f}",
+        "pull by the twin, N": f"{each('least').min():.3f} to {each('tension').max():.3f}",
+        "largest pull of the plant, N": f"{each('plant_tension').max():.3f}",
+        "largest shortening, mm": f"{each('shortening').max():.2f}",
         "steps without an answer of the controller": f"{faults.get('no answer', 0)}",
         "wanted shapes that were not found": f"{last['unshown']}",
         "memory, MB an hour simulated": grown(minutes),
-        "distance in free air, first and last hour, mm": f"{free['first']:.3f}, {free['last']:.3f}",
-        "distance, pushes too, first and last hour, mm": f"{whole['first']:.3f}, {whole['last']:.3f}",
-        "largest distance, mm": f"{max(m['error_most'] for m in minutes):.2f}",
+        "distance in free air, first and last hour, mm": hours("free"),
+        "distance, pushes too, first and last hour, mm": hours("error"),
+        "largest distance, mm": f"{each('error_most').max():.2f}",
     }
     return "\n".join(["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows.items())])
 
