@@ -61,6 +61,7 @@ def test_its_state_is_the_plant_s_to_the_last_bit(started: Rig, tmp_path: Path) 
     again, minutes = begun(tmp_path, 1)
     assert minutes == []  # one is later than the state, the other was cut off
     assert again.steps == started.steps
+    assert {"qpos", "qvel", "slip", "beyond", "tension", "shortening"} == set(started.plant.arrays)
     for name, array in started.plant.arrays.items():
         np.testing.assert_array_equal(again.plant.arrays[name], array)
     assert not (tmp_path / (STATE + ".part")).exists()

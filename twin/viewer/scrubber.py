@@ -46,7 +46,8 @@ class Clock:
     def on(self, passed: float, end: float) -> float:
         """Where the clock is `passed` of a watcher's seconds later, s of a trial that ends at `end`."""
         t = self.time.value + passed * self.speed.value
-        t = t if t <= end else 0.0
+        if t > end:  # who looks at the end stays there, though the slider's last hundredth may lie behind it
+            t = 0.0 if passed > 0.0 else end
         if abs(t - self.time.value) > 1e-9:
             self.time.value = t
         return t
