@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -139,6 +140,13 @@ def test_fingers_are_drawn_where_mujoco_s_flexes_are(lifted: Trial, folder: Path
     model, vertices = lifted.scene.model, lifted.scene.data.flexvert_xpos
     for tip, first, count in zip(tips, model.flex_vertadr, model.flex_vertnum, strict=True):
         assert np.linalg.norm(vertices[first : first + count] - tip, axis=1).min() < 1e-4
+
+
+def test_a_trial_of_another_lattice_is_said(lifted: Trial, tmp_path: Path) -> None:
+    made = Kept.of(lifted, Told("hold", "hand", SEED, SHOWN, 0))
+    keep(tmp_path / "coarse.parquet", replace(made, nodes=made.nodes[:, :, ::2]))
+    with pytest.raises(DataError, match="3 fingers of 45 nodes, the robot has 3 of 90"):
+        stage(tmp_path / "coarse.parquet")
 
 
 def test_between_frames_things_go_on_the_short_way() -> None:

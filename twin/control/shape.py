@@ -19,6 +19,7 @@ tangent, the limits and the residual are ours.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ import numpy as np
 
 from twin.control.bounded import bounded
 from twin.control.held import HeldFinger
-from twin.errors import DataError
+from twin.errors import DataError, SolveError
 from twin.sensors import strain
 from twin.shape.estimator import Estimator, Felt, estimator
 from twin.twin import Twin
@@ -107,7 +108,8 @@ class ShapeController:
             room = far - np.sign(way) * (finger.shortening - before)
             # All by one share: a micrometre of one tendon alone is some tenths of a newton of its antagonist.
             share = min(1.0, float((room / np.maximum(np.abs(way), 1e-12)).min()))
-            finger.hold(finger.shortening + max(0.0, share) * way, CLOSE)
+            with suppress(SolveError):  # what was found before stands
+                finger.hold(finger.shortening + max(0.0, share) * way, CLOSE)
 
     def seen(self, resistance: np.ndarray, truth: np.ndarray | None) -> Seen:
         eps = strain(np.asarray(resistance, float), self.cords)

@@ -10,6 +10,7 @@ import numpy as np
 
 from twin.body import DIRECT
 from twin.effects import Loads, Route
+from twin.errors import DataError
 from twin.figure import Frames
 from twin.learn.demonstrate import body_of
 from twin.learn.hands import built
@@ -72,6 +73,10 @@ def stage(file: Path) -> Stage:
     """Raises DataError as `read`, and for a hand of another lattice than today's."""
     kept = read(file)
     figure, statics = hand(kept.told.robot, kept.told.hand)
+    fingers, nodes = len(statics.fingers), statics.fingers[0].body.lattice.n_free
+    if kept.nodes.shape[1:3] != (fingers, nodes):
+        said = " fingers of ".join(map(str, kept.nodes.shape[1:3]))
+        raise DataError(f"{file}: {said} nodes, the robot has {fingers} of {nodes}; it was made with another description of it")
     paths = []
     for k, finger in enumerate(statics.fingers):
         u, tension = kept.nodes[:, k], kept.tension[:, k]
