@@ -134,6 +134,18 @@ def test_the_finger_moves_as_the_twin_predicts() -> None:
     assert np.ptp(told["tip_x"]) > 5e-3
 
 
+def test_what_no_effect_looks_back_at_is_forgotten() -> None:
+    """A sensor that drifts by nothing has its past kept, and says the same."""
+    idle = replace(Twin.of("finger"), effects=(named("sensor_drift")({}, 4),))
+    plants, told = [FingerPlant(twin, 0.04) for twin in (Twin.of("finger"), idle)], np.array([3e-3, 0.0, -3e-3, 0.0])
+    for _ in range(6):
+        one, other = (plant.step(told) for plant in plants)
+        np.testing.assert_array_equal(one.resistance, other.resistance)
+        np.testing.assert_array_equal(one.displacement, other.displacement)
+    assert [len(plant._wires.time) for plant in plants] == [2, 7]
+    assert [len(plant._wires._seen) for plant in plants] == [2, 7]
+
+
 def test_a_wanted_shape_is_reached_by_its_own_servos() -> None:
     env = FingerShape("finger")
     env.reset(seed=1)

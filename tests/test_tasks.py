@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,14 +14,16 @@ import pytest
 
 from twin import cli
 from twin.errors import DataError, UnknownNameError
-from twin.learn import lerobot
-from twin.learn.demonstrate import ATTEMPTS, FPS, Order, body_of, demonstrate, read
+from twin.learn import kept, lerobot
+from twin.learn.demonstrate import ATTEMPTS, Order, body_of, demonstrate, read
 from twin.learn.hands import LEFT, Eye, aligned, built, fingers
 from twin.learn.imitate import AHEAD, PRESS, Actor, Nearest, learn
+from twin.learn.kept import FPS
 from twin.learn.teach import Lesson
 from twin.learn.ways import ByStrain
 from twin.robots import load
 from twin.sensors import resistance
+from twin.task_commands import Imitate
 from twin.tasks import Outcome, Person, Track, Trial, task, tasks
 from twin.tasks.task import about_z
 
@@ -274,6 +277,34 @@ def test_what_was_shown_by_hand_is_done_by_tendons(shown: Path) -> None:
     trials = [actor.act(np.random.default_rng(seed)) for seed in (103, 104, 106, 107)]
     assert sum(trial.outcome() is Outcome.SUCCESS for trial in trials) >= 3
     assert max(trial.seen.tension.max() for trial in trials) < 6.0  # N: told 4 at most by a twin of other silicone
+
+
+def test_what_a_policy_did_is_kept_beside_what_was_shown(shown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every trial, whatever became of it, under a name that holds all that decides it; and where it comes from."""
+    folder = tmp_path / "hold"
+    shutil.copytree(shown, folder)
+    Imitate(folder, policy="nearest", trials=1, seed=3, jobs=1).run()
+    found = kept.sets(folder)
+    assert [(name, len(files)) for name, files in found.items()] == [("shown", 2), ("nearest-shape-hand1-seed3", 1)]
+    trial = kept.read(found["nearest-shape-hand1-seed3"][0])
+    assert trial.told == kept.Told("hold", "hand", 1, "nearest-shape-hand1-seed3", 0)
+    assert trial.time[-1] == pytest.approx(3.0)
+    assert f"1 of 1 {trial.outcome}" in capsys.readouterr().out.replace("0 of 1 success; 1 ", "1 of 1 ")
+    made = json.loads((found["nearest-shape-hand1-seed3"][0].parent / "provenance.json").read_text("utf-8"))
+    assert made["seed"] == 3
+    assert len(made["data_hash"]) == 64
+    assert made["versions"].keys() >= {"twin", "mujoco", "pyarrow"}
+
+
+def test_trials_of_other_orders_have_other_names() -> None:
+    names = [
+        Imitate(Path("x"), **words)._name(1)  # type: ignore[arg-type]
+        for words in ({}, {"train_seed": 1}, {"way": "bend"}, {"seed": 1}, {"drift": 0.1}, {"drift": 0.1, "checked": True},
+                      {"drift": 0.1, "trials": 5}, {"policy": "nearest"}, {"policy": "cloning"})
+    ]  # fmt: skip
+    assert len(set(names)) == len(names)
+    assert names[0] == "diffusion-0-shape-hand1-seed0"
+    assert names[5] == "diffusion-0-shape-hand1-seed0-drift0.1of20-checked"
 
 
 # ---- command line ----------------------------------------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from twin.show_commands import View
 from twin.twin import Twin, simulate
 from twin.viewer import App
 from twin.viewer import app as app_module
+from twin.viewer import panel as panel_module
 from twin.viewer import replay as replay_module
 from twin.viewer.colours import bar, colours
 from twin.viewer.film import Film
@@ -151,7 +152,8 @@ def test_a_running_replay_draws_at_every_turn_of_the_loop_and_solves_nothing_for
     """The rate itself is for `tools/viewer_speed.py`: here the clock is the test's own."""
     solved, now = [], [100.0]
     monkeypatch.setattr(replay_module, "simulate", lambda *a, **b: solved.append(1) or simulate(*a, **b))
-    monkeypatch.setattr(app_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    for module in (app_module, panel_module):
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     server = viser.ViserServer(host="127.0.0.1", port=8670, verbose=False)
     try:
         app = App(server, [("", rubbing())], sample())

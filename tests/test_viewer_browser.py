@@ -6,20 +6,18 @@ Needs Chromium (Debian's `chromium`) and is skipped, loudly, where there is none
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from tests.viewer_page import Page, browser, look, rubbing, sample, served
+from tests.viewer_page import Look, Page, browser, look, rubbing, sample, served
 from twin.effects import Drive
 from twin.twin import Twin
 from twin.viewer import App
 from twin.viewer import film as film_module
 
 __all__ = ["browser", "look"]  # fixtures
-Look = Callable[[str], Page]
 
 
 def _tip_x(app: App) -> float:

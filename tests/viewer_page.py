@@ -8,10 +8,10 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import pytest
@@ -22,9 +22,11 @@ from twin.effects import named
 from twin.measurements import Recording, read
 from twin.twin import Twin
 from twin.viewer import App
+from twin.viewer.panel import Panel
 
 SAMPLE = Path(__file__).parents[1] / "models/continuum/samples/friday"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+P = TypeVar("P", bound=Panel)
 SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 
 
@@ -38,15 +40,21 @@ def sample() -> Recording:
 
 
 @dataclass
-class Served:
-    app: App
+class Served(Generic[P]):
+    app: P
     address: str
 
 
+def served(
+    twins: Sequence[tuple[str, Twin]], recording: Recording | None = None, port: int = 8650
+) -> AbstractContextManager[Served[App]]:
+    return serving(lambda server: App(server, twins, recording), port)
+
+
 @contextmanager
-def served(twins: Sequence[tuple[str, Twin]], recording: Recording | None = None, port: int = 8650) -> Iterator[Served]:
+def serving(make: Callable[[viser.ViserServer], P], port: int = 8650) -> Iterator[Served[P]]:
     server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
-    app, over = App(server, twins, recording), threading.Event()
+    app, over = make(server), threading.Event()
 
     def loop() -> None:
         while not over.is_set():
@@ -61,6 +69,9 @@ def served(twins: Sequence[tuple[str, Twin]], recording: Recording | None = None
         over.set()
         thread.join()
         server.stop()
+
+
+Look = Callable[[str], "Page"]
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from twin.terminal import cores, out, working
 if TYPE_CHECKING:
     from twin.measurements import Recording
     from twin.twin import Twin
+    from twin.viewer.panel import Make
 
 SAMPLE = "*/samples/friday"
 
@@ -71,35 +72,63 @@ class Rollout:
 
 @dataclass(frozen=True)
 class View:
-    """Look at a robot in a browser: under sliders, or as it moved in a measurement set, beside what was measured."""
+    """Look at a robot in a browser: under sliders, or as it moved in a measurement set, beside what was measured; or at the trials
+    of a hand's tasks, of persons and of policies."""
 
     what: Positional[
         Annotated[
             tuple[str, ...],
-            arg(help="a robot, twin.toml or report's folder, or two side by side; a measurement set; default: the bundled sample"),
+            arg(
+                help="a robot, twin.toml or report's folder, or two side by side; a measurement set; default: the bundled sample; "
+                "or a folder that twin demonstrate made"
+            ),
         ]
     ] = ()
     port: Annotated[int, arg(help="where to serve on 127.0.0.1; the next one that is free if it is taken")] = 8080
     film: Annotated[Path | None, arg(help="write a GIF of the set's replay here, drawn by Chromium unseen, and end")] = None
-    trial: Annotated[str | None, arg(help="which trial the film is of; default: the first")] = None
+    trial: Annotated[str | None, arg(help="which trial the film is of, or of a task is shown; default: the first")] = None
     speed: Annotated[float, arg(help="trial seconds a second, of the film")] = 1.0
 
     def run(self) -> None:
         from twin.viewer import serve, take_film
 
-        twins, recording = self._shown()
+        name, make, trial = self._of_tasks() or self._of_twins()
         if self.film is None:
-            with working(f"drawing {twins[0][1].robot.name}"):
+            with working(f"drawing {name}"):
                 pass
-            serve(twins, recording, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
+            serve(make, name, self.port, lambda address: out.print(f"open {address} (Ctrl-C ends it)", highlight=False))
             return
-        if recording is None or not self.speed > 0.0:
-            raise DataError("a film is of a replay, at a speed above 0: give a measurement set as well")
+        if not self.speed > 0.0:
+            raise DataError(f"--speed {self.speed:g}: a film needs one above 0")
         if not self.film.absolute().parent.is_dir():
             raise DataError(f"{self.film.absolute().parent} is no folder; make it, or give another file with --film")
         with working("taking a film") as progress:
-            take_film(twins, recording, self.trial, self.speed, self.film, progress)
+            take_film(make, trial, self.speed, self.film, progress)
         out.print(f"wrote {self.film}", highlight=False, markup=False)
+
+    def _of_tasks(self) -> tuple[str, Make, str | None] | None:
+        """A name, the panel of trials that were kept, and the trial a film is of where it is not the panel's; None where no such
+        folder is given."""
+        folders = [Path(w) for w in self.what if _holds_trials(Path(w))]
+        if not folders:
+            return None
+        if len(self.what) > 1:
+            raise DataError(f"{' and '.join(self.what)}: trials of tasks are shown alone; give one folder")
+        if self.trial is not None and not self.trial.isdecimal():
+            raise DataError(f"--trial {self.trial}: trials of tasks have numbers, from 0 on")
+        from twin.viewer import Trials
+
+        number = None if self.trial is None else int(self.trial)
+        return folders[0].name, lambda server: Trials(server, folders[0], number), None
+
+    def _of_twins(self) -> tuple[str, Make, str | None]:
+        """As above, of twins."""
+        from twin.viewer import App
+
+        twins, recording = self._shown()
+        if self.film is not None and recording is None:
+            raise DataError("a film is of a replay: give a measurement set as well")
+        return twins[0][1].robot.name, lambda server: App(server, twins, recording), self.trial
 
     def _shown(self) -> tuple[list[tuple[str, Twin]], Recording | None]:
         """The twins by name, and the set to replay with them."""
@@ -114,6 +143,15 @@ class View:
         recording, first = loaded(Path(sets[0]) if sets else None, named[0] if named else None)
         names = [Path(w).name for w in named] or [first.robot.name]
         return list(zip(names, [first, *(read_twin(w) for w in named[1:])], strict=True)), recording
+
+
+def _holds_trials(folder: Path) -> bool:
+    """Whether tasks were shown or done there, or it is one set of their trials."""
+    from twin.learn.demonstrate import ATTEMPTS
+    from twin.learn.kept import FOLDER
+
+    one = folder.is_dir() and folder.resolve().parent.name == FOLDER
+    return one or (folder / ATTEMPTS).is_file() or (folder / FOLDER).is_dir()
 
 
 def loaded(folder: Path | None, twin: str | None) -> tuple[Any, Any]:

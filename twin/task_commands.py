@@ -48,6 +48,7 @@ class Demonstrate:
 
     def run(self) -> None:
         from twin.learn.demonstrate import Order, demonstrate
+        from twin.learn.kept import SHOWN
         from twin.robots import load
         from twin.tasks import task
 
@@ -57,7 +58,10 @@ class Demonstrate:
         out.print(f"{self.task}: success is that {order.task.success}", highlight=False, markup=False)
         with working(f"showing {self.task}") as progress:
             outcomes = demonstrate(order, self.out, self.jobs, progress)
+        command = f"twin demonstrate {self.task} --n {self.n} --seed {self.seed} --out {self.out}"
+        provenance(self.out, SHOWN, command, self.seed)
         out.print(f"demonstrations: {self.out}; attempts: {counts(outcomes)}", highlight=False, markup=False)
+        out.print(f"to look at them: twin view {self.out}", highlight=False, markup=False)
 
 
 @dataclass(frozen=True)
@@ -82,9 +86,10 @@ class Imitate:
     def run(self) -> None:
         from twin.learn.demonstrate import read
         from twin.learn.imitate import Actor, learn
+        from twin.learn.kept import Kept, Told, file_of, keep
         from twin.learn.teach import Lesson
         from twin.robots import load
-        from twin.tasks import task
+        from twin.tasks import Trial, task
 
         if self.trials < 1 or min(self.seed, self.train_seed, self.hand or 0) < 0 or self.jobs < 1:
             raise DataError("--trials and --jobs from 1 on, --seed, --train-seed and --hand from 0 on are needed")
@@ -93,14 +98,39 @@ class Imitate:
         order = read(self.data)
         lesson, what = Lesson(self.policy, self.way, self.train_seed), task(order["task"])
         hand = order["seed"] if self.hand is None else self.hand
+        name = self._name(hand)
+
+        def kept(number: int, trial: Trial) -> None:
+            keep(file_of(self.data, name, number), Kept.of(trial, Told(what.name(), HAND, hand, name, number)))
+
         out.print(f"{what.name()}: success is that {what.success}", highlight=False, markup=False)
         with working(f"{what.name()} by {self.way}") as progress:
             policy = learn(lesson, self.data, progress)
             actor = Actor(what, load(HAND), hand, self.way, policy, self.drift, self.checked)
-            found = actor.score(self.trials, self.seed, self.jobs, progress)
+            found = actor.score(self.trials, self.seed, self.jobs, progress, kept)
+        provenance(self.data, name, f"twin imitate {self.data}: {name}, {self.trials} trials", self.seed)
         whose = "the hand shown" if hand == order["seed"] else f"hand {hand}, shown on hand {order['seed']}"
         said = f"{what.name()} by {self.way} ({self.policy}), {whose}, seed {self.seed}: {counts(found)}"
         out.print(said, highlight=False, markup=False)
+        out.print(f"to look at them: twin view {self.data / 'trials' / name}", highlight=False, markup=False)
+
+    def _name(self, hand: int) -> str:
+        """All that decides the trials, as a folder's name."""
+        taught = self.policy if self.policy == "nearest" else f"{self.policy}-{self.train_seed}"
+        drift = f"-drift{self.drift:g}of{self.trials}{'-checked' * self.checked}" if self.drift else ""
+        return f"{taught}-{self.way}-hand{hand}-seed{self.seed}{drift}"
+
+
+def provenance(folder: Path, name: str, command: str, seed: int) -> None:
+    """What kept trials come from, beside them; the data is what was shown."""
+    from twin.learn import lerobot
+    from twin.learn.demonstrate import write_json
+    from twin.learn.kept import file_of
+    from twin.learn.teach import digest
+    from twin.report import stamp
+
+    shown = [episode["observation.state"] for episode in lerobot.read_episodes(folder, ("observation.state",))]
+    write_json(file_of(folder, name, 0).with_name("provenance.json"), stamp(command, seed, digest(shown), ("pyarrow",)))
 
 
 def counts(found: Counter[Outcome]) -> str:

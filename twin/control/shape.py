@@ -14,20 +14,20 @@ letting the other go takes 5 um/N, so that on a finger that is not quite the twi
 more than told.
 
 Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078) projects vertex errors onto constant directions (`shape_baselines.py`); the
-tangent, the limits and the residual are ours. Bounded least squares: Stark and Parker 1995, as in scipy.
+tangent, the limits and the residual are ours.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import lsq_linear
 
+from twin.control.bounded import bounded
 from twin.control.held import HeldFinger
-from twin.errors import DataError
+from twin.errors import DataError, SolveError
 from twin.sensors import strain
 from twin.shape.estimator import Estimator, Felt, estimator
 from twin.twin import Twin
@@ -36,6 +36,7 @@ SETTLE = 0.05  # s, in which all but a third is done: noise of one reading moves
 EASY = 5e-5  # m/N: pulling 1 N harder has to bring the points nearer by that; they move by 1 mm/N and more where they are pulled
 WITHIN = 1e-3  # m, mean distance: less is what a shape is estimated to
 CLOSE = 1e-5  # m, of Newton's last step: the next control step goes on with what it leaves, and a tangent serves longer
+OVER = 0.01  # N above the most pull, from which on it is paid out again: what CLOSE leaves is up to 6 mN
 STILL = 1e-4  # m: tendons asked for less than this have arrived
 
 
@@ -90,19 +91,32 @@ class ShapeController:
         dT = _pulls(apart, slope, T, limits)
         share = 1.0 - np.exp(-dt / SETTLE)
         change = loose - share * (response.length @ dT)
-        full = float(np.abs(change).max())
-        finger.hold(finger.shortening + change * min(1.0, limits.rate * dt / max(full, 1e-12)), CLOSE)
+        full, before = float(np.abs(change).max()), finger.shortening
+        finger.hold(before + change * min(1.0, limits.rate * dt / max(full, 1e-12)), CLOSE)
+        self._ease(before, limits.rate * dt)
         left = apart - slope @ dT
         error, residual = (float(np.linalg.norm(a, axis=-1).mean()) for a in (apart, left))
         reason = self._reason(T + dT, residual) if full < STILL and residual > WITHIN else None
         return Step(finger.shortening.copy(), error, residual, reason)
 
+    def _ease(self, before: np.ndarray, far: float) -> None:
+        """What the tangent missed the most pull by is paid out again, tendons then no further than `far` (m) from `before` (t,)."""
+        finger = self.finger
+        over = np.maximum(finger.tension - self.limits.most, 0.0)
+        if over.max() > OVER:
+            way = finger.response().length @ over
+            room = far - np.sign(way) * (finger.shortening - before)
+            # All by one share: a micrometre of one tendon alone is some tenths of a newton of its antagonist.
+            share = min(1.0, float((room / np.maximum(np.abs(way), 1e-12)).min()))
+            with suppress(SolveError):  # what was found before stands
+                finger.hold(finger.shortening + max(0.0, share) * way, CLOSE)
+
     def seen(self, resistance: np.ndarray, truth: np.ndarray | None) -> Seen:
         eps = strain(np.asarray(resistance, float), self.cords)
         if truth is not None:
             return Seen(self.finger.own(truth), eps)
-        shapes = self.eye.estimate(Felt(eps[None], self.finger.shortening[None], self.pushed))
-        return Seen(self.finger.rest + shapes.moved[0], eps)
+        moved = self.eye.displaced(Felt(eps[None], self.finger.shortening[None], self.pushed))
+        return Seen(self.finger.rest + moved[0], eps)
 
     def aim(self, wanted: np.ndarray, seen: Seen, points: np.ndarray, strains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is to be made small, (k, 3) m, and how it answers tensions, (k, 3, t) m/N, from the response of the points (P, 3, t)
@@ -121,6 +135,5 @@ def _pulls(apart: np.ndarray, slope: np.ndarray, tension: np.ndarray, limits: Li
     """dT (t,) N: the bounded least squares above, of as many rows as there are tendons."""
     n, nt = apart.size // apart.shape[-1], len(tension)
     S = slope.reshape(-1, nt)
-    R = cholesky(S.T @ S / n + EASY**2 * np.eye(nt))
-    b = solve_triangular(R, S.T @ apart.ravel() / n - EASY**2 * tension, trans=1)
-    return lsq_linear(R, b, (limits.least - tension, limits.most - tension), method="bvls").x
+    H, g = S.T @ S / n + EASY**2 * np.eye(nt), S.T @ apart.ravel() / n - EASY**2 * tension
+    return bounded(H, g, limits.least - tension, limits.most - tension)

@@ -16,7 +16,8 @@ from twin.laws import Laws
 
 
 class Wires:
-    """Between whoever commands tendons, all in one way, and a body. Keeps what was, from the first instant on.
+    """Between whoever commands tendons, all in one way, and a body. Keeps what was, from the first instant on, where an effect
+    looks back; else the last two instants, however long it goes on.
 
     Tensions and displacements go straight from one command to the next; a current holds from when it is commanded.
     """
@@ -51,6 +52,9 @@ class Wires:
         """What is true at the time last commanded: (n_tendon,) N, (n_tendon,) m, (n_marker, 3) m as their frame has them, and
         further signals (n_port,) by group."""
         self._seen.append((tension, displacement, markers, others or {}))
+        if not (self._acts or self._senses):
+            for kept in (self.time, self._told, self.base, self._seen):
+                del kept[:-2]
 
     def sensed(self) -> Signals:
         """What the sensors say of what was last noted, at the last of its samples."""

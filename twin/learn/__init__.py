@@ -5,6 +5,7 @@ hands.py        built hands, and the shape of all their fingers     demonstrate.
 lerobot.py      their files                                         ways.py         by shape, by strain, by bend
 policy.py       what a network wants: diffusion, cloning            teach.py        how it is taught
 drifting.py     sensors that drift over a day of trials             imitate.py      what was shown, done by tendons
+kept.py         trials kept to be looked at again
 """
 
 from twin.learn.remainder import Remainder

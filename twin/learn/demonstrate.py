@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -20,14 +20,13 @@ from threadpoolctl import threadpool_limits
 from twin.errors import DataError
 from twin.learn import lerobot
 from twin.learn.hands import Eye, aligned, built, fingers
+from twin.learn.kept import EVERY, FPS, SHOWN, Kept, Told, file_of, keep
 from twin.robots import Robot
 from twin.soft import HandBody
 from twin.tasks import Outcome, Person, Task, Trial
 
 FORMAT = "twin-demonstrations/1"
 ATTEMPTS = Path("meta/attempts.json")
-EVERY = 2  # steps a frame
-FPS = 25
 RESISTANCE, ENCODER = 0.3, 1e-5  # ohm, m: noise of a reading, as in the finger's samples
 HOPELESS = 20  # attempts a demonstration that is wanted
 
@@ -45,7 +44,12 @@ class Order:
         return {"format": FORMAT, "task": self.task.name(), "robot": self.robot.name, "n": self.n, "seed": self.seed}
 
 
-Attempt = tuple[Outcome, dict[str, np.ndarray]]  # what became of it, and its frames: every column (n, width)
+class Attempt(NamedTuple):
+    """What became of it, its frames (every column (n, width)), and what is kept to be looked at."""
+
+    outcome: Outcome
+    frames: dict[str, np.ndarray]
+    kept: Kept
 
 
 def stream(seed: int, attempt: int) -> np.random.Generator:
@@ -67,11 +71,13 @@ def demonstrate(order: Order, folder: Path, jobs: int, progress: Callable[[str],
             raise DataError(f"{kept} of {len(outcomes)} attempts at {order.task.name()!r} succeeded; this task cannot be shown so")
         batch = range(len(outcomes), len(outcomes) + min(jobs, order.n - kept))
         made = cast("list[Attempt]", Parallel(n_jobs=jobs, prefer="threads")(delayed(_attempt)(order, values, i) for i in batch))
-        for outcome, frames in made:
-            if outcome is Outcome.SUCCESS:
+        for one in made:
+            if one.outcome is Outcome.SUCCESS:
                 index = outcomes.count(Outcome.SUCCESS)
-                lerobot.write_episode(folder, index, frames, FPS)
-            outcomes.append(outcome)
+                lerobot.write_episode(folder, index, one.frames, FPS)
+                shown = replace(one.kept, told=replace(one.kept.told, number=index))
+                keep(file_of(folder, SHOWN, index), shown)
+            outcomes.append(one.outcome)
             write_json(folder / ATTEMPTS, order.manifest() | {"outcomes": outcomes})
         progress(f"{outcomes.count(Outcome.SUCCESS)} of {order.n}, {len(outcomes)} attempts")
     lerobot.write_meta(folder, f"{order.task.name()}: {order.task.about}", order.robot.name, FPS)
@@ -133,7 +139,9 @@ def _attempt(order: Order, values: dict[str, float], i: int) -> Attempt:
     state = np.stack(rows["state"])
     action = np.vstack([np.diff(state, axis=0), np.zeros((1, state.shape[1]))])
     columns = {f"observation.{name}": np.stack(rows[name]) for name in ("state", "resistance", "encoder")}
-    return trial.outcome(), columns | {"action": action, "object.pose": np.stack(rows["object"])}
+    columns |= {"action": action, "object.pose": np.stack(rows["object"])}
+    told = Told(order.task.name(), robot.name, order.seed, SHOWN, i)
+    return Attempt(trial.outcome(), columns, Kept.of(trial, told))
 
 
 def read_bench(true: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:

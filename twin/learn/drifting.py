@@ -15,7 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twin.learn.demonstrate import ENCODER, EVERY, RESISTANCE, read_bench
+from twin.learn.demonstrate import ENCODER, RESISTANCE, read_bench
+from twin.learn.kept import EVERY
 from twin.shape.drift import steadied
 from twin.shape.sensing import Sensed
 from twin.soft import HandBody

@@ -59,7 +59,7 @@ class Eye:
         """z (f, k) m of resistances (f, s) ohm and tendons shortened by (f, t) m."""
         z = []
         for eye, turn, r, d in zip(self.eyes, self.turns, resistance, shortening, strict=True):
-            moved = eye.estimate(Felt(strain(r, eye.body.cords)[None], d[None])).moved[0] @ turn.T
+            moved = eye.displaced(Felt(strain(r, eye.body.cords)[None], d[None]))[0] @ turn.T
             z.append(np.tensordot(eye.basis, moved - eye.mean, 2))
         return np.stack(z)
 

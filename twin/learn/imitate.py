@@ -23,9 +23,10 @@ from threadpoolctl import threadpool_limits
 
 from twin.errors import SolveError
 from twin.learn import lerobot
-from twin.learn.demonstrate import ENCODER, EVERY, RESISTANCE, body_of, read_bench
+from twin.learn.demonstrate import ENCODER, RESISTANCE, body_of, read_bench
 from twin.learn.drifting import gains, undone
 from twin.learn.hands import aligned, built, fingers
+from twin.learn.kept import EVERY
 from twin.learn.teach import Lesson, taught
 from twin.learn.ways import WAYS, way
 from twin.robots import Robot
@@ -139,17 +140,20 @@ class Actor:
                 yield trial
 
     def score(
-        self, trials: int, seed: int, jobs: int, progress: Callable[[str], None] = lambda words: None
+        self, trials: int, seed: int, jobs: int, progress: Callable[[str], None] = lambda words: None,
+        keep: Callable[[int, Trial], None] = lambda number, trial: None,
     ) -> Counter[Outcome]:  # fmt: skip
-        """What became of `trials` fresh trials; each has its own stream, by the seed and its number."""
+        """What became of `trials` fresh trials; each has its own stream, by the seed and its number, and is given to `keep`."""
         rngs = (np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3, i))) for i in range(trials))
         shares = np.linspace(0.0, 1.0, trials)
         found: Counter[Outcome] = Counter()
         work = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")
-        for outcome in work(delayed(self._outcome)(r, s) for r, s in zip(rngs, shares, strict=True)):
+        for outcome in work(delayed(self._outcome)(k, r, s, keep) for k, (r, s) in enumerate(zip(rngs, shares, strict=True))):
             found[cast(Outcome, outcome)] += 1
             progress(f"{found[Outcome.SUCCESS]} of {found.total()}")
         return found
 
-    def _outcome(self, rng: np.random.Generator, share: float) -> Outcome:
-        return self.act(rng, share).outcome()
+    def _outcome(self, number: int, rng: np.random.Generator, share: float, keep: Callable[[int, Trial], None]) -> Outcome:
+        trial = self.act(rng, share)
+        keep(number, trial)
+        return trial.outcome()

@@ -33,11 +33,11 @@ COUNTED = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int
 def write_episode(folder: Path, episode: int, frames: dict[str, np.ndarray], fps: int) -> None:
     """Columns (n, width) of one episode; `index` follows when all are there. Whole or not at all."""
     n = len(next(iter(frames.values())))
-    columns = {name: _lists(values) for name, values in frames.items()}
+    columns = {name: lists(values) for name, values in frames.items()}
     counted = (np.arange(n) / fps, np.arange(n), np.full(n, episode), np.zeros(n), np.zeros(n))
     for (name, kind), values in zip(COUNTED.items(), counted, strict=True):
         columns[name] = pa.array(values.astype(kind))
-    _write(_path(folder, episode), pa.table(columns))
+    write(_path(folder, episode), pa.table(columns))
 
 
 def write_meta(folder: Path, task: str, robot: str, fps: int) -> None:
@@ -48,7 +48,7 @@ def write_meta(folder: Path, task: str, robot: str, fps: int) -> None:
         table = pq.read_table(path)
         index = pa.array(np.arange(first, first + len(table)))
         table = table.set_column(table.schema.get_field_index("index"), "index", index)
-        _write(path, table)
+        write(path, table)
         tables.append(table)
         first += len(table)
     lengths = np.array([len(t) for t in tables])
@@ -60,13 +60,13 @@ def write_meta(folder: Path, task: str, robot: str, fps: int) -> None:
         "total_tasks": 1, "chunks_size": CHUNK, "data_files_size_in_mb": 100, "video_files_size_in_mb": 200, "fps": fps,
         "splits": {"train": f"0:{len(paths)}"}, "data_path": DATA, "video_path": None, "features": features,
     }  # fmt: skip
-    whole = {name: np.concatenate([_array(t[name]) for t in tables]).astype(float) for name in features}
+    whole = {name: np.concatenate([array(t[name]) for t in tables]).astype(float) for name in features}
     _text(folder / "meta/stats.json", {name: _stats(values) for name, values in whole.items()})
     columns = [_pandas("task_index", "int64", "int64"), _pandas("task", "unicode", "object")]
     words = {"index_columns": ["task"], "column_indexes": [], "columns": columns}
     tasks = pa.table({"task_index": pa.array([0]), "task": pa.array([task])}).replace_schema_metadata({"pandas": json.dumps(words)})
-    _write(folder / "meta/tasks.parquet", tasks)
-    _write(folder / EPISODES, _episodes(lengths, task))
+    write(folder / "meta/tasks.parquet", tasks)
+    write(folder / EPISODES, _episodes(lengths, task))
     _text(folder / "meta/info.json", info)
 
 
@@ -76,7 +76,7 @@ def read_episodes(folder: Path, names: tuple[str, ...]) -> list[dict[str, np.nda
         tables = [pq.read_table(path, columns=list(names)) for path in _paths(folder)]
     except (OSError, pa.ArrowInvalid) as fault:
         raise DataError(f"{folder}: an episode cannot be read ({fault}); make the demonstrations again") from None
-    return [{name: _array(table[name]).astype(float) for name in names} for table in tables]
+    return [{name: array(table[name]).astype(float) for name in names} for table in tables]
 
 
 def _paths(folder: Path) -> list[Path]:
@@ -111,11 +111,11 @@ def _pandas(name: str, kind: str, numpy: str) -> dict[str, str | None]:
     return {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
 
 
-def _lists(values: np.ndarray) -> pa.Array:
+def lists(values: np.ndarray) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(pa.array(values.astype(np.float32).ravel()), values.shape[1])
 
 
-def _array(column: pa.ChunkedArray) -> np.ndarray:
+def array(column: pa.ChunkedArray) -> np.ndarray:
     whole = column.combine_chunks()
     if pa.types.is_fixed_size_list(whole.type):
         return whole.flatten().to_numpy(zero_copy_only=False).reshape(len(whole), -1)
@@ -126,10 +126,11 @@ def _width(kind: pa.DataType) -> int:
     return kind.list_size if pa.types.is_fixed_size_list(kind) else 1
 
 
-def _write(path: Path, rows: pa.Table) -> None:
+def write(path: Path, rows: pa.Table, split: bool = False) -> None:
+    """Whole or not at all. `split`: bytes of a kind together, by which numbers that all differ take two thirds of the space."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    pq.write_table(rows, part, compression="zstd")
+    pq.write_table(rows, part, compression="zstd", use_dictionary=not split, use_byte_stream_split=split)
     part.replace(path)
 
 

@@ -76,6 +76,10 @@ class Estimator(ABC):
     def estimate(self, felt: Felt) -> Shapes:
         """The shapes behind what is felt."""
 
+    def displaced(self, felt: Felt) -> np.ndarray:
+        """Their points' displacements (n, P, 3) m alone, for a control loop that asks for nothing else."""
+        return self.estimate(felt).moved
+
 
 @cache
 def estimators() -> dict[str, type[Estimator]]:

@@ -98,9 +98,15 @@ class Modal(Learned):
 
     def decode(self, felt: Felt) -> tuple[np.ndarray, np.ndarray]:
         z, std = self.net(felt)
+        return self._at(z), np.sqrt(std**2 @ self.reach + REST**2)
+
+    def displaced(self, felt: Felt) -> np.ndarray:
+        return self._at(self.net(felt)[0]) if felt.pushed else super().displaced(felt)
+
+    def _at(self, z: np.ndarray) -> np.ndarray:
+        """Displacements (n, P, 3) m of the points at coordinates (n, k) m."""
         k, p = self.basis.shape[:2]
-        moved = self.mean + (z @ self.basis.reshape(k, -1)).reshape(-1, p, 3)
-        return moved, np.sqrt(std**2 @ self.reach + REST**2)
+        return self.mean + (z @ self.basis.reshape(k, -1)).reshape(-1, p, 3)
 
 
 class Network:

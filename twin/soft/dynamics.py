@@ -177,7 +177,7 @@ class Moving:
         return limb.room.pulled.length.copy()
 
     def _warnings(self) -> np.ndarray:
-        return np.array([w.number for w in self.data.warning])
+        return np.array(self.data.warning.number)
 
 
 def step_for(body: SoftBody) -> float:

@@ -22,7 +22,7 @@ PALM, THICK = (89, 94, 102), 5e-3  # colour, and m, of a hand's palm
 class SoftFigure:
     """As `Figure`. Its colours are the strain of the skin, the resistance of the cords, or the tension along the tendons."""
 
-    shades = ("strain", "resistance", "tension")
+    shades: tuple[str, ...] = ("strain", "resistance", "tension")
 
     def __init__(self, body: SoftBody) -> None:
         self._body, self._parts, self._statics = body, parts_of(body), SoftStatics(body)

@@ -50,7 +50,9 @@ class SoftStatics:
         self.straight_path: np.ndarray = np.linalg.norm(np.diff(body.paths, axis=1), axis=2).sum(axis=1)
         self.tip = grid.weights(np.array([[0.0, 0.0, body.cone.length]]))[0]
         self._seen, self._cords = grid.weights(body.seen), grid.weights(body.cord_paths.reshape(-1, 3))
-        self._cord_rest = np.linalg.norm(np.diff(body.cord_paths, axis=1), axis=2).sum(axis=1)
+        self._pieces = np.diff(body.cord_paths, axis=1)
+        self._cord_steps = np.diff(self._cords.reshape(*body.cord_paths.shape[:2], -1), axis=1)
+        self._cord_rest = np.linalg.norm(self._pieces, axis=2).sum(axis=1)
 
     @cached_property
     def skin(self) -> Skin:
@@ -129,11 +131,9 @@ class SoftStatics:
 
     def strain_slope(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Strains (s,) of the cords at nodes' displacements u (n_free, 3) m, and their derivatives (s, 3 n_free) 1/m."""
-        s, points, _ = self.body.cord_paths.shape
-        weights = self._cords.reshape(s, points, -1)
-        piece = np.diff(self.body.cord_paths + weights @ u, axis=1)
-        length = np.linalg.norm(piece, axis=2)
-        slope = np.einsum("spc,spn->snc", piece / length[..., None], np.diff(weights, axis=1)).reshape(s, -1)
+        piece = self._pieces + self._cord_steps @ u
+        length = np.sqrt((piece**2).sum(axis=2))
+        slope = (np.swapaxes(self._cord_steps, 1, 2) @ (piece / length[..., None])).reshape(len(piece), -1)
         return length.sum(axis=1) / self._cord_rest - 1.0, slope / self._cord_rest[:, None]
 
 

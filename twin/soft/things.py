@@ -67,6 +67,11 @@ class Thing:
         if not self.fixed and self.hinge is None and np.abs(centre).max() > CENTRED * self.mass:
             raise DataError(f"thing {self.name!r}: its parts move its centre of mass from its place; balance them, or fix it")
 
+    @property
+    def solids(self) -> tuple[Part, ...]:
+        """All that it is made of."""
+        return Part(self.shape, self.size, (0.0, 0.0, 0.0), UPRIGHT, self.mass, self.friction), *self.parts
+
     def add(self, spec: mujoco.MjSpec) -> None:
         body = spec.worldbody.add_body(name=self.name, pos=self.place, quat=self.turn)
         if self.hinge is not None:
@@ -74,8 +79,7 @@ class Thing:
             body.add_joint(name=self.name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=point, axis=axis)
         elif not self.fixed:
             body.add_freejoint(name=self.name)
-        first = Part(self.shape, self.size, (0.0, 0.0, 0.0), UPRIGHT, self.mass, self.friction)
-        for k, part in enumerate((first, *self.parts)):
+        for k, part in enumerate(self.solids):
             body.add_geom(
                 name=self.name if not k else f"{self.name} {k}", type=SHAPES[part.shape][0], size=[*part.size, 0.0, 0.0][:3],
                 pos=part.place, quat=part.turn, mass=part.mass, friction=[part.friction, 5e-3, 1e-4], contype=THING,

@@ -25,6 +25,7 @@ class Trial:
         self.start = self.seen = self.scene.see()
         self._skins = [surface(finger.cone, finger.cells) for finger in body.fingers]
         self._looks, self._lost, self._aside = [self.seen], False, 0.0
+        self._sunk = [0.0]
 
     @property
     def over(self) -> bool:
@@ -32,12 +33,14 @@ class Trial:
 
     def pull(self, shortening: np.ndarray) -> None:
         """STEP s on, tendons shortened to (finger, tendon) m by its end; a simulation that ends is an outcome, no error."""
-        leaves = self.task.leaves
+        leaves, sunk = self.task.leaves, self._sunk[-1]
         if leaves is not None and self.seen.time > leaves:
             self.scene.shift(TABLE, [0.0, 0.0, SINKS * STEP])
+            sunk += SINKS * STEP
         try:
             self.seen = self.scene.pull(shortening, STEP)
             self._looks.append(self.seen)
+            self._sunk.append(sunk)
         except SolveError:
             self._lost = True
 
@@ -51,6 +54,11 @@ class Trial:
             for k, skin in enumerate(self._skins)
         ]))  # fmt: skip
         self.pull(np.full_like(self.seen.shortening, PAID_OUT))
+
+    def frames(self, every: int) -> list[tuple[Sight, float]]:
+        """What was seen, at every so many steps and last, and by how many m the table had sunk then."""
+        last = len(self._looks) - 1
+        return [(self._looks[k], self._sunk[k]) for k in sorted({*range(0, last + 1, every), last})]
 
     def track(self) -> Track:
         looks: list[Sight] = self._looks

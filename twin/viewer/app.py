@@ -1,59 +1,46 @@
-"""The panel beside the picture, and the loop that serves both.
-
-Callbacks of the panel only note what is wanted: one loop solves and draws, since a solver serves one thread.
-"""
+"""The panel of twins beside the picture: by hand, or beside the trials of a set."""
 
 from __future__ import annotations
 
-import logging
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import viser
 
 from twin.effects import Drive
-from twin.errors import DataError, TwinError
-from twin.figure import Frames, Range
+from twin.errors import DataError
+from twin.figure import Frames
 from twin.measurements import Recording
 from twin.twin import Twin
-from twin.viewer.colours import bar
 from twin.viewer.controls import MOST_PUSH, Controls
-from twin.viewer.film import Film, captioned, plain, png, render
+from twin.viewer.panel import Panel
 from twin.viewer.replay import Track
 from twin.viewer.scene import set_up
 from twin.viewer.scrubber import Scrubber, between
 from twin.viewer.side import DESCRIBED, Side
 
-RATE = 60.0  # Hz, of the loop
-PAUSE = 0.25  # s: a clock that was held up for longer does not catch up
 TELLING, PLOTTING = 0.1, 1.0  # s between words and between plots of a running replay: a reader needs no more
 REPLAY, BY_HAND = "replay", "by hand"
-SHADES = {"tension": "tension of the tendons", "strain": "strain of the skin", "resistance": "resistance of the cords"}
-Sent = Callable[[str, bytes], None]
 
 
-class App:
+class App(Panel):
     """One twin in a browser or two beside each other, under the same sliders or beside the trials of a set."""
+
+    scrubber: Scrubber
 
     def __init__(self, server: viser.ViserServer, twins: Sequence[tuple[str, Twin]], recording: Recording | None = None) -> None:
         """`twins` by name, which is shown where there are two. Each is compared with its robot as described. Raises DataError for a
         robot that is not drawn, a set that does not drive it, or two robots that the same sliders do not drive."""
-        self.server = server
+        super().__init__(server)
         places = set_up(server, twins[0][1].robot.gravity, [twin.figure() for _, twin in twins])
         names = [f"{letter}: {name}" if len(twins) > 1 else "" for letter, (name, _) in zip("AB", twins, strict=False)]
         self.sides = [
             Side(server, twin, name, where, recording) for name, (_, twin), where in zip(names, twins, places, strict=True)
         ]
-        self._wanted, self._clock, self._told, self._plotted = True, time.monotonic(), 0.0, 0.0
-        self._asked: list[Callable[[], None]] = []  # what clicks and buttons left to the loop
-        self._film: tuple[Film, Sent] | None = None
-        self._resting = False
+        self._told, self._plotted, self._resting = 0.0, 0.0, False
         self._tracks: list[Track] = []
-        self._ranges: dict[str, Range] = {}
         self._panel(recording)
-        self.drawn = 0  # pictures sent
 
     # ---- the panel ------------------------------------------------------------------------------------------------------
 
@@ -62,21 +49,18 @@ class App:
         gui.configure_theme(control_width="medium", dark_mode=False)
         told = "\n\n".join(f"{f'{s.name}, ' if s.name else ''}**{s.twin.robot.title}**" for s in self.sides)
         gui.add_markdown(told + (f"\n\n{recording.title}  \n*{recording.source}*" if recording else ""))
-        self._bar = gui.add_html("")
-        self.words = gui.add_markdown("")
+        self._heading(gui)
         self._mode = gui.add_dropdown("show", (REPLAY, BY_HAND) if replay else (BY_HAND,), hint="a trial, or your own pulls")
-        shades = tuple(SHADES[s] for s in first.figure.shades)
-        self.shade = gui.add_dropdown("colour by", shades, visible=len(shades) > 1, hint="what the colours of the robot mean")
-        self.picture = gui.add_button("save picture", hint="of the scene as you see it, its colour bar beside it, as PNG")
-        for handle in (self._mode, self.shade):
-            self._changed(handle)
+        self._changed(self._mode)
+        self._colours(gui, first.figure.shades)
+        self._picture_button(gui)
         for side in self.sides:
             side.panel(gui, self._changed)
         self._replaying = gui.add_folder("replay", visible=replay is not None)
         lines = [s.name for s in self.sides] if len(self.sides) > 1 else [DESCRIBED, "as shown"]
         with self._replaying:
             self.scrubber = Scrubber(gui, replay.labels if replay else (), lines, self._changed)
-            self.film = gui.add_button("save film", hint="the trial from first to last at this speed, as GIF; keep the window open")
+            self._film_button(gui)
         self._driving = gui.add_folder("by hand", visible=replay is None)
         with self._driving:
             self.hand = Controls(gui, first.twin, first.figure, self._changed)
@@ -84,8 +68,6 @@ class App:
         self.hand.by.on_update(lambda _: self._asked.append(self._let_go))
         self.hand.rest.on_click(lambda _: self._asked.append(self._rest))
         self.hand.slack.on_click(lambda _: self._asked.append(self._let_go))
-        self.picture.on_click(lambda event: self._asked.append(lambda: self._save(event)))
-        self.film.on_click(lambda event: self._asked.append(lambda: self._filmed(event)))
         self.server.scene.on_click()(lambda event: self._asked.append(lambda: self._touched(event)))
 
     def _alike(self) -> None:
@@ -96,15 +78,6 @@ class App:
                 f"the same sliders do not drive {' and '.join(s.twin.robot.name for s in self.sides)}: they have other tendons; "
                 "look at one after the other"
             )
-
-    def _changed(self, handle: Any) -> None:
-        def note(event: viser.GuiEvent) -> None:
-            # What the loop itself moved needs no second picture.
-            if event.client is not None:
-                self._wanted = True
-
-        clicked = isinstance(handle, viser.GuiButtonGroupHandle | viser.GuiButtonHandle)
-        (handle.on_click if clicked else handle.on_update)(note)
 
     def _let_go(self) -> None:
         self.hand.let_go()
@@ -123,65 +96,14 @@ class App:
                 self.hand.take(hold)
                 return
 
-    # ---- pictures and films ---------------------------------------------------------------------------------------------
-
-    def _save(self, event: viser.GuiEvent) -> None:
-        if event.client is not None:
-            camera = event.client.camera
-            picture = render(event.client, int(camera.image_width), int(camera.image_height))
-            self._handed(event.client)("twin.png", png(captioned(picture, plain(self.words.content), self._bars)))
-
-    def _filmed(self, event: viser.GuiEvent) -> None:
-        if event.client is not None:
-            self.begin_film(event.client, self._handed(event.client))
-
-    def _handed(self, client: viser.ClientHandle) -> Sent:
-        return lambda name, content: client.send_file_download(name, content, save_immediately=True)
-
-    def begin_film(self, client: viser.ClientHandle, sent: Sent) -> None:
-        """Take a film of the chosen trial as `client` sees it; `sent` takes its name and content. Raises DataError for one of too
-        many pictures."""
-        self.scrubber.play.value = False
-        self._film = Film(client, float(self._tracks[0].time[-1]), self.scrubber.speed.value), sent
-
-    def _take(self, film: Film, sent: Sent) -> None:
-        self.scrubber.time.value = film.time
-        self._show_replay(0.0, True)
-        film.take(f"{self.scrubber.trial.value}\n{plain(self.words.content)}", self._bars)
-        self.words.content = f"taking a film: {film.time:.2f} of {film.end:.2f} s"
-        if film.done:
-            sent(f"{self.scrubber.trial.value}.gif", film.gif())
-            self._film, self._wanted = None, True
-
     @property
-    def filming(self) -> bool:
-        return self._film is not None
+    def _end(self) -> float:
+        return float(self._tracks[0].time[-1])
 
-    # ---- the loop -------------------------------------------------------------------------------------------------------
+    def _stand(self) -> None:
+        self._show_replay(0.0, True)
 
-    def run(self) -> None:
-        """Serve until interrupted."""
-        while True:
-            started = time.monotonic()
-            self.tick()
-            time.sleep(max(0.001, 1.0 / RATE - (time.monotonic() - started)))
-
-    def tick(self) -> None:
-        """Draw what is wanted by now."""
-        now = time.monotonic()
-        passed, self._clock = min(now - self._clock, PAUSE), now
-        try:
-            while self._asked:
-                self._wanted = True
-                self._asked.pop(0)()
-            if self._film is not None:
-                self._take(*self._film)
-            elif not self._shown(passed):
-                return
-        except TwinError as error:
-            self.words.content, self._film = f"**{error}**", None
-            return
-        self.drawn += 1
+    # ---- what is drawn --------------------------------------------------------------------------------------------------
 
     def _shown(self, passed: float) -> bool:
         """Whether anything was drawn."""
@@ -208,10 +130,10 @@ class App:
         if asked or not self._tracks:
             self._tracks = [side.track(k) for side in self.sides]
             self._replaying.visible, self._driving.visible = True, False
-            self.scrubber.time.max = max(round(float(self._tracks[0].time[-1]), 2), 0.01)
+            self.scrubber.until(self._end)
             self._coloured([t.frames for t in self._tracks])
-        t = self.scrubber.on(passed, float(self._tracks[0].time[-1]))
-        i, share = between(self._tracks[0], t)
+        t = self.scrubber.on(passed, self._end)
+        i, share = between(self._tracks[0].time, t)
         for side, track in zip(self.sides, self._tracks, strict=True):
             assert side.replay is not None
             measured, shown = side.replay.measured(k), track.frames.at(i, share)
@@ -255,15 +177,6 @@ class App:
             lines.append(_named(side) + _standing(shown) + _warm(side))
         self.words.content = "  \n".join(lines)
 
-    @property
-    def _shade(self) -> str:
-        return next(s for s, told in SHADES.items() if told == self.shade.value)
-
-    @property
-    def _bars(self) -> list[Range]:
-        """The ranges that are in the picture."""
-        return [r for shade, r in self._ranges.items() if shade in (self._shade, "temperature")]
-
     def _coloured(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
         """Ranges that hold all of `frames`, or up to the largest tension (N) and warmest spring (K) there may be."""
         figure, pulled = self.sides[0].figure, max(float(f.tension.max()) for f in frames)
@@ -271,10 +184,7 @@ class App:
         ranges = {shade: figure.coloured(shade, most) for shade in figure.shades}
         if any(f.temperature.size for f in frames):
             ranges["temperature"] = figure.coloured("temperature", max(warmest, *(f.temperature.max() for f in frames)))
-        self._ranges = ranges
-        now = "".join(bar(r) for r in self._bars)
-        if now != self._bar.content:
-            self._bar.content = now
+        self._range(ranges)
 
 
 def _named(side: Side) -> str:
@@ -294,22 +204,3 @@ def _warm(side: Side) -> str:
     springs = ", ".join(f"{T - 273.15:.0f}" for T in side.heated.temperature)
     how = "still warming or cooling" if side.heated.changing else "at rest: the clock waits"
     return f"; springs at {springs} degC, **{side.heated.time:.0f} s** after they were cold, {how}"
-
-
-def served(port: int, label: str | None = None) -> viser.ViserServer:
-    """A server on 127.0.0.1, at the first free port from `port` on."""
-    # Browsers open connections ahead and drop those they do not need, each of which would be a traceback.
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    return viser.ViserServer(host="127.0.0.1", port=port, label=label, verbose=False)
-
-
-def serve(twins: Sequence[tuple[str, Twin]], recording: Recording | None, port: int, told: Callable[[str], None]) -> None:
-    """Serve on 127.0.0.1, the first free port from `port` on, until interrupted; `told` the address once the picture stands."""
-    server = served(port, f"twin view {twins[0][1].robot.name}")
-    try:
-        app = App(server, twins, recording)
-        app.tick()
-        told(f"http://127.0.0.1:{server.get_port()}")
-        app.run()
-    finally:
-        server.stop()

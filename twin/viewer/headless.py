@@ -6,14 +6,12 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from twin.errors import DataError
-from twin.measurements import Recording
-from twin.twin import Twin
-from twin.viewer.app import App, served
 from twin.viewer.film import HIGH, WIDE
+from twin.viewer.panel import Make, Panel, served
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PORT = 8080  # or the next one that is free
@@ -22,21 +20,18 @@ OPENING = 60.0  # s for the browser to come
 QUIETLY = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 
 
-def take_film(
-    twins: Sequence[tuple[str, Twin]], recording: Recording, trial: str | None, speed: float, out: Path,
-    progress: Callable[[str], None],
-) -> None:  # fmt: skip
-    """Write a GIF of a trial (the first by default), `speed` times as fast, to `out`. Raises DataError for a trial that is not
-    there, and where no browser is found or draws."""
+def take_film(make: Make, trial: str | None, speed: float, out: Path, progress: Callable[[str], None]) -> None:
+    """Write a GIF of a panel's trial (its own by default), `speed` times as fast, to `out`. Raises DataError for a trial that is
+    not there, and where no browser is found or draws."""
     browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     if browser is None:
         raise DataError("no Chromium is found to draw a film: apt-get install chromium, or save the film in the viewer's page")
     server = served(PORT)
     try:
-        app = App(server, twins, recording)
+        app = make(server)
         if trial is not None and trial not in app.scrubber.labels:
             raise DataError(f"the set has no trial {trial!r}; it has {', '.join(app.scrubber.labels)}")
-        app.scrubber.trial.value, app.scrubber.speed.value = trial or app.scrubber.labels[0], speed
+        app.scrubber.trial.value, app.scrubber.speed.value = trial or app.scrubber.trial.value, speed
         app.tick()
         with tempfile.TemporaryDirectory() as profile:
             size = f"--window-size={WIDE + 500},{HIGH + 200}"
@@ -51,7 +46,7 @@ def take_film(
         server.stop()
 
 
-def _taken(app: App, out: Path, progress: Callable[[str], None]) -> None:
+def _taken(app: Panel, out: Path, progress: Callable[[str], None]) -> None:
     end = time.monotonic() + OPENING
     while not app.server.get_clients():
         if time.monotonic() > end:

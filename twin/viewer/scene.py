@@ -6,10 +6,12 @@ viser alone: mjviser draws no flex and gives a tendon one colour.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import trimesh
 import viser
+from trimesh.exchange.gltf import export_glb
 
 from twin.figure import Figure, Frames, Range
 from twin.viewer.colours import colours
@@ -42,8 +44,8 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer, figure: Figure, name: str, where: np.ndarray) -> None:
         """`name`, whose first letter tells it from others, is written beside it unless it is empty; `where` (3,) it stands."""
-        self._server, self._scale, self._figure, self._where = server, 1.0 / figure.height, figure, where
-        self._root = root = f"/robot_{name[:1] or 'shown'}"
+        self._server, self.scale, self._figure, self._where = server, 1.0 / figure.height, figure, where
+        self.root = root = f"/robot_{name[:1] or 'shown'}"
         scene = server.scene
         scene.add_frame(root, axes_length=0.12, axes_radius=0.004, position=tuple(where))
         if name:
@@ -60,24 +62,24 @@ class Scene:
 
     def _cylinders(self, figure: Figure) -> viser.BatchedMeshHandle:
         unit = trimesh.creation.cylinder(radius=1.0, height=2.0, sections=24)
-        n, size = len(figure.cylinders), self._scale * figure.cylinders
+        n, size = len(figure.cylinders), self.scale * figure.cylinders
         turn = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)).astype(np.float32)
         return self._server.scene.add_batched_meshes_simple(
-            f"{self._root}/links", unit.vertices.astype(np.float32), unit.faces.astype(np.uint32), turn,
+            f"{self.root}/links", unit.vertices.astype(np.float32), unit.faces.astype(np.uint32), turn,
             np.zeros((n, 3), np.float32), batched_scales=size[:, [0, 0, 1]].astype(np.float32), batched_colors=figure.colour,
             lod="off", flat_shading=True,
         )  # fmt: skip
 
     def _segments(self, kind: str) -> viser.LineSegmentsHandle:
         none = np.zeros((0, 2, 3), np.float32)
-        return self._server.scene.add_line_segments(f"{self._root}/{kind}", none, none.astype(np.uint8), thickness=CORD)
+        return self._server.scene.add_line_segments(f"{self.root}/{kind}", none, none.astype(np.uint8), thickness=CORD)
 
     def draw(self, shown: Frames, shade: str, over: Mapping[str, Range]) -> None:
         """The first instant of `shown`. `shade` is the field of it that colours its skin or, within a skin of glass, its cords or
         tendons; each field's colours are `over` its range, where it has one."""
         with self._server.atomic():
             if self._links is not None:
-                self._links.batched_positions = (self._scale * shown.place[0]).astype(np.float32)
+                self._links.batched_positions = (self.scale * shown.place[0]).astype(np.float32)
                 self._links.batched_wxyzs = shown.turn[0].astype(np.float32)
             self._line("tendons", shown.piece[0], shown.tension[0], over["tension"] if shade == "tension" else None)
             self._line("cords", shown.cord[0], shown.resistance[0], over["resistance"] if shade == "resistance" else None)
@@ -87,24 +89,27 @@ class Scene:
 
     def _line(self, kind: str, pieces: np.ndarray, values: np.ndarray, over: Range | None) -> None:
         line, shade = self._lines[kind], np.full((len(pieces), 3), DARK, np.uint8) if over is None else colours(values, over)
-        line.points = (self._scale * pieces).astype(np.float32)
+        line.points = (self.scale * pieces).astype(np.float32)
         line.colors = np.repeat(_linear(shade)[:, None], 2, axis=1)
         line.thickness = CORD if over is not None else THIN
 
     def _wrap(self, shown: Frames, over: Range | None) -> None:
         """The skin, by strain `over` a range, or as glass."""
-        points = self._scale * shown.skin[0]
+        points = self.scale * shown.skin[0]
         if over is not None:
             skin = trimesh.Trimesh(
                 points, self._figure.faces, vertex_colors=_linear(colours(shown.strain[0], over)), process=False
             )  # fmt: skip
-            self._skin = self._server.scene.add_mesh_trimesh(f"{self._root}/skin", skin)
+            # In shadow a colour would be read as another one.
+            self._skin = self._server.scene.add_glb(
+                f"{self.root}/skin", export_glb(skin, tree_postprocessor=_matte), receive_shadow=False
+            )
         elif self._skin is not None:
             self._skin.remove()
             self._skin = None
         if self._glass is None and over is None:
             self._glass = self._server.scene.add_mesh_simple(
-                f"{self._root}/glass", points.astype(np.float32), self._figure.faces, color=GLASS, opacity=0.25
+                f"{self.root}/glass", points.astype(np.float32), self._figure.faces, color=GLASS, opacity=0.25
             )
         if self._glass is not None:
             self._glass.visible = over is None
@@ -114,7 +119,7 @@ class Scene:
     def mark(self, predicted: np.ndarray, measured: np.ndarray, enlarged: float) -> None:
         """Markers (m, 3) m as predicted and as measured (NaN where they were not); arrows from one to the other, so many times as
         long as the residual, none for zero."""
-        s, there = self._scale, np.isfinite(measured).all(axis=1)
+        s, there = self.scale, np.isfinite(measured).all(axis=1)
         start, away = predicted[there], measured[there] - predicted[there]
         with self._server.atomic():
             self._predicted.points = (s * predicted).astype(np.float32)
@@ -126,13 +131,13 @@ class Scene:
         """An arrow that ends at (3,) m, along a force (3,) over the largest there is."""
         size, faces = float(np.linalg.norm(force)), len(self._figure.faces)
         rim = 0.0 if faces else float(self._figure.cylinders[:, 0].max())  # of a disk, which is pushed in its middle
-        end = self._scale * (at - rim * force / max(size, 1e-12))
+        end = self.scale * (at - rim * force / max(size, 1e-12))
         arrow = np.stack([end - LONGEST * force, end])[None] if size > 0.0 else np.zeros((0, 2, 3))
         self._push.points = arrow.astype(np.float32)
 
     def touched(self, shown: Frames, origin: np.ndarray, direction: np.ndarray) -> int | None:
         """Which of the figure's holds a ray (heights) meets first, if any."""
-        points = self._scale * self._figure.grips(shown) + self._where
+        points = self.scale * self._figure.grips(shown) + self._where
         along = (points - origin) @ direction
         off = np.linalg.norm(points - origin - along[:, None] * direction, axis=1)
         near = np.flatnonzero(off < max(1.3 * float(off.min()), NEAR))
@@ -140,6 +145,14 @@ class Scene:
 
 
 NEAR, WIDE = 0.02, 0.12  # heights off the ray: of points to choose the first from; beyond which nothing was meant
+
+
+def _matte(tree: dict[str, Any]) -> None:
+    """Silicone: what names no material is metal by the glTF standard, and nearly black where no lamp is mirrored."""
+    tree["materials"] = [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}}]
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            primitive["material"] = 0
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
