@@ -80,12 +80,15 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return said
 
 
-def judged(best: Any, *others: Any, small: tuple[str, ...] = ()) -> Any:
+def judged(best: Any, *others: Any, small: tuple[str, ...] = (), doubts: tuple[Any, ...] = ()) -> Any:
     base = weighed(BASE, -400.0, cost=1000.0, size=2.0)
     ranked = tuple(sorted((base, best, *others), key=lambda w: -w.score))
     sizes = {"friction": 1.0, "creep": 3.0}
     gated = SimpleNamespace(
-        best=best, doubts=(), small=tuple(SimpleNamespace(effect=e) for e in small), contribution=lambda study, e: sizes.get(e, 0.0)
+        best=best,
+        doubts=doubts,
+        small=tuple(SimpleNamespace(effect=e) for e in small),
+        contribution=lambda study, e: sizes.get(e, 0.0),
     )
     study = SimpleNamespace(progress=lambda words: None, bench=None, trials=[0])
     return judge(study, SimpleNamespace(base=base, all=ranked), gated, BARS)  # type: ignore[arg-type]
@@ -128,6 +131,17 @@ def test_a_second_robot_is_seen_only_where_no_effects_explain_as_much(staged: di
     found = judged(best)
     assert (found.verdict, found.claims, found.final.effects, found.rigs) == ("unexplained", (), BASE, staged["rigs"])
     assert (found.signs.after, found.signs.unseen) == (2.0, 0.07)  # those of the robot as it stays
+
+
+def test_no_second_robot_is_seen_where_one_of_two_effects_explains_as_much(staged: dict[str, Any]) -> None:
+    """Neither is claimed; the one lowers the cost by 700, the other by 900."""
+    doubt = SimpleNamespace(found=weighed(FRICTION, 0.0, cost=300.0), other=weighed(CREEP, -5.0, cost=100.0))
+    base = weighed(BASE, -400.0, cost=1000.0, size=2.0)
+    staged["rigs"] = SimpleNamespace(fall=800.0)
+    assert judged(base).rigs is staged["rigs"]
+    assert judged(base, doubts=(doubt,)).rigs is None
+    staged["rigs"] = SimpleNamespace(fall=901.0)
+    assert judged(base, doubts=(doubt,)).rigs is staged["rigs"]
 
 
 def test_effects_that_do_worse_on_trials_left_out_count_nothing(staged: dict[str, Any]) -> None:

@@ -64,7 +64,9 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     added = tuple(e for e in best.effects if e not in base.effects)
     signs = look(study, base, best, bars)
     apart = rigs(study.bench, study.trials, base.fit)
-    if apart is not None and apart.fall < base.fit.cost - best.fit.cost:  # what the effects explain needs no second robot
+    # What effects explain needs no second robot, also where data cannot tell which of two it is.
+    least = min(w.fit.cost for w in (best, *(w for d in gated.doubts for w in (d.found, d.other))))
+    if apart is not None and apart.fall < base.fit.cost - least:
         apart = None
     said = "unexplained" if apart else verdict(bool(added), signs, bars)
     if said in ("noise", "unexplained") and best is not base:
