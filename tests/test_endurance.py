@@ -39,15 +39,15 @@ def rig(started: Rig) -> Rig:
 
 
 def test_it_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
-    """Two seconds and two more are four: the plant to the last bit, the twins to what Newton leaves (10 um)."""
+    """One second and one more are two: the plant to the last bit, the twins to what Newton leaves (10 um)."""
     ends = {}
-    for name, stops in (("parts", (2.0, 4.0)), ("whole", (4.0,))):
+    for name, stops in (("parts", (1.0, 2.0)), ("whole", (2.0,))):
         for seconds in stops:
             assert not endure(tmp_path / name, seconds * SECONDS, 1, lambda words: None)
         ends[name] = begun(tmp_path / name, 1)[0]
-        assert ends[name].steps == round(4.0 / STEP)
+        assert ends[name].steps == round(2.0 / STEP)
     lines = read(tmp_path / "parts")
-    assert [round(m["hours"] / SECONDS) for m in lines] == [2, 4]
+    assert [round(m["hours"] / SECONDS) for m in lines] == [1, 2]
     assert lines[1]["wall"] > lines[0]["wall"]
     np.testing.assert_allclose(ends["parts"].plant.shortening, ends["whole"].plant.shortening, atol=1e-5)
     assert ends["parts"].plant.arrays["qpos"] == pytest.approx(ends["whole"].plant.arrays["qpos"], abs=2e-5)
