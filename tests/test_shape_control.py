@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear
 
 from twin.control import ConstantDirections, Limits, ShapeController, Step, StrainTracking, TipTracking
-from twin.control.bounded import bounded
 from twin.control.held import HeldFinger
 from twin.effects import named
 from twin.errors import DataError, SolveError
@@ -186,19 +184,6 @@ def test_a_finger_that_is_lost_is_not_led_on(monkeypatch: pytest.MonkeyPatch) ->
     np.testing.assert_array_equal(finger.shortening, there)
     with pytest.raises(SolveError, match="start it anew"):
         finger.response()
-
-
-def test_bounded_least_squares_are_scipy_s() -> None:
-    """On problems of which some have no bound in force and some all four; to rounding."""
-    rng, at = np.random.default_rng(0), set()
-    for _ in range(300):
-        A, b = rng.normal(size=(6, 4)) * 10.0 ** rng.uniform(-3.0, 0.0, 4), rng.normal(size=6)
-        size = np.abs(np.linalg.lstsq(A, b, rcond=None)[0]) * rng.uniform(0.1, 2.0)
-        low, high = -size * rng.uniform(0.1, 1.0, 4), size * rng.uniform(0.1, 1.0, 4)
-        found, known = bounded(A.T @ A, A.T @ b, low, high), lsq_linear(A, b, (low, high), method="bvls", tol=1e-14).x
-        np.testing.assert_allclose(found, known, atol=1e-7 * float(size.max()))
-        at.add(int(((found == low) | (found == high)).sum()))
-    assert at == {0, 1, 2, 3, 4}
 
 
 def test_a_control_loop_asks_for_the_points_alone() -> None:

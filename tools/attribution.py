@@ -1,13 +1,13 @@
 """Does the diagnosis name the right effect? Fresh sets of the independent bench, diagnosed one by one, scored and tabled.
 
-    python -m tools.attribution --out results/ [--sets 300] [--seed 5000] [--shard 0/2]
+    python -m tools.attribution --out results/ [--sets 300] [--seed 5000] [--jobs 2]
 
 Of the sets 15 % have no effect, 55 % one (all in turn), 15 % two, 15 % one that is not in the catalogue. Amplitudes are 1, 3 or 8
 sigma (marker noise, left after refitting the robot's own parameters); the robot is as described ("exact"), within its tolerances
 ("built"), or half again as far and with a soft spot and a slight helix that no parameter spans ("rough": some 0.1 sigma). Designs,
 mounts, instruments and what drives the tendons are drawn. Results go to results/attribution.jsonl as they come, so an interrupted
-run resumes; shards of one plan run side by side. An effect counts as named if it, or one of its class (effects such data hardly
-tell apart), is claimed with the largest contribution.
+run resumes; sets run side by side through joblib (`joblib.parallel_config` chooses where). An effect counts as named if it, or one
+of its class (effects such data hardly tell apart), is claimed with the largest contribution.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ import argparse
 import json
 import shutil
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from tools.attribution_table import table
 from tools.bench.day import MISMATCH, make_set
@@ -92,7 +94,7 @@ def plan(sets: int, seed: int) -> list[Case]:
     return out
 
 
-def run(case: Case, folder: Path) -> dict[str, object]:
+def run(case: Case, folder: Path) -> dict[str, Any]:
     """Make one set, diagnose it, keep what the table needs."""
     where = folder / f"set_{case.seed}"
     shutil.rmtree(where, ignore_errors=True)
@@ -144,25 +146,29 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--sets", type=int, default=300)
     parser.add_argument("--seed", type=int, default=5000)
-    parser.add_argument("--shard", default="0/1", help="I/N: every N-th set from the I-th")
+    parser.add_argument("--jobs", type=int, default=1, help="sets diagnosed side by side, each on one core")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     log = args.out / "attribution.jsonl"
     done = {r["seed"] for r in _rows(log)}
-    first, step = (int(x) for x in args.shard.split("/"))
-    for case in plan(args.sets, args.seed)[first::step]:
-        if case.seed in done:
-            continue
-        try:
-            row = run(case, args.out)
-        except (DataError, NoEquilibrium) as error:
-            print(f"seed {case.seed}: not made or not readable: {error}", flush=True)
+    left = (delayed(_tried)(case, args.out) for case in plan(args.sets, args.seed) if case.seed not in done)
+    for row in cast(Iterator[dict[str, Any]], Parallel(n_jobs=args.jobs, return_as="generator_unordered")(left)):
+        if "not made" in row:
+            print(f"seed {row['seed']}: not made or not readable: {row['not made']}", flush=True)
             continue
         with log.open("a") as file:
             file.write(json.dumps(row) + "\n")
-        print(f"{case.seed} {case.effects} {row['sigmas']} {case.design} {case.mismatch} -> {row['verdict']} {row['claims']} "
+        print(f"{row['seed']} {row['true']} {row['sigmas']} {row['design']} {row['mismatch']} -> {row['verdict']} {row['claims']} "
               f"({row.get('seconds', np.nan):.0f} s)", flush=True)  # fmt: skip
     print(table(_rows(log)))
+
+
+def _tried(case: Case, folder: Path) -> dict[str, Any]:
+    """What `run` tells of the set, or why there is none."""
+    try:
+        return run(case, folder)
+    except (DataError, NoEquilibrium) as error:
+        return {"seed": case.seed, "not made": str(error)}
 
 
 def _rows(log: Path) -> list[dict]:

@@ -7,7 +7,7 @@ pi.py        a PI law with limits, and the plain tension loop it makes
 rbf.py       the network that learns what neither foresees
 guard.py     what no spring may exceed: its voltage and its temperature
 shape.py     a soft finger's wanted points -> tendon shortenings; shape_baselines.py: what that is held against
-held.py      the twin of that finger as its tendons hold it, and what each of them changes; bounded.py: least squares within limits
+held.py      the twin of that finger as its tendons hold it, and what each of them changes
 
 Nothing here steps a robot or reads more of it than its sensors say.
 """

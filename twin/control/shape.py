@@ -14,7 +14,7 @@ letting the other go takes 5 um/N, so that on a finger that is not quite the twi
 more than told.
 
 Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078) projects vertex errors onto constant directions (`shape_baselines.py`); the
-tangent, the limits and the residual are ours.
+tangent, the limits and the residual are ours. Bounded least squares: Stark and Parker 1995, as in scipy.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
 
-from twin.control.bounded import bounded
 from twin.control.held import HeldFinger
 from twin.errors import DataError, SolveError
 from twin.sensors import strain
@@ -135,5 +136,6 @@ def _pulls(apart: np.ndarray, slope: np.ndarray, tension: np.ndarray, limits: Li
     """dT (t,) N: the bounded least squares above, of as many rows as there are tendons."""
     n, nt = apart.size // apart.shape[-1], len(tension)
     S = slope.reshape(-1, nt)
-    H, g = S.T @ S / n + EASY**2 * np.eye(nt), S.T @ apart.ravel() / n - EASY**2 * tension
-    return bounded(H, g, limits.least - tension, limits.most - tension)
+    R = cholesky(S.T @ S / n + EASY**2 * np.eye(nt))
+    b = solve_triangular(R, S.T @ apart.ravel() / n - EASY**2 * tension, trans=1)
+    return lsq_linear(R, b, (limits.least - tension, limits.most - tension), method="bvls").x
