@@ -144,6 +144,29 @@ def test_no_second_robot_is_seen_where_one_of_two_effects_explains_as_much(stage
     assert judged(base, doubts=(doubt,)).rigs is staged["rigs"]
 
 
+def test_what_stands_beside_either_of_two_that_data_cannot_tell_apart_is_claimed(
+    staged: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Alone it leaves much, which is the one's or the other's. Not so where one of the two explains nothing, or does without it."""
+    alone = replace(CLEAN, after=1.5, halved=False)
+    left = {BASE: alone, FRICTION: alone, BOTH: CLEAN, ("delay", "friction"): replace(CLEAN, after=0.03), ("creep", "delay"): CLEAN}
+    monkeypatch.setattr(stage, "look", lambda study, base, best, bars: left[best.effects])
+
+    def beside(other: tuple[str, ...]) -> Any:
+        return judged(weighed(FRICTION, -50.0), doubts=(SimpleNamespace(found=weighed(BOTH, 0.0), other=weighed(other, -5.0)),))
+
+    found = beside(("delay", "friction"))
+    assert (found.verdict, [c.effect for c in found.claims], found.final.effects) == ("partly_explained", ["friction"], FRICTION)
+    assert found.claims[0].probability > 0.99  # what it leaves alone has a cause that is known but for its name
+    assert found.signs.after == 1.5
+    assert beside(("creep", "delay")).verdict == "unexplained"
+    assert judged(weighed(FRICTION, -50.0)).verdict == "unexplained"
+    left["delay", "friction"] = replace(CLEAN, after=0.5)
+    assert (beside(("delay", "friction")).verdict, beside(("delay", "friction")).claims) == ("unexplained", ())
+    left["delay", "friction"], staged["rigs"] = CLEAN, SimpleNamespace(fall=1e4)
+    assert beside(("delay", "friction")).verdict == "unexplained"
+
+
 def test_effects_that_do_worse_on_trials_left_out_count_nothing(staged: dict[str, Any]) -> None:
     staged["worse"] = (FRICTION,)
     found = judged(weighed(FRICTION, 0.0))

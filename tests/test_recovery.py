@@ -6,14 +6,17 @@ curvature that varies along the body, another pre-sliding, a gap instead of a wa
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
 from tests.conftest import Day
+from tools.attribution_table import held
 from tools.bench.effects import all_effects
 from tools.bench.effects.effect import Effect as Truth
 from tools.bench.effects.tendon_backlash import TendonBacklash as Play
-from tools.compared import COMPARED, OTHER, distance
+from tools.compared import COMPARED, KNOWN, OTHER, distance
 from twin.bench import prepare
 from twin.calibrate import Fit, fit
 from twin.diagnose import Settings
@@ -65,6 +68,8 @@ def test_it_recovers_its_own_parameters(bench: Day, effect: str, design: str) ->
     values = next(e for e in fitted.model.twin.effects if e.id == effect).values
     true, found, tolerance = COMPARED[effect](truth, values)
     assert distance(true, found) < tolerance, f"true {true}, found {found}"
+    known = KNOWN[effect](asdict(truth)) if effect in KNOWN else {}  # what the benchmark holds intervals against: the same numbers
+    assert not known or distance(list(known.values()), [values.get(n, 0.0) for n in known]) < tolerance, f"{known}, found {values}"
     # White residuals have a mean square of one; of what stood above it the effect must take three quarters, whatever its law,
     # and nearly all where the law is the bench's own.
     before, after = (float(np.mean(f.z[f.z != 0] ** 2)) for f in (base, fitted))
@@ -84,3 +89,17 @@ def test_the_worn_drive_is_told_from_its_neighbours(bench: Day, seed: int, worn:
 
 def test_every_effect_of_the_catalogue_is_compared() -> None:
     assert set(COMPARED) | OF_OTHERS == set(catalogue())
+
+
+def test_an_interval_is_held_to_the_truth_it_is_about() -> None:
+    """90 %: 1.645 standard errors either way. What was not fitted has no interval; an effect not claimed has none to hold."""
+    friction, payload = ({"id": name, "parameters": {"strength": 4.0}} for name in ("tendon_friction", "tip_payload"))
+    claims = {"tendon_friction": {"mu": [0.44, 0.025], "bristle": [1e-4, 1e-5]}}
+    row = {"truth": [friction, payload], "parameters": claims}
+    assert held(row) == [True]  # 0.04 off, 0.0411 allowed
+    claims["tendon_friction"]["mu"] = [0.36, 0.024]
+    assert held(row) == [False]  # 0.0395 allowed
+    claims["tip_payload"] = {"mass": [4.1e-3, 1e-4]}
+    assert held(row) == [False, True]
+    claims["tip_payload"] = {"mass": [4.1e-3, 0.0]}
+    assert held(row) == [False]

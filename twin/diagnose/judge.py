@@ -69,10 +69,12 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     if apart is not None and apart.fall < base.fit.cost - least:
         apart = None
     said = "unexplained" if apart else verdict(bool(added), signs, bars)
+    either = _with_either(study, base, gated, added, bars) if said == "unexplained" and not apart else None
+    said = "partly_explained" if either else said
     if said in ("noise", "unexplained") and best is not base:
         signs = replace(signs, after=base.discrepancy.size, unseen=left_out(study, base.fit).structure, strained=())
         best, added = base, ()
-    claims = _claims(study, found, gated, best, added, signs, bars)
+    claims = _claims(study, found, gated, best, added, either or signs, bars)
     runners = _runners_up(found, gated, () if said == "unexplained" else added)
     doubts = tuple(w.effects for d in gated.doubts for w in (d.found, d.other))
     ambiguous = tuple(dict.fromkeys((*doubts, *_as_good(found, best))))
@@ -91,6 +93,17 @@ def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
     line = Spectrum.of(bench, trials).peak(best.fit.z.reshape(rest.shape) - best.discrepancy.mean)
     unseen = left_out(study, best.fit).structure
     return Signs(base.discrepancy.size, after, unseen, line, halved(study, base, best), bent or at_once or bool(limits), limits)
+
+
+def _with_either(study: Study, base: Weighed, gated: Gated, added: tuple[str, ...], bars: Thresholds) -> Signs | None:
+    """The signs of these effects beside one that was dropped only because data cannot tell it from its rival, where the two sets, with
+    it and with the rival, both explain the day: what the effects alone leave is then either's, and no reason to doubt them."""
+    for doubt in gated.doubts:
+        if added and set(added) <= set(doubt.found.effects) & set(doubt.other.effects):
+            signs = [look(study, base, w, bars) for w in (doubt.found, doubt.other)]
+            if all(verdict(True, s, bars) == "explained" for s in signs):
+                return signs[0]
+    return None
 
 
 def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
