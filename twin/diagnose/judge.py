@@ -96,8 +96,8 @@ def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
 
 
 def _with_either(study: Study, base: Weighed, gated: Gated, added: tuple[str, ...], bars: Thresholds) -> Signs | None:
-    """The signs of these effects beside one that was dropped only because data cannot tell it from its rival, where the two sets, with
-    it and with the rival, both explain the day: what the effects alone leave is then either's, and no reason to doubt them."""
+    """The signs of these effects beside one that was dropped only because data cannot tell it from its rival, where the two sets,
+    with it and with the rival, both explain the day: what the effects alone leave is then either's, and no reason to doubt them."""
     for doubt in gated.doubts:
         if added and set(added) <= set(doubt.found.effects) & set(doubt.other.effects):
             signs = [look(study, base, w, bars) for w in (doubt.found, doubt.other)]
