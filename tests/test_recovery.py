@@ -59,7 +59,9 @@ def fitted_alone(bench: Day, effect: str, seed: int = 5, design: str = "") -> tu
 OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "constructional_stretch", "joint_friction"}
 
 
-DAYS = [(effect, "") for effect in sorted(set(catalogue()) - OF_OTHERS)] + [("actuator_saturation", "by_length")]
+DAYS = [(effect, "") for effect in sorted(set(catalogue()) - OF_OTHERS)] + [
+    ("actuator_saturation", "by_length"), ("backbone_precurvature", "by_current"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("effect", "design"), DAYS)

@@ -24,8 +24,10 @@ from tools.bench.write import write_set
 from twin.bench import prepare
 from twin.body import Heating, Problem
 from twin.effects import Drive, Effect, Loads, Route, named
-from twin.equilibrium import Equilibrium
+from twin.equilibrium import ChainPath, Equilibrium
+from twin.equilibrium.figure import _stretched
 from twin.errors import DataError
+from twin.kinematics.heated import HeatedRobot
 from twin.measurements import Channel, Recording, Trial, read
 from twin.robots import load
 from twin.springs import Spring, pull
@@ -233,6 +235,62 @@ def test_it_is_the_rod_with_springs(mu: float) -> None:
     # 0.01 mm is what the description is good for; pre-sliding is another law there, for which 0.05 mm
     assert np.sqrt(np.mean(error**2)) < (1e-5 if mu == 0.0 else 5e-5)
     np.testing.assert_allclose(found.others["temperature"] - 273.15, truth.temperature, rtol=0, atol=2e-3 if mu == 0.0 else 0.05)
+
+
+def bent(mounted: float) -> tuple[Twin, Equilibrium]:
+    """A robot that rests with a radius of half a metre, and its springs put on it so."""
+    law = named("backbone_precurvature")({"about_y": 2.0, "mounted": mounted})
+    twin = Twin(load("continuum"), {}, (law,))
+    return twin, Equilibrium(twin.robot.chain(twin.body()))
+
+
+def cold(twin: Twin, solver: Equilibrium, current: float = 0.0) -> ChainPath:
+    """Unloaded; 20 s later, a current in all springs."""
+    heating = Heating(np.full(2, ROOM), springs())
+    currents = np.full((2, 3), current)
+    path = solver.solve(Problem(np.array([0.0, 20.0]), currents, Loads(np.zeros(3)), twin.laws.route, HEATED, heating=heating))
+    assert path.status.all()
+    return path
+
+
+def test_springs_put_on_a_bent_robot_begin_alike_and_leave_it_as_it_is() -> None:
+    """All pull with 0.7 N: three alike about the axis turn no disk. To 2 %, 18 um of a spring's 785 N/m: pressed by 2.1 N the bent
+    backbone bows between disks, and a path that bows is longer or shorter by some micrometres."""
+    twin, solver = bent(1.0)
+    path = cold(twin, solver)
+    np.testing.assert_allclose(path.tension[0], 0.7, rtol=2e-2)
+    rest = solver.solve(Problem(np.zeros(1), np.zeros((1, 3)), Loads(np.zeros(3))))
+    np.testing.assert_allclose(path.markers[0], rest.markers[0], rtol=0, atol=2e-4)
+    assert rest.markers[0, -1, 0] > 0.01  # m, the tip aside: bent indeed
+    np.testing.assert_allclose(solver.rest_path, rest.path[0], rtol=0, atol=1e-9)
+
+
+def test_springs_put_on_a_robot_held_straight_pull_it_straighter() -> None:
+    """The one that its bend leaves short pulls less, the two across from it more."""
+    twin, solver = bent(0.0)
+    path = cold(twin, solver)
+    off = path.path[0] - solver.straight_path
+    assert off[0] < -1e-4  # m
+    assert off[1] == pytest.approx(off[2], abs=1e-7)
+    assert path.tension[0, 0] < 0.7 - 0.1
+    assert path.tension[0, 1] > 0.7 + 0.05
+    kept = cold(*bent(1.0))
+    assert path.markers[0, -1, 0] < kept.markers[0, -1, 0] - 1e-3
+    half = cold(*bent(0.5))  # in between, whatever the springs' law
+    assert path.tension[0, 0] < half.tension[0, 0] < kept.tension[0, 0]
+
+
+@pytest.mark.parametrize("mounted", [0.0, 1.0])
+def test_heat_steps_find_the_springs_where_they_were_put_on(mounted: float) -> None:
+    """A robot that is led from outside stands where a prediction has it; its pictures show springs of that length."""
+    twin, solver = bent(mounted)
+    robot, path = HeatedRobot(twin, Loads(np.zeros(3)), ROOM), cold(twin, solver, 1.0)
+    np.testing.assert_allclose(robot.tension, path.tension[0], rtol=0, atol=1e-4)
+    robot.step(np.ones(3), 20.0)
+    np.testing.assert_allclose(robot.tension, path.tension[1], rtol=0, atol=1e-4)
+    shown = _stretched(path, 1, solver, twin.laws.route, springs())
+    assert shown is not None
+    np.testing.assert_allclose(shown[:, 0], robot.elongation, rtol=0, atol=1e-6)
 
 
 def test_steps_of_20_ms_are_stable_and_converge() -> None:

@@ -69,7 +69,7 @@ class Laws:
         )
         return Route(
             rubbing.mu, rubbing.presliding, sum(r.stretch for r in routes), beds.bedding, beds.bedding_tension,
-            bearing.bearing, bearing.bearing_presliding,
+            bearing.bearing, bearing.bearing_presliding, max((r.mounted for r in routes), default=0.0),
         )  # fmt: skip
 
     @property

@@ -61,9 +61,10 @@ def winding(problem: Problem, moving: Equilibrium, start: ChainPath) -> Winding:
     motors, springs = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
     stretch = max(problem.route.stretch, STIFFEST)
     records = no_springs(nt).records if problem.heating is None else problem.heating.spring.records
-    elongated = records["initial_elongation"] + path - moving.straight_path - problem.route.stretch * tension
+    began = np.where(springs, moving.spring_path(problem.route), moving.straight_path)
+    elongated = records["initial_elongation"] + path - began - problem.route.stretch * tension
     held = Held(
-        motors | springs, springs, np.zeros(nt), np.full(nt, stretch), moving.straight_path, float(problem.route.stretch),
+        motors | springs, springs, np.zeros(nt), np.full(nt, stretch), began, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
     )  # fmt: skip
     number = np.array([model.tendon(whole(t)).id if held.which[t] else -1 for t in range(nt)], np.int64)

@@ -84,7 +84,8 @@ class Loads:
 @dataclass(frozen=True)
 class Route:
     """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N). Of antagonists also by how much they bed in (m) and
-    over which tension (N), and the torque (N m) by which the joint that they turn rubs, with its pre-sliding turn (rad)."""
+    over which tension (N), and the torque (N m) by which the joint that they turn rubs, with its pre-sliding turn (rad).
+    `mounted`: the share of its rest bend that the body had when SMA springs were put on."""
 
     mu: float = 0.0
     presliding: float = 4e-4
@@ -93,6 +94,7 @@ class Route:
     bedding_tension: float = 1.0
     bearing: float = 0.0
     bearing_presliding: float = 1e-2
+    mounted: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ antagonists.py  a jaw between two tendons              held.py    a trial of ten
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import mujoco
 import numpy as np
 
 from twin.body import Path, Problem
-from twin.effects import Drive, Loads, Push
+from twin.effects import Drive, Loads, Push, Route
 from twin.equilibrium import held, pulled
 from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
@@ -135,13 +135,23 @@ class Equilibrium:
             command=command,
             by_length=by_length,
             by_spring=by_spring,
-            straight=self.straight_path,
+            straight=np.where(by_spring, self.spring_path(problem.route), self.straight_path),
             stretch=float(problem.route.stretch),
             least_stretch=STIFFEST,
             stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),
             ambient=np.zeros(n) if heating is None else np.array(heating.ambient, float),
             spring=_unsprung(nt) if heating is None else heating.spring.records,
         )
+
+    @cached_property
+    def rest_path(self) -> np.ndarray:
+        """(n_tendon,) m: path lengths of the unloaded body, bent as it rests, its tendons paid out."""
+        paid_out, held_by = -self.straight_path[None], (Drive.DISPLACEMENT,) * len(self.straight_path)
+        return self.solve(Problem(np.zeros(1), paid_out, Loads(np.zeros(3)), drives=held_by)).path[0]
+
+    def spring_path(self, route: Route) -> np.ndarray:
+        """(n_tendon,) m: path lengths at which springs are as long as at the start."""
+        return self.straight_path + route.mounted * (self.rest_path - self.straight_path) if route.mounted else self.straight_path
 
     def solve(self, problem: Problem) -> ChainPath:
         """Equilibria in the order of `twin.equilibrium.pulled`, or `held` where a tendon is held at a length or by a spring.

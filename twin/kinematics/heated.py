@@ -54,9 +54,9 @@ class HeatedRobot(LoadedRobot):
         self.now = State(start.tension[0] * self.softness, start.q[0].copy(), start.slip.copy(), start.distal.copy())
         self.factors = no_factors(c.n_slow, nt)
         self.warm = np.full(nt, self.temperature)
-        spring = self.heating.spring
+        spring, path = self.heating.spring, c.spring_path(self.route)
         self.held = Held(
-            np.ones(nt, bool), np.ones(nt, bool), c.straight_path.copy(), np.empty(nt), c.straight_path, self.route.stretch,
+            np.ones(nt, bool), np.ones(nt, bool), path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
             spring.initial_tension.copy(),
         )  # fmt: skip
