@@ -18,7 +18,8 @@ from twin.shape.estimator import Felt
 from twin.shape.modal import Network
 from twin.shape.sensing import sense
 from twin.soft.skin import Skin, distances, facing
-from twin.soft.statics import single_thread, turned
+from twin.soft.statics import turned
+from twin.threads import single_thread
 from twin.twin import Twin
 
 EVERY = 3  # clouds of a trial that count, to save time

@@ -18,8 +18,8 @@ from tools.endurance.course import MINUTE
 from tools.endurance.log import append, begun, line, save, table
 from tools.endurance.rig import Look, Rig
 from twin.errors import SolveError
-from twin.soft.statics import single_thread
 from twin.tasks import STEP
+from twin.threads import single_thread
 
 OF_A_MINUTE = round(MINUTE / STEP)
 

@@ -18,7 +18,8 @@ from twin.factory.points import named_points
 from twin.factory.solve import CLOSE, hang, march, weight_of
 from twin.soft import SoftStatics
 from twin.soft.solid import Solid
-from twin.soft.statics import single_thread, turned
+from twin.soft.statics import turned
+from twin.threads import single_thread
 from twin.twin import Twin
 
 

@@ -36,6 +36,7 @@ from twin.errors import DataError
 from twin.evaluate import KIND, UNIT, headline, rms
 from twin.measurements import Recording
 from twin.shape.under_hand import under_hand
+from twin.threads import single_thread
 from twin.twin import Twin
 
 Hear = Callable[[Looked], None]
@@ -59,9 +60,10 @@ def diagnose(
     bench = prepare(recording, twin.robot)
     if len(bench.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one sealed")
-    looked = looked_at(bench, twin, settings, progress)
-    hear(looked)
-    return _by_hand(recording, _sealed(looked, twin, settings, progress))
+    with single_thread():
+        looked = looked_at(bench, twin, settings, progress)
+        hear(looked)
+        return _by_hand(recording, _sealed(looked, twin, settings, progress))
 
 
 def _sealed(looked: Looked, twin: Twin, settings: Settings, progress: Progress) -> Diagnosis:

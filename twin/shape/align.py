@@ -34,7 +34,8 @@ from twin.shape.sensing import Sensed, feeling, sense
 from twin.shape.sensor_fit import FREE, PUSHED, Known, fit_sensors
 from twin.soft import SoftBody, SoftStatics
 from twin.soft.skin import Skin, distances, facing
-from twin.soft.statics import single_thread, turned
+from twin.soft.statics import turned
+from twin.threads import single_thread
 from twin.twin import Twin, simulate
 
 STEP = 1e-4  # m in z, of differences

@@ -27,7 +27,7 @@ from twin.shape.estimator import Estimator, Felt, Shapes, own_error
 from twin.shape.free import far, wrong_by
 from twin.soft import Cone, SoftStatics
 from twin.soft.solid import Solid
-from twin.soft.statics import single_thread
+from twin.threads import single_thread
 from twin.twin import Twin
 
 HANDS, RANK = 4000, 60  # hands drawn for the prior, components kept: the others push with less than 1 % of it

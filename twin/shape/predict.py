@@ -14,7 +14,8 @@ from twin.shape.drift import steadied
 from twin.shape.estimator import Estimator, Felt, Shapes
 from twin.shape.sensing import Sensed, sense
 from twin.soft.skin import Skin
-from twin.soft.statics import single_thread, turned
+from twin.soft.statics import turned
+from twin.threads import single_thread
 
 PLAIN = Bands()
 

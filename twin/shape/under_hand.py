@@ -22,7 +22,8 @@ from twin.shape.modal import Network
 from twin.shape.sensing import Sensed, feeling, sense
 from twin.soft import SoftStatics
 from twin.soft.skin import Skin
-from twin.soft.statics import single_thread, turned
+from twin.soft.statics import turned
+from twin.threads import single_thread
 from twin.twin import Twin
 
 MARKER = 4e-4  # m, noise of a marker whose channel declares none

@@ -20,8 +20,9 @@ from twin.soft.flex import flex, place
 from twin.soft.metric import metric
 from twin.soft.newton import Parts
 from twin.soft.room import room_for
-from twin.soft.statics import SoftPath, SoftStatics, Trial, single_thread, turned
+from twin.soft.statics import SoftPath, SoftStatics, Trial, turned
 from twin.soft.stepping import DONE, FASTEST, INVERTED, LOST, UNBALANCED, Engine, Limb, Touch, advance, once, shape
+from twin.threads import single_thread
 
 LONGEST, SHORTEST, PER_DAMPING = (
     4e-3,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
 from twin.effects import Drive, Loads
@@ -19,6 +18,7 @@ from twin.soft.body import SoftBody
 from twin.soft.newton import Found, Kept, Way, along
 from twin.soft.room import parts_of, room_for, undeformed
 from twin.soft.skin import Skin, stand
+from twin.threads import single_thread
 
 SMALLEST = 1e-3  # of a step between two samples
 REMEMBERED = 64  # trials, of some 300 kB
@@ -135,16 +135,6 @@ class SoftStatics:
         length = np.sqrt((piece**2).sum(axis=2))
         slope = (np.swapaxes(self._cord_steps, 1, 2) @ (piece / length[..., None])).reshape(len(piece), -1)
         return length.sum(axis=1) / self._cord_rest - 1.0, slope / self._cord_rest[:, None]
-
-
-def single_thread() -> AbstractContextManager[object]:
-    """Small systems by one thread each: with two, these take tens of times longer on a busy machine."""
-    return _threads().limit(limits=1)
-
-
-@cache
-def _threads() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 def turned(angle: float) -> np.ndarray:
