@@ -9,7 +9,7 @@ import pytest
 
 from twin.body import Heating, Path, Problem
 from twin.dynamics import Dynamics
-from twin.effects import Drive, Loads, Route
+from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.equilibrium.lengths import COMPRESSION, STIFFEST
 from twin.robots import load
@@ -115,3 +115,18 @@ def test_heated_springs_pull_as_they_do_in_statics() -> None:
     assert off[-1] < 5e-5
     np.testing.assert_allclose(moved.tension[-1], still.tension[-1], rtol=0, atol=2e-3)  # N, as 50 um
     np.testing.assert_allclose(moved.others["temperature"], still.others["temperature"], rtol=0, atol=0.05)  # K, as before
+
+
+@pytest.mark.parametrize("mounted", [0.0, 1.0])
+def test_springs_rest_on_a_bent_robot_as_they_were_put_on_it(mounted: float) -> None:
+    """Cold springs on a robot that rests bent: motion begins where statics has it, and stays."""
+    law, t = named("backbone_precurvature")({"about_y": 1.0, "mounted": mounted}), np.arange(0.0, 1.0, 0.02)
+    body = load("continuum").chain(load("continuum").build({"damping.time": 0.03}))
+    body.spec.option.timestep = 1e-3
+    law.edit(body)
+    heating = Heating(np.full(len(t), ROOM), load("continuum").springs(3))
+    problem = Problem(t, np.zeros((len(t), 3)), HANGING, law.route(), (Drive.CURRENT,) * 3, heating=heating)
+    moved, still = (solver.solve(problem) for solver in (Dynamics(body), Equilibrium(body)))
+    assert moved.ended == ""
+    assert (np.ptp(still.tension[0]) < 0.05) == bool(mounted)  # N: put on alike they pull alike, but for the payload's press
+    np.testing.assert_allclose(moved.tension, still.tension, rtol=0, atol=2e-3)  # N, as above

@@ -43,6 +43,7 @@ class HeatedRobot(LoadedRobot):
     def rest(self) -> None:
         """As at the start of a trial: springs at the room's temperature, the straight robot, then its loads. Raises SolveError."""
         nt, c = self.n_tendon, self.solver
+        path = c.spring_path(self.route)
         start = c.solve(
             Problem(
                 np.zeros(1), np.zeros((1, nt)), self.loads, self.route, (Drive.CURRENT,) * nt, heating=self.heating,
@@ -54,7 +55,7 @@ class HeatedRobot(LoadedRobot):
         self.now = State(start.tension[0] * self.softness, start.q[0].copy(), start.slip.copy(), start.distal.copy())
         self.factors = no_factors(c.n_slow, nt)
         self.warm = np.full(nt, self.temperature)
-        spring, path = self.heating.spring, c.spring_path(self.route)
+        spring = self.heating.spring
         self.held = Held(
             np.ones(nt, bool), np.ones(nt, bool), path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
