@@ -137,10 +137,18 @@ class Page:
         box.fill(value)
         box.press("Enter")
 
+    def drop_down(self, label: str) -> Any:
+        """A drop-down list."""
+        row = self.page.locator("label", has_text=label).first.locator("xpath=ancestor::div[.//input][1]")
+        return row.locator("input").first
+
+    def chosen(self, label: str) -> str:
+        """What of a drop-down list is shown."""
+        return self.drop_down(label).input_value()
+
     def choose(self, label: str, value: str) -> None:
         """Of a drop-down list."""
-        row = self.page.locator("label", has_text=label).first.locator("xpath=ancestor::div[.//input][1]")
-        row.locator("input").first.click()
+        self.drop_down(label).click()
         self.page.get_by_role("option", name=value).click()
 
     def button(self, name: str) -> Any:

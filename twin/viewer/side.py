@@ -38,8 +38,9 @@ class Side:
         """The switches; `changed` is told of every handle that a person may move."""
         better = bool(self.twin.effects or self.twin.values)
         with gui.add_folder(f"twin {self.name}".strip(), visible=better):
-            self.which = gui.add_button_group("predicted", (DESCRIBED, BETTER), hint="before and after a diagnosis")
-            self.which.value = BETTER if better else DESCRIBED
+            first = BETTER if better else DESCRIBED
+            names = (DESCRIBED, BETTER)
+            self.which = gui.add_dropdown("predicted", names, initial_value=first, hint="before and after a diagnosis")
             self.effects = {
                 e.id: gui.add_checkbox(e.id.replace("_", " "), True, hint=f"moves with {e.moves_with}") for e in self.twin.effects
             }
