@@ -55,16 +55,15 @@ def hang(spec: mujoco.MjSpec, body: HingeChain, which: np.ndarray) -> None:
             tendon.wrap_site(site)
 
 
-def winding(problem: Problem, moving: Equilibrium, start: ChainPath, put_on: np.ndarray) -> Winding:
-    """Of tendons that rest as in `start`, where MuJoCo's data is; at paths `put_on` (n_tendon,) m springs are as they began."""
+def winding(problem: Problem, moving: Equilibrium, start: ChainPath, zero: np.ndarray) -> Winding:
+    """Of tendons that rest as in `start`, where MuJoCo's data is; `zero` (n_tendon,) m as `Equilibrium.zero_path`."""
     model, data, nt, path, tension = moving.model, moving.data, problem.command.shape[1], start.path[0], start.tension[0]
     motors, springs = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
     stretch = max(problem.route.stretch, STIFFEST)
     records = no_springs(nt).records if problem.heating is None else problem.heating.spring.records
-    began = np.where(springs, put_on, moving.straight_path)
-    elongated = records["initial_elongation"] + path - began - problem.route.stretch * tension
+    elongated = records["initial_elongation"] + path - zero - problem.route.stretch * tension
     held = Held(
-        motors | springs, springs, np.zeros(nt), np.full(nt, stretch), began, float(problem.route.stretch),
+        motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
     )  # fmt: skip
     number = np.array([model.tendon(whole(t)).id if held.which[t] else -1 for t in range(nt)], np.int64)

@@ -135,7 +135,7 @@ class Equilibrium:
             command=command,
             by_length=by_length,
             by_spring=by_spring,
-            straight=np.where(by_spring, self.spring_path(problem.route), self.straight_path),
+            straight=self.zero_path(problem.route, by_spring),
             stretch=float(problem.route.stretch),
             least_stretch=STIFFEST,
             stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),
@@ -149,9 +149,11 @@ class Equilibrium:
         paid_out, held_by = -self.straight_path[None], (Drive.DISPLACEMENT,) * len(self.straight_path)
         return self.solve(Problem(np.zeros(1), paid_out, Loads(np.zeros(3)), drives=held_by)).path[0]
 
-    def spring_path(self, route: Route) -> np.ndarray:
-        """(n_tendon,) m: path lengths at which springs are as long as at the start."""
-        return self.straight_path + route.mounted * (self.rest_path - self.straight_path) if route.mounted else self.straight_path
+    def zero_path(self, route: Route, by_spring: np.ndarray) -> np.ndarray:
+        """(n_tendon,) m: path lengths at which motors stand at zero, and springs are as long as when they were put on."""
+        if not (route.mounted and by_spring.any()):
+            return self.straight_path
+        return self.straight_path + route.mounted * by_spring * (self.rest_path - self.straight_path)
 
     def solve(self, problem: Problem) -> ChainPath:
         """Equilibria in the order of `twin.equilibrium.pulled`, or `held` where a tendon is held at a length or by a spring.

@@ -43,7 +43,8 @@ class HeatedRobot(LoadedRobot):
     def rest(self) -> None:
         """As at the start of a trial: springs at the room's temperature, the straight robot, then its loads. Raises SolveError."""
         nt, c = self.n_tendon, self.solver
-        path = c.spring_path(self.route)
+        sprung = np.ones(nt, bool)
+        path = c.zero_path(self.route, sprung)
         start = c.solve(
             Problem(
                 np.zeros(1), np.zeros((1, nt)), self.loads, self.route, (Drive.CURRENT,) * nt, heating=self.heating,
@@ -57,7 +58,7 @@ class HeatedRobot(LoadedRobot):
         self.warm = np.full(nt, self.temperature)
         spring = self.heating.spring
         self.held = Held(
-            np.ones(nt, bool), np.ones(nt, bool), path.copy(), np.empty(nt), path, self.route.stretch,
+            sprung.copy(), sprung, path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
             spring.initial_tension.copy(),
         )  # fmt: skip
