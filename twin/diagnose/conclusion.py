@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 from twin.diagnose.gate import Gated
 from twin.diagnose.judge import Judgement
+from twin.diagnose.objective import noise_under
 from twin.diagnose.screen import Screening
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
+from twin.errors import SolveError
+from twin.residual import Noise
 from twin.twin import Twin
 
 
@@ -32,6 +35,14 @@ class Conclusion:
     def final(self) -> Twin:
         """The twin the verdict leaves in force."""
         return self.judged.final.fit.model.twin
+
+    def noise(self) -> Noise:
+        """The noise of the fitted trials under the final twin; that of the objective where a command beside theirs has no
+        equilibrium."""
+        try:
+            return noise_under(self.study.objective, self.judged.final.fit.evaluation)
+        except SolveError:
+            return self.study.objective.whitener.noise
 
     def without(self, effect: str) -> Twin:
         """The final twin less one effect, everything else fitted again; itself where the effect is not claimed."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.bench import Bench
-from twin.calibrate import Model, Objective, fit
+from twin.calibrate import Evaluation, Model, Objective, fit
 from twin.diagnose.diagnosis import Settings
 from twin.effects import Drive
 from twin.evaluate import TYPICAL
@@ -30,6 +30,17 @@ def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings
     G = sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, G)
     return start.model, Objective(bench, fitted, Whitener(noise, measured, G, command), settings.jobs), notes
+
+
+def noise_under(objective: Objective, found: Evaluation) -> Noise:
+    """The noise of the fitted trials, found anew under a model with its effects. Raises SolveError as `sensitivity`.
+
+    The first calibration knows no effect: what ages, or remembers, between two repeats of a trial is noise to it.
+    """
+    bench, trials, twin = objective.bench, objective.trials, found.model.twin
+    predicted = [readings(bench, report(twin.effects, found.traces[k].true)) for k in trials]
+    G = sensitivity(bench, trials, twin, predicted, found.traces)
+    return estimate_noise(bench, trials, found.raw, G)[0]
 
 
 def sensitivity(

@@ -79,16 +79,18 @@ class Opened:
         )  # fmt: skip
 
     def _floor(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
-        """RMS error a perfect twin would still show, by group; NaN where no trial can be predicted."""
+        """RMS error a perfect twin would still show, by group; NaN where no trial can be predicted. By the noise as it is once the
+        effects are known: what they change between repeated trials would raise it else."""
         squared: dict[str, list[float]] = {g: [] for g in groups}
         for conclusion, trials in self.parts:
+            noise = conclusion.noise()
             for k in (k for k in trials if k in kept):
                 at = predicted(conclusion.final, self.bench, [k])
                 try:
                     G = sensitivity(self.bench, [k], conclusion.final, at)
                 except SolveError:
                     continue  # a neighbouring command has no equilibrium: this trial says nothing of the floor
-                for g, value in conclusion.study.objective.whitener.noise.floor(self.bench, G).items():
+                for g, value in noise.floor(self.bench, G).items():
                     squared[g].append(value**2)
         return {g: float(np.sqrt(np.mean(s))) if s else float("nan") for g, s in squared.items()}
 
