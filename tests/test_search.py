@@ -54,6 +54,20 @@ def test_three_effects_are_found_together(monkeypatch: pytest.MonkeyPatch) -> No
     assert world.found().best.effects == ("creep", "drift", "friction")
 
 
+@pytest.mark.parametrize(("share", "tried"), [(0.24, False), (0.26, True)])
+def test_a_pattern_that_promises_a_quarter_of_what_counts_is_refitted(
+    monkeypatch: pytest.MonkeyPatch, share: float, tried: bool
+) -> None:
+    """A first-order pattern may tell half the size of what bends far, a quarter in square; whether it pays is the refit to say."""
+    world = World(monkeypatch, {"asymmetry": 500.0})
+    few = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100)})  # material 1.7, so that evidence, 12, is the bar
+    monkeypatch.setattr(
+        stage, "rank", lambda *args, **named: [SimpleNamespace(effect="asymmetry", start=None, gain=share * Thresholds().accept)]
+    )
+    world.found(few)
+    assert (("asymmetry",) in world.refitted) == tried
+
+
 def test_patterns_are_taken_anew_of_what_promises_anything_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "tilt": 0.0})
     world.found()

@@ -56,7 +56,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
 def _extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
     """Into `fresh`: `member` with each of the effects whose pattern promises most."""
     for candidate in rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks):
-        if candidate.gain < max(bars.accept, PROMISE * _material(study, base, member, bars.visible)):
+        if candidate.gain < PROMISE * max(bars.accept, _material(study, base, member, bars.visible)):
             continue
         name = " + ".join((*member.effects, candidate.effect))
         if not study.budget.allows(name):

@@ -208,8 +208,8 @@ HOPELESS = _row(
     "error, and that is less than what the best leaves", "judgement",
 )  # fmt: skip
 PROMISE = _row(
-    "PROMISE", 0.25, "of a material gain", "what a first-order pattern must promise to be worth a refit",
-    "derivation: a pattern right to half in size promises a quarter in square",
+    "PROMISE", 0.25, "of what an effect must bring, in evidence and in size", "what a first-order pattern must promise to be "
+    "worth a refit", "derivation: a pattern right to half in size promises a quarter in square",
 )  # fmt: skip
 ROUGHLY = _row(
     "ROUGHLY", 2e-4, "of the cost", "the last step's fall at which a refit is weighed; what is left is second order in it",
