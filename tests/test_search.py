@@ -60,7 +60,7 @@ def test_a_pattern_that_promises_a_quarter_of_what_counts_is_refitted(
 ) -> None:
     """A first-order pattern may tell half the size of what bends far, a quarter in square; whether it pays is the refit to say."""
     world = World(monkeypatch, {"asymmetry": 500.0})
-    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100)})  # material 1.7, so that evidence, 12, is the bar
+    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100)})  # so that evidence is the bar
     monkeypatch.setattr(
         stage, "rank", lambda *args, **named: [SimpleNamespace(effect="asymmetry", start=None, gain=share * Thresholds().accept)]
     )
