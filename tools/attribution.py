@@ -1,13 +1,13 @@
 """Does the diagnosis name the right effect? Fresh sets of the independent bench, diagnosed one by one, scored and tabled.
 
-    python -m tools.attribution --out results/ [--sets 300] [--seed 5000] [--jobs 2]
+    python -m tools.attribution --out results/ [--sets 300] [--seed 5000] [--jobs 2] [--backend ray]
 
 Of the sets 15 % have no effect, 55 % one (all in turn), 15 % two, 15 % one that is not in the catalogue. Amplitudes are 1, 3 or 8
 sigma (marker noise, left after refitting the robot's own parameters); the robot is as described ("exact"), within its tolerances
 ("built"), or half again as far and with a soft spot and a slight helix that no parameter spans ("rough": some 0.1 sigma). Designs,
 mounts, instruments and what drives the tendons are drawn. Results go to results/attribution.jsonl as they come, so an interrupted
-run resumes; sets run side by side through joblib (`joblib.parallel_config` chooses where). An effect counts as named if it, or one
-of its class (effects such data hardly tell apart), is claimed with the largest contribution.
+run resumes; sets run side by side in processes here, or on a cluster (`--backend ray`, by RAY_ADDRESS). An effect counts as named
+if it, or one of its class (effects such data hardly tell apart), is claimed with the largest contribution.
 """
 
 from __future__ import annotations
@@ -19,21 +19,23 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from tools.attribution_table import table
 from tools.bench.day import MISMATCH, make_set
 from tools.bench.effects import all_effects
 from tools.bench.rod import NoEquilibrium
+from tools.cluster import BACKENDS, backend
 from tools.compared import COMPARED, SAME, distance
 from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.effects import catalogue
 from twin.errors import DataError, SolveError
 from twin.measurements import read
 from twin.robots import load
+from twin.spread import as_they_come
 from twin.twin import Twin
 
 AMPLITUDES = (1.0, 3.0, 8.0)
@@ -147,12 +149,20 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=300)
     parser.add_argument("--seed", type=int, default=5000)
     parser.add_argument("--jobs", type=int, default=1, help="sets diagnosed side by side, each on one core")
+    parser.add_argument("--backend", choices=BACKENDS, default="loky", help="processes here, or Ray: RAY_ADDRESS, else a local one")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     log = args.out / "attribution.jsonl"
     done = {r["seed"] for r in _rows(log)}
     left = (delayed(_tried)(case, args.out) for case in plan(args.sets, args.seed) if case.seed not in done)
-    for row in cast(Iterator[dict[str, Any]], Parallel(n_jobs=args.jobs, return_as="generator_unordered")(left)):
+    with backend(args.backend, args.jobs):
+        _keep(as_they_come(left, args.jobs), log)
+    print(table(_rows(log)))
+
+
+def _keep(rows: Iterator[dict[str, Any]], log: Path) -> None:
+    """Each row is said and written as it comes."""
+    for row in rows:
         if "not made" in row:
             print(f"seed {row['seed']}: not made or not readable: {row['not made']}", flush=True)
             continue
@@ -160,7 +170,6 @@ def main() -> None:
             file.write(json.dumps(row) + "\n")
         print(f"{row['seed']} {row['true']} {row['sigmas']} {row['design']} {row['mismatch']} -> {row['verdict']} {row['claims']} "
               f"({row.get('seconds', np.nan):.0f} s)", flush=True)  # fmt: skip
-    print(table(_rows(log)))
 
 
 def _tried(case: Case, folder: Path) -> dict[str, Any]:

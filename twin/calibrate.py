@@ -157,7 +157,7 @@ class Objective:
             raw = [self.bench.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]
             return self.white(raw) / size
 
-        with Parallel(n_jobs=self.jobs, prefer="threads") as parallel:  # joblib.parallel_config chooses another backend
+        with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
             done: Any = parallel(delayed(column)(m, s) for m, s in models)
         return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
 

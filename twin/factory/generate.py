@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from threadpoolctl import threadpool_limits
 
 from twin.errors import DataError
@@ -24,6 +24,7 @@ from twin.factory.solve import walk, weight_of
 from twin.quantities import Parameter, Values
 from twin.robots import Robot
 from twin.soft import SoftBody, SoftStatics
+from twin.spread import as_they_come
 from twin.storage import read_twin, standard_errors
 
 MANIFEST = "factory.json"
@@ -76,7 +77,7 @@ def generate(order: Order, folder: Path, jobs: int, progress: Callable[[int, flo
     todo = [k for k in range(-(-order.samples // shard.SIZE)) if not _path(folder, k).exists()]
     begun, made = time.perf_counter(), 0
     done = order.samples - sum(_rows(order, k) for k in todo)
-    for rows in Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_shard)(order, folder, k) for k in todo):
+    for rows in as_they_come((delayed(_shard)(order, folder, k) for k in todo), jobs):
         made += rows or 0
         progress(done + made, made / (time.perf_counter() - begun))
     return int((~shard.read(folder, ["converged"])["converged"]).sum())

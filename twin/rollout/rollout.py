@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from twin.bench import prepare
 from twin.errors import DataError, SolveError
 from twin.measurements import Recording, Trial
+from twin.spread import as_they_come
 from twin.twin import Twin, can_step
 
 LEAST = 2  # samples that are worth a trial
@@ -60,13 +60,11 @@ def rollout(
     single = [replace(controls, trials=(t,)) for t in controls.trials]
     trials: list[Trial] = []
     ended: list[Ended] = []
-    # joblib.parallel_config chooses another backend.
-    with Parallel(n_jobs=jobs, prefer="threads", return_as="generator") as parallel:
-        runs: Any = parallel(delayed(_one)(twin, one, steps) for one in single)
-        for k, (trial, lost) in enumerate(runs, 1):
-            trials += [] if trial is None else [_noisy(trial, controls, noise, [seed, k])]
-            ended += [] if lost is None else [lost]
-            progress(f"{k} of {len(single)} rollouts" + (f", {len(ended)} ended early" if ended else ""))
+    runs = as_they_come((delayed(_one)(twin, one, steps) for one in single), jobs, "threads", ordered=True)
+    for k, (trial, lost) in enumerate(runs, 1):
+        trials += [] if trial is None else [_noisy(trial, controls, noise, [seed, k])]
+        ended += [] if lost is None else [lost]
+        progress(f"{k} of {len(single)} rollouts" + (f", {len(ended)} ended early" if ended else ""))
     if not trials:
         raise SolveError(f"no rollout got anywhere: {ended[0].why}")
     how = "MuJoCo steps" if steps else "static equilibria"

@@ -1,0 +1,78 @@
+"""Work that is shared out gives the same answers on every backend of joblib, also on a Ray of two workers (extra `cluster`)."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+
+import joblib
+import numpy as np
+import pytest
+from joblib import delayed
+
+from twin.rollout import drawn, rollout
+from twin.rollout.controls import Drawing
+from twin.spread import EACH, as_they_come
+from twin.twin import Twin
+
+
+def piece(k: int) -> tuple[int, int]:
+    """Which it is, the first being the slowest, and whose process did it."""
+    time.sleep(0.5 if k == 0 else 0.01)
+    return k, os.getpid()
+
+
+@contextmanager
+def ray_of(workers: int) -> Iterator[None]:
+    ray = pytest.importorskip("ray", reason="extra `cluster`")
+    from ray.util.joblib import register_ray
+
+    register_ray()
+    ray.init(num_cpus=workers, include_dashboard=False, logging_level="ERROR")
+    try:
+        with joblib.parallel_config(backend="ray"):
+            yield
+    finally:
+        ray.shutdown()
+
+
+def test_what_is_done_first_comes_first_unless_the_order_is_asked_for() -> None:
+    work = [delayed(piece)(k) for k in range(6)]
+    assert [k for k, _ in as_they_come(work, 2, "threads", ordered=True)] == list(range(6))
+    came = [k for k, _ in as_they_come(work, 2, "threads")]
+    assert sorted(came) == list(range(6))
+    assert came[0] != 0
+
+
+def test_where_results_come_together_work_goes_out_in_batches() -> None:
+    """Work without end is asked for by the batch only, and each batch is given out before the next is begun."""
+    asked = []
+
+    def endless() -> Iterator[object]:
+        for k in count():
+            asked.append(k)
+            yield delayed(piece)(k)
+
+    with joblib.parallel_config(backend="multiprocessing"):
+        came = as_they_come(endless(), 2)
+        assert [next(came)[0] for _ in range(2 * EACH)] == list(range(2 * EACH))
+        assert len(asked) == 2 * EACH
+        came.close()  # type: ignore[attr-defined]
+
+
+def test_two_workers_of_ray_do_all_work_and_roll_out_what_threads_do() -> None:
+    twin = Twin.of("continuum")
+    controls = drawn(twin, 4, seed=4, drawing=Drawing(seconds=1.0, rate=25.0))
+    here = rollout(twin, controls, noise=1e-4, seed=4, jobs=2).recording
+    with ray_of(2):
+        came = list(as_they_come((delayed(divmod)(k, 5) for k in range(3 * EACH)), 2))
+        workers = set(as_they_come((delayed(os.getpid)() for _ in range(EACH)), 2))
+        there = rollout(twin, controls, noise=1e-4, seed=4, jobs=2).recording
+    assert came == [divmod(k, 5) for k in range(3 * EACH)]
+    assert os.getpid() not in workers
+    for a, b in zip(here.trials, there.trials, strict=True):
+        for name, values in a.values.items():
+            assert np.array_equal(values, b.values[name], equal_nan=True)
