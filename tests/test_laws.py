@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -110,9 +111,8 @@ def test_the_camera_turns_about_the_bases_origin_and_shifts() -> None:
     np.testing.assert_allclose(turned, np.stack([c * x - s * y, s * x + c * y + 2e-3, z], axis=-1), atol=1e-15)
 
 
-def test_a_lag_of_a_step_and_of_a_ramp() -> None:
-    """After a ramp of 1 s to one: 1 - tau (1 - exp(-1/tau)) exp(-(t - 1)/tau); two lags in series of a ramp that never ends are
-    late by the sum of both times."""
+def test_a_lag_of_a_step() -> None:
+    """After a ramp of 1 s to one: 1 - tau (1 - exp(-1/tau)) exp(-(t - 1)/tau)."""
     t = np.linspace(0.0, 60.0, 241)
     up = np.minimum(t, 1.0)[:, None] * np.ones(3)
     seen = Signals(t, t, up, 1e-3 * up, np.zeros((241, 0, 3)), t, (Drive.TENSION,) * 3)
@@ -121,9 +121,31 @@ def test_a_lag_of_a_step_and_of_a_ramp() -> None:
     expected = 1.0 - 2.0 * (1 - np.exp(-0.5)) * np.exp(-(t[after] - 1.0) / 2.0)
     np.testing.assert_allclose(lagged.tension[after, 1], expected, rtol=1e-12)
     np.testing.assert_allclose(lagged.displacement[after, 1], 1e-3 * expected, rtol=1e-12)
-    ramp = seen.with_(tension=t[:, None] * np.ones(3))
-    late = law("actuator_lag", time=1.0, time_2=2.0).drive(ramp).tension[-1, 0]
-    assert late == pytest.approx(60.0 - 3.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.7, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.5, 8.0])
+def test_a_lag_of_second_order_is_what_an_integrator_makes_of_it(damping: float) -> None:
+    """tau^2 x'' + 2 damping tau x' + x = c by scipy, over rows of no even spacing; behind a ramp it is late by 2 damping tau."""
+    t = np.array([0.0, 0.05, 0.4, 0.41, 1.3, 2.0, 3.5, 3.6, 9.0])
+    c = np.array([1.0, 2.0, 2.0, -1.0, 0.5, 0.5, 3.0, 3.0, 1.0])
+    tau = 0.3
+    exact = [c[0]]
+    state = np.array([c[0], 0.0])
+    for a, b, start, end in zip(t, t[1:], c, c[1:], strict=False):
+        slope = (end - start) / (b - a)
+
+        def rate(s: float, y: np.ndarray, start: float = start, slope: float = slope) -> list[float]:
+            return [y[1], (start + slope * s - y[0] - 2 * damping * tau * y[1]) / tau**2]
+
+        state = solve_ivp(rate, (0.0, b - a), state, method="Radau", rtol=1e-10, atol=1e-12).y[:, -1]
+        exact.append(state[0])
+    seen = Signals(t, t, c[:, None] * np.ones(3), np.zeros((9, 3)), np.zeros((9, 0, 3)), t, (Drive.TENSION,) * 3)
+    drive = law("actuator_lag", time=2 * damping * tau, inertia=0.25 / damping**2)
+    np.testing.assert_allclose(drive.drive(seen).tension[:, 1], exact, atol=1e-7)  # a thousand of the integrator's steps
+    long = np.linspace(0.0, 60.0, 31)
+    ramp = Signals(long, long, long[:, None] * np.ones(3), np.zeros((31, 3)), np.zeros((31, 0, 3)), long, (Drive.TENSION,) * 3)
+    # To 1e-5: exp(-60 s / 4.8 s) is left.
+    assert drive.drive(ramp).tension[-1, 0] == pytest.approx(60.0 - 2 * damping * tau, rel=1e-5)
 
 
 def test_a_late_share_of_strain_comes_exponentially_whenever_rows_were_taken() -> None:

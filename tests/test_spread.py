@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import count
 
 import joblib
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from joblib import delayed
 
+from tools.cluster import backend
 from twin.rollout import drawn, rollout
 from twin.rollout.controls import Drawing
 from twin.spread import EACH, as_they_come
@@ -23,20 +23,6 @@ def piece(k: int) -> tuple[int, int]:
     """Which it is, the first being the slowest, and whose process did it."""
     time.sleep(0.5 if k == 0 else 0.01)
     return k, os.getpid()
-
-
-@contextmanager
-def ray_of(workers: int) -> Iterator[None]:
-    ray = pytest.importorskip("ray", reason="extra `cluster`")
-    from ray.util.joblib import register_ray
-
-    register_ray()
-    ray.init(num_cpus=workers, include_dashboard=False, logging_level="ERROR")
-    try:
-        with joblib.parallel_config(backend="ray"):
-            yield
-    finally:
-        ray.shutdown()
 
 
 def test_what_is_done_first_comes_first_unless_the_order_is_asked_for() -> None:
@@ -64,10 +50,11 @@ def test_where_results_come_together_work_goes_out_in_batches() -> None:
 
 
 def test_two_workers_of_ray_do_all_work_and_roll_out_what_threads_do() -> None:
+    pytest.importorskip("ray", reason="extra `cluster`")
     twin = Twin.of("continuum")
     controls = drawn(twin, 4, seed=4, drawing=Drawing(seconds=1.0, rate=25.0))
     here = rollout(twin, controls, noise=1e-4, seed=4, jobs=2).recording
-    with ray_of(2):
+    with backend("ray", 2):
         came = list(as_they_come((delayed(divmod)(k, 5) for k in range(3 * EACH)), 2))
         workers = set(as_they_come((delayed(os.getpid)() for _ in range(EACH)), 2))
         there = rollout(twin, controls, noise=1e-4, seed=4, jobs=2).recording

@@ -71,8 +71,7 @@ COMPARED: dict[str, Compare] = {
         np.radians(3.0) * t.strength * t.around, v.get(f"angle_{t.tendon + 1}", 0.0), SAME,
     ),
     "time_delay": lambda t, v: (0.1 * t.strength, v["delay"], SAME),
-    # Another law there: of second order, whose steady lag behind a ramp is 2 zeta tau.
-    "actuator_lag": lambda t, v: (2 * t.zeta * 0.1 * t.strength, v["time"] + v["time_2"], OTHER),
+    "actuator_lag": lambda t, v: (2 * t.zeta * 0.1 * t.strength, v["time"], SAME),  # the steady lag behind a ramp
     "actuator_saturation": lambda t, v: (  # a softer corner there
         (16e-3 - 1.6e-3 * t.strength, v["stroke"], SAME) if any(_each(v, "loss")) else (5.0 - 0.6 * t.strength, v["limit"], SAME)
     ),

@@ -8,10 +8,9 @@ import numpy as np
 
 from twin.bench import Bench
 from twin.calibrate import Fit
+from twin.diagnose.lateness import LATE
 from twin.diagnose.thresholds import LEAP, LEFT_THERE
 from twin.diagnose.zeros import of_robot
-
-LATE = {"actuator_lag", "time_delay"}  # laws for which it counts when a command came
 
 
 def leaps(bench: Bench, trials: Sequence[int], found: Fit) -> list[str]:

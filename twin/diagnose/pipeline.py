@@ -1,6 +1,7 @@
 """The main job: from a recording to what the twin lacks, how sure that is, and the error before and after on sealed trials.
 
-look -> calibrate -> screen -> search -> choose -> gate -> judge -> describe, all on the fitted trials; then the seal is opened.
+look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> describe, all on the fitted trials; then the seal is
+opened.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from twin.diagnose.diagnosis import Claim, Diagnosis, Fold, Settings
 from twin.diagnose.experiment import Experiment, next_experiment
 from twin.diagnose.gate import gate
 from twin.diagnose.judge import judge
+from twin.diagnose.lateness import lateness
 from twin.diagnose.look import Looked, looked_at
 from twin.diagnose.loops import loops
 from twin.diagnose.objective import objective_of
@@ -98,6 +100,7 @@ def conclude(
     study, base, notes = calibrate(bench, twin, sealed, nominal, settings, progress)
     screening = screen(study, base, settings.seed)
     found = choose(study, search(study, base, screening.patterns, screening.bars), screening.bars)
+    found = lateness(study, found, screening.bars.accept)
     gated = gate(study, found, screening)
     return Conclusion(study, screening, found, gated, judge(study, found, gated, screening.bars), (*notes, *study.budget.words()))
 

@@ -227,6 +227,34 @@ WORSE = _row(
 )  # fmt: skip
 BLOCKS = _row("BLOCKS", 4, "parts", "where one trial alone is fitted, it is left out by quarters", "judgement")
 
+# ---- what makes the robot late -----------------------------------------------------------------------------------------------
+
+SUBROWS = _row("SUBROWS", 4, "moments a row", "a cubic between rows, as straight lines, is off by 1/16 of its bulge", "derivation")
+EXACT = _row(
+    "EXACT", 1e-4, "of a command's range", "the least noise of a reading that a spline is asked to follow",
+    "judgement: four digits are logged"
+)  # fmt: skip
+EVENLY = _row(
+    "EVENLY", 1e-6, "noise^2 / row^3", "the least that a spline gives way: 6e-4 of the noise within a row",
+    "derivation: sqrt(q / 3), of a step of one row",
+)  # fmt: skip
+NEIGHBOUR = _row(
+    "NEIGHBOUR", 0.25, "of a neighbour's looseness", "an interval's own, of one sample a tendon, is found to 60 %; with more "
+    "corners blur", "python -m tools.lag_or_delay results/",
+)  # fmt: skip
+SPLINE = _row(
+    "SPLINE", 10, "rounds", "of expectation maximisation; after 20 paths are too stiff: outputs were met worse on 7 of 8 days",
+    "python -m tools.lag_or_delay results/, neighbours not heard",
+)  # fmt: skip
+PATHS = _row("PATHS", 32, "paths", "of which a covariance of three tendons is taken, to a quarter", "derivation: sqrt(2 / 32)")
+TAILS = _row(
+    "TAILS", 4.0, "degrees of freedom", "of Student's t: a corner of a command that no spline sees is an outlier, not a law",
+    "judgement"
+)  # fmt: skip
+LATE_ROWS = _row(
+    "LATE_ROWS", 4000, "rows", "of the trials that move fastest: what tells a lag from a delay is there", "judgement: seconds"
+)
+
 # ---- judge -------------------------------------------------------------------------------------------------------------------
 
 SHARE = _row("SHARE", 0.15, "of the structure before", "less left over is what a right law's form leaves", BENCHMARK)

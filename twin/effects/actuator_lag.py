@@ -10,19 +10,44 @@ from twin.quantities import Parameter
 
 
 @jit
-def follow(time, command, tau, delivered):
-    """tau x' = c - x for commands (n, m) linear between `time` (n,), exact, from rest at the first; x to `delivered` (n, m)."""
+def follow(time, command, lag, inertia, delivered):
+    """inertia lag^2 x'' + lag x' + x = c for commands (n, m) linear between `time` (n,), exact, from rest at the first; x to
+    `delivered` (n, m).
+
+    Behind the ramp that a drive settles to, c - lag c', it is e: of exp(-t / lag) in first order, in second order of
+    exp(-s t) (e C + (e' + s e) S) with s = 1 / (2 inertia lag), w^2 = s^2 - 1 / (inertia lag^2), C = cosh(w t), S = sinh(w t) / w.
+    """
     for j in range(command.shape[1]):
-        delivered[0, j] = command[0, j]
+        x, v = command[0, j], 0.0
+        delivered[0, j] = x
         for i in range(1, time.size):
-            dt = time[i] - time[i - 1]
-            slope = (command[i, j] - command[i - 1, j]) / dt
-            behind = delivered[i - 1, j] - command[i - 1, j] + tau * slope  # of the ramp the drive would settle to
-            delivered[i, j] = command[i, j] - tau * slope + behind * np.exp(-dt / tau)
+            t = time[i] - time[i - 1]
+            slope = (command[i, j] - command[i - 1, j]) / t
+            e = x - command[i - 1, j] + lag * slope
+            if inertia == 0.0:
+                e *= np.exp(-t / lag)
+            else:
+                stiff = 1.0 / (inertia * lag * lag)
+                s = 0.5 * stiff * lag
+                w = np.sqrt(abs(s * s - stiff))
+                if w * t < 1e-6:  # critically damped: the error is the square of it
+                    C, S = np.exp(-s * t), t * np.exp(-s * t)
+                elif s * s > stiff:
+                    fast, slow = np.exp(-(s + w) * t), np.exp(-stiff / (s + w) * t)
+                    C, S = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
+                else:
+                    C, S = np.exp(-s * t) * np.cos(w * t), np.exp(-s * t) * np.sin(w * t) / w
+                u = v - slope
+                e, v = e * C + (u + s * e) * S, slope + u * C - (stiff * e + s * u) * S
+            x = command[i, j] - lag * slope + e
+            delivered[i, j] = x
 
 
 class ActuatorLag(Effect):
-    """First-order lag between command and delivery: time x' = c - x; with `time_2` two in series, an overdamped second order.
+    """Lag between command and delivery, of first order: time x' = c - x; of second, inertia time^2 x'' + time x' + x = c.
+
+    Damping ratio 1 / (2 sqrt(inertia)): up to 0.25 two first-order lags in series, beyond it the drive overshoots. Behind a steady
+    ramp it is late by `time` whatever its inertia.
 
     Acts on whatever drives the tendons, tension or displacement. Between two rows the command is a straight line.
 
@@ -37,22 +62,20 @@ class ActuatorLag(Effect):
     id = "actuator_lag"
     parameters = (
         Parameter("time", 0.0, "s", 0.0, 5.0, "time constant; what a bench log's rows can show", scale=0.05),
-        Parameter("time_2", 0.0, "s", 0.0, 5.0, "of a second lag in series", scale=0.05),
+        Parameter("inertia", 0.0, "", 0.0, 10.0, "1 / (4 damping ratio^2); 0: first order", scale=0.2),
     )
-    richer = ("time_2",)
+    richer = ("inertia",)
     akin = ("time_delay",)
     guesses = ({"time": 0.1},)
     moves_with = "the rate of change of the pull"
 
     def drive(self, command: Signals) -> Signals:
         tension, displacement = command.tension, command.displacement
-        for tau in (self["time"], self["time_2"]):
-            if tau > 0.0 and len(command.time) > 1:
-                tension, displacement = _lagged(command.time, tension, tau), _lagged(command.time, displacement, tau)
+        if self["time"] > 0.0 and len(command.time) > 1:
+            tension, displacement = self._lagged(command.time, tension), self._lagged(command.time, displacement)
         return command.with_(tension=tension, displacement=displacement)
 
-
-def _lagged(time: np.ndarray, command: np.ndarray, tau: float) -> np.ndarray:
-    out = np.empty_like(command)
-    follow(np.asarray(time, float), np.ascontiguousarray(command, float), tau, out)
-    return out
+    def _lagged(self, time: np.ndarray, command: np.ndarray) -> np.ndarray:
+        out = np.empty_like(command)
+        follow(np.asarray(time, float), np.ascontiguousarray(command, float), self["time"], self["inertia"], out)
+        return out

@@ -1,0 +1,65 @@
+"""The path of a command between its rows, against paths that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from twin.diagnose.path import path
+
+NOISE = 0.01
+
+
+def logged(kind: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows (uneven by 15 %), what is logged, moments between, and what three commands were then."""
+    time = np.linspace(0.0, 9.0, 80)
+    time[1:-1] += rng.uniform(-0.15, 0.15, 78) * time[1]
+    fine = np.linspace(0.0, 9.0, 901)
+    if kind == "smooth":
+        true = np.stack([2.0 - 2.0 * np.cos(1.3 * fine + a) for a in range(3)], axis=1)
+    else:
+        knots = np.sort(rng.uniform(0.0, 9.0, 14))
+        true = np.stack([np.interp(fine, knots, level) for level in np.repeat(rng.uniform(0.0, 4.0, (3, 7)), 2, axis=1)], axis=1)
+    rows = np.stack([np.interp(time, fine, c) for c in true.T], axis=1)
+    return time, rows + NOISE * rng.standard_normal(rows.shape), fine, true
+
+
+def at(fine: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(fine, time, v) for v in values.T], axis=1)
+
+
+def test_a_smooth_command_is_known_better_than_it_is_read() -> None:
+    """Its error between rows is below the reading's noise; straight lines between readings are off by more than that noise."""
+    rng = np.random.default_rng(1)
+    time, rows, fine, true = logged("smooth", rng)
+    found = path(time, rows, NOISE, rng)
+    error = np.sqrt(np.mean((at(fine, found.time, found.mean) - true) ** 2))
+    assert error < 0.8 * NOISE
+    assert np.sqrt(np.mean((at(fine, time, rows) - true) ** 2)) > 0.8 * NOISE
+
+
+@pytest.mark.parametrize(("kind", "least"), [("smooth", 0.85), ("corners", 0.75)])
+def test_the_paths_drawn_hold_the_true_one(kind: str, least: float) -> None:
+    """90 % intervals by the draws' spread, over eight logs. The looseness is found from these rows too, which costs some of their
+    cover; near corners the true path is no draw of any spline."""
+    inside = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        time, rows, fine, true = logged(kind, rng)
+        found = path(time, rows, NOISE, rng)
+        true = at(found.time, fine, true)
+        inside.append(np.abs(true - found.mean) < norm.ppf(0.95) * found.drawn.std(axis=2))
+    assert least < np.mean(inside) < 0.99
+
+
+def test_readings_without_noise_are_kept() -> None:
+    """Down to a ten-thousandth of the range, and a command that does not move at all is fine."""
+    rng = np.random.default_rng(2)
+    time = np.linspace(0.0, 2.0, 21)
+    rows = np.stack([np.sin(3.0 * time), np.zeros(21), time], axis=1)
+    found = path(time, rows, 0.0, rng)
+    assert np.abs(found.mean[::4] - rows).max() < 5e-4
+    assert np.isfinite(found.drawn).all()
+    still = path(time, np.zeros((21, 3)), 0.0, rng)
+    assert np.abs(still.drawn).max() < 1e-9

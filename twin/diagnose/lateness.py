@@ -1,0 +1,214 @@
+"""Stage `lateness`: whether a drive that lags, a log that is delayed, or both make the robot late.
+
+The laws differ in what they make of a command within a few tenths of a second, and there a log knows the command only at its rows,
+and only with the noise of its reading. The search takes commands to run straight from row to row; on such paths a lag, which
+smooths, beats a delay where readings are noisy, and loses to it where corners fall between rows. So the laws are weighed anew, by
+what the outputs say the tendons were given: at each row u, with covariance C, from residuals, their noise and the outputs'
+sensitivities. A law applied to what the command may have been (`path`) predicts it with mean m and covariance V, and is worth
+2 sum log t(u - m; V + C) - k log n, t Student's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+from twin.bench import Bench
+from twin.calibrate import fit
+from twin.diagnose.objective import sensitivity
+from twin.diagnose.path import Path, path
+from twin.diagnose.search import Search
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import CLEAR, LATE_ROWS, TAILS
+from twin.diagnose.weigh import Weighed, weigh
+from twin.effects import Drive, Signals
+from twin.effects.actuator_lag import follow
+from twin.errors import SolveError
+from twin.twin import readings, report
+
+LATE = frozenset({"actuator_lag", "time_delay"})  # laws for which it counts when a command came
+Laws = frozenset[str]
+Form = Callable[[np.ndarray], tuple[float, float, float]]  # free numbers -> delay (s), lag (s), inertia
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the outputs of a trial say its tendons were given: `pull` (n, n_tendon) at `time` (n,), with covariance (n, n_tendon,
+    n_tendon); and what was commanded."""
+
+    time: np.ndarray
+    pull: np.ndarray
+    covariance: np.ndarray
+    command: Path
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What a law of lateness is worth (2 ln odds), and its values by effect."""
+
+    score: float
+    values: Mapping[str, Mapping[str, float]]
+
+
+def lateness(study: Study, found: Search, accept: float) -> Search:
+    """`found` with its laws of lateness weighed anew, where its best set has one."""
+    laws = LATE & set(found.best.effects)
+    if not laws or study.bench.driven_by(Drive.CURRENT).any() or not study.budget.allows("what makes it late"):
+        return found
+    study.progress("what makes it late")
+    weights = weighed(given(study, found.best), typical(found.best), accept)
+    if weights is None:
+        return found
+    likely = max(weights, key=lambda f: weights[f].score)
+    best = found.best
+    if likely != laws:
+        best = _in_place(study, best, weights[likely]) or best
+    ranked = ranked([best, *(w for w in found.all if w.effects != best.effects)], weights)
+    best = next(w for w in ranked if w.effects == best.effects)
+    return Search(found.base, best, tuple(sorted(ranked, key=lambda w: -w.score)))
+
+
+def ranked(sets: list[Weighed], weights: Mapping[Laws, Weight]) -> list[Weighed]:
+    """Sets that differ in their laws of lateness alone differ in score by what these are worth; the best of them keeps its own."""
+    top: dict[frozenset[str], float] = {}
+    for w in sets:
+        if LATE & set(w.effects):
+            rest = frozenset(w.effects) - LATE
+            top[rest] = max(top.get(rest, -np.inf), w.score)
+    most = max(w.score for w in weights.values())
+    out = []
+    for w in sets:
+        laws = LATE & set(w.effects)
+        behind = most - weights[laws].score if laws else 0.0
+        out.append(replace(w, score=top[frozenset(w.effects) - LATE] - behind) if laws else w)
+    return out
+
+
+def typical(best: Weighed) -> float:
+    """By how much (s) a steady pull is late."""
+    laws = {e.id: e for e in best.fit.model.twin.effects if e.id in LATE}
+    return sum(e["time" if n == "actuator_lag" else "delay"] for n, e in laws.items())
+
+
+def _in_place(study: Study, best: Weighed, likely: Weight) -> Weighed | None:
+    """The set with these laws in place of its own, fitted; None without equilibrium."""
+    model = best.fit.model
+    for law in LATE:
+        model = model.without_effect(law)
+    for law, values in likely.values.items():
+        model = model.with_effect(law, dict(values), tuple(values), study.bench.n_tendon)
+    try:
+        return weigh(study, fit(study.objective, model))
+    except SolveError:
+        return None
+
+
+def weighed(trials: list[Given], late: float, accept: float) -> dict[Laws, Weight] | None:
+    """Every law by itself and both, for a robot some `late` seconds late; None for one that is early, which no drive is.
+
+    What a lag of second order or both laws bring must pay `accept` besides: they bend to what `path` does not know of corners. Both
+    must be clearly better than a lag of second order, of which an overdamped one is nearly a delay and a lag.
+    """
+    if late <= 0.0:
+        return None
+    n = sum(g.pull.size for g in trials)
+    lag, delay = frozenset({"actuator_lag"}), frozenset({"time_delay"})
+    delayed = _best(trials, lambda x: (x[0], 0.0, 0.0), np.array([late]))
+    first = _best(trials, lambda x: (0.0, x[0], 0.0), np.array([late]))
+    second = _best(trials, lambda x: (0.0, x[0], x[1]), np.array([first[1][1], 0.25]))
+    both = _best(trials, lambda x: (x[0], x[1], 0.0), 0.5 * np.array([late, late]))
+    cost = float(np.log(n))
+    lagging = max(
+        Weight(first[0] - cost, {"actuator_lag": {"time": first[1][1]}}),
+        Weight(second[0] - 2 * cost - accept, {"actuator_lag": {"time": second[1][1], "inertia": second[1][2]}}),
+        key=lambda w: w.score,
+    )
+    together = {"time_delay": {"delay": both[1][0]}, "actuator_lag": {"time": both[1][1]}}
+    return {
+        delay: Weight(delayed[0] - cost, {"time_delay": {"delay": delayed[1][0]}}),
+        lag: lagging,
+        delay | lag: Weight(both[0] - 2 * cost - accept - CLEAR, together),
+    }
+
+
+def _best(trials: list[Given], form: Form, start: np.ndarray) -> tuple[float, tuple[float, float, float]]:
+    """Twice the largest log likelihood of a form, and where it is."""
+
+    def cost(x: np.ndarray) -> float:
+        delay, lag, inertia = form(np.atleast_1d(x))
+        if min(delay, lag, inertia) < 0.0 or lag > 5.0 or inertia > 10.0:
+            return np.inf
+        return -sum(likelihood(g, delay, lag, inertia) for g in trials)
+
+    if len(start) == 1:
+        found = minimize_scalar(cost, bounds=(0.0, 3.0 * start[0]), method="bounded", options={"xatol": 1e-3 * start[0]})
+        x = np.array([found.x])
+    else:
+        corners = np.vstack([start, start + np.diag(0.3 * start)])
+        found = minimize(cost, start, method="Nelder-Mead", options={"initial_simplex": corners, "xatol": 1e-3, "fatol": 0.1})
+        x = found.x
+    return -2.0 * float(found.fun), form(x)
+
+
+def likelihood(seen: Given, delay: float, lag: float, inertia: float) -> float:
+    """Log likelihood, up to a constant, of what the tendons of a trial were given, under such a law."""
+    way, (n, tendons) = seen.command, seen.pull.shape
+    columns = np.concatenate([way.mean[:, :, None], way.drawn], axis=2).reshape(len(way.time), -1)
+    if lag > 0.0:
+        delivered = np.empty_like(columns)
+        follow(way.time, columns, lag, inertia, delivered)
+        columns = delivered
+    then = np.clip(seen.time - delay, way.time[0], way.time[-1])
+    i = np.clip(np.searchsorted(way.time, then, side="right") - 1, 0, len(way.time) - 2)
+    share = ((then - way.time[i]) / (way.time[i + 1] - way.time[i]))[:, None]
+    rows = ((1.0 - share) * columns[i] + share * columns[i + 1]).reshape(n, tendons, -1)
+    off = rows[:, :, 1:] - rows[:, :, :1]
+    V = seen.covariance + np.einsum("nad,nbd->nab", off, off) / off.shape[2]
+    e = seen.pull - rows[:, :, 0]
+    square = np.einsum("na,na->n", e, np.linalg.solve(V, e[:, :, None])[:, :, 0])
+    return float(np.sum(-0.5 * (TAILS + tendons) * np.log1p(square / TAILS) - 0.5 * np.linalg.slogdet(V)[1]))
+
+
+def given(study: Study, best: Weighed) -> list[Given]:
+    """Of the fitted trials that move fastest, under the best set: what it has the tendons given, and what its residuals add."""
+    bench, at = study.bench, best.fit.evaluation
+    twin, place = at.model.twin, {k: i for i, k in enumerate(study.trials)}
+    laws = [e for e in twin.effects if e.id in LATE]
+    chosen = _fastest(bench, study.trials)
+    G = sensitivity(bench, chosen, twin, [readings(bench, report(twin.effects, at.traces[k].true)) for k in chosen], at.traces)
+    noise, rng = study.objective.whitener.noise, np.random.default_rng(0)
+    out = []
+    for k, g in zip(chosen, G, strict=True):
+        inputs, late = bench.inputs[k], bench.inputs[k].signals
+        for law in laws:
+            late = law.drive(law.command(late))
+        raw = at.raw[place[k]]
+        seen = np.isfinite(raw)
+        per_sigma = np.where(seen[:, :, None], g / noise.sigma[:, None], 0.0)
+        r = np.where(seen, raw, 0.0) / noise.sigma
+        span = max(float(np.ptp(inputs.command)), 1e-9)  # what no output shows is somewhere within it
+        covariance = np.linalg.inv(np.einsum("nma,nmb->nab", per_sigma, per_sigma) + np.eye(bench.n_tendon) / span**2)
+        more = np.einsum("nab,nmb,nm->na", covariance, per_sigma, r)
+        way = path(inputs.time, _driving(bench, inputs.signals), float(np.mean(noise.drive)), rng)
+        out.append(Given(inputs.time, _driving(bench, late) + more, covariance, way))
+    return out
+
+
+def _driving(bench: Bench, signals: Signals) -> np.ndarray:
+    """(n, n_tendon) of whatever drives each tendon."""
+    return np.where(bench.driven_by(Drive.DISPLACEMENT), signals.displacement, signals.tension)
+
+
+def _fastest(bench: Bench, trials: list[int]) -> list[int]:
+    """Trials by the rate of their commands, as many as `LATE_ROWS` hold and at least one."""
+    rate = {k: float(np.abs(np.diff(bench.inputs[k].command, axis=0)).sum() / np.ptp(bench.inputs[k].time)) for k in trials}
+    out, rows = [], 0
+    for k in sorted(trials, key=lambda k: -rate[k]):
+        rows += len(bench.inputs[k].time)
+        if out and rows > LATE_ROWS:
+            break
+        out.append(k)
+    return out
