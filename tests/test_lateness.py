@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from twin.diagnose.lateness import Given, likelihood, ranked, weighed
+from twin.diagnose.lateness import Given, likelihood, rescored, weighed
 from twin.diagnose.path import path
 
 ACCEPT = 12.0
@@ -115,7 +115,7 @@ def test_sets_differ_by_what_their_laws_of_lateness_are_worth() -> None:
         Set(("time_delay",), 90.0),
         Set((), 0.0),
     ]
-    after = {w.effects: w.score for w in ranked(sets, weights)}  # type: ignore[arg-type]
+    after = {w.effects: w.score for w in rescored(sets, weights)}  # type: ignore[arg-type]
     assert after["actuator_lag", "tip_payload"] == 500.0
     assert after["time_delay", "tip_payload"] == pytest.approx(500.0 - behind)
     assert after["time_delay",] == pytest.approx(90.0 - behind)

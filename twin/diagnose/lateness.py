@@ -66,12 +66,12 @@ def lateness(study: Study, found: Search, accept: float) -> Search:
     best = found.best
     if likely != laws:
         best = _in_place(study, best, weights[likely]) or best
-    ranked = ranked([best, *(w for w in found.all if w.effects != best.effects)], weights)
+    ranked = rescored([best, *(w for w in found.all if w.effects != best.effects)], weights)
     best = next(w for w in ranked if w.effects == best.effects)
     return Search(found.base, best, tuple(sorted(ranked, key=lambda w: -w.score)))
 
 
-def ranked(sets: list[Weighed], weights: Mapping[Laws, Weight]) -> list[Weighed]:
+def rescored(sets: list[Weighed], weights: Mapping[Laws, Weight]) -> list[Weighed]:
     """Sets that differ in their laws of lateness alone differ in score by what these are worth; the best of them keeps its own."""
     top: dict[frozenset[str], float] = {}
     for w in sets:
