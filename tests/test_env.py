@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from twin.bench import prepare
 from twin.effects import Drive, named
 from twin.env import KINDS
 from twin.env.continuum import ContinuumReach, ContinuumTrack
@@ -22,7 +23,7 @@ from twin.env.plant import Plant
 from twin.errors import DataError, TwinError, UnknownNameError
 from twin.measurements import Channel, Recording, Trial
 from twin.storage import read_twin
-from twin.twin import Twin
+from twin.twin import Twin, readings, report, simulate
 
 DIAGNOSED = """
 format = "twin/1"
@@ -83,6 +84,13 @@ def test_a_seed_gives_the_same_episode_bit_for_bit(kind: type[ContinuumReach], d
     assert np.isfinite(first).all()
 
 
+def predicted(twin: Twin, whole: Recording, dynamic: bool) -> np.ndarray:
+    """The trial's only marker (n, 3), its commands straight from row to row, as an environment has them."""
+    bench = prepare(whole, twin.robot)
+    bench = replace(bench, inputs=tuple(replace(i, smooth=False) for i in bench.inputs))
+    return readings(bench, report(twin.effects, simulate(twin, bench, dynamic=dynamic)[0].true))
+
+
 def test_the_environment_moves_as_the_twin_predicts() -> None:
     """Friction and a lag in force: the plant, step by step, against the prediction of the same commands as a whole trial."""
     effects = tuple(named(n)(v) for n, v in (("tendon_friction", {"mu": 0.25}), ("actuator_lag", {"time": 0.15})))
@@ -95,9 +103,9 @@ def test_the_environment_moves_as_the_twin_predicts() -> None:
     ]
     values = {c.name: command[:, k] if k < 3 else np.zeros(41) for k, c in enumerate(channels)}
     whole = Recording("continuum", "", "", None, tuple(channels), (Trial("a", time, values),))
-    predicted = twin.predict(whole, dynamic=True).trials[0]
+    there = predicted(twin, whole, dynamic=True)
     # The same steps but for when the elastic correction is taken anew (every other step, counted from each call): under 1e-6 m.
-    assert np.abs(seen - np.column_stack([predicted.values[f"tip_{a}"] for a in "xyz"])).max() < 1e-6
+    assert np.abs(seen - there).max() < 1e-6
     assert np.ptp(seen[:, 0]) > 0.02
 
 
@@ -117,9 +125,9 @@ def test_lengths_and_currents_move_it_as_the_twin_predicts(drive: Drive, interva
     channels = [Channel(n, "input", "m" if by_length else "A") for n in names] + [Channel(f"tip_{a}", "output", "m") for a in "xyz"]
     values = {c.name: command[:, k] if k < 3 else np.zeros(31) for k, c in enumerate(channels)}
     whole = Recording("continuum", "", "", None, tuple(channels), (Trial("a", np.arange(31) * interval, values),))
-    predicted = twin.predict(whole, dynamic=dynamic).trials[0]
+    there = predicted(twin, whole, dynamic)
     # As above where MuJoCo steps; at rest the same solve, sample by sample.
-    assert np.abs(seen - np.column_stack([predicted.values[f"tip_{a}"] for a in "xyz"])).max() < (1e-6 if dynamic else 1e-9)
+    assert np.abs(seen - there).max() < (1e-6 if dynamic else 1e-9)
     assert np.ptp(seen[:, 0]) > 0.005
 
 

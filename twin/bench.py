@@ -24,7 +24,7 @@ ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quo
 class Inputs:
     """One trial as the twin is driven: time and clock (n,) s, reported command (n, n_tendon), SI, of what drives each tendon
     (`drives`), a current constant from one time to the next; temperature (n,) K of the room, its loads; `seen`, patches of skin
-    that clouds show, where these are compared."""
+    that clouds show, where these are compared. Between rows, of which no log tells, tensions and displacements are `smooth`."""
 
     name: str
     time: np.ndarray
@@ -34,6 +34,7 @@ class Inputs:
     temperature: np.ndarray
     loads: Loads
     seen: Patches | None = None
+    smooth: bool = True
 
     @property
     def signals(self) -> Signals:
@@ -42,7 +43,7 @@ class Inputs:
         of = {kind: np.where(driven_by(self.drives, kind), self.command, nothing) for kind in Drive}
         return Signals(
             self.time, self.clock, of[Drive.TENSION], of[Drive.DISPLACEMENT], np.zeros((n, 0, 3)), self.temperature, self.drives,
-            of[Drive.CURRENT],
+            of[Drive.CURRENT], smooth=self.smooth,
         )  # fmt: skip
 
 

@@ -159,7 +159,8 @@ def likelihood(seen: Given, delay: float, lag: float, inertia: float) -> float:
     columns = np.concatenate([way.mean[:, :, None], way.drawn], axis=2).reshape(len(way.time), -1)
     if lag > 0.0:
         delivered = np.empty_like(columns)
-        follow(way.time, columns, lag, inertia, delivered)
+        straight = np.diff(columns, axis=0) / np.diff(way.time)[:, None]
+        follow(way.time, np.stack([0.0 * straight, 0.0 * straight, straight, columns[:-1]]), lag, inertia, delivered)
         columns = delivered
     then = np.clip(seen.time - delay, way.time[0], way.time[-1])
     i = np.clip(np.searchsorted(way.time, then, side="right") - 1, 0, len(way.time) - 2)

@@ -229,7 +229,9 @@ BLOCKS = _row("BLOCKS", 4, "parts", "where one trial alone is fitted, it is left
 
 # ---- what makes the robot late -----------------------------------------------------------------------------------------------
 
-SUBROWS = _row("SUBROWS", 4, "moments a row", "a cubic between rows, as straight lines, is off by 1/16 of its bulge", "derivation")
+SUBROWS = _row(
+    "SUBROWS", 4, "moments a row", "of a row's path, as straight lines", "derivation: a parabola is off by 1/16 of its bulge"
+)
 EXACT = _row(
     "EXACT", 1e-4, "of a command's range", "the least noise of a reading that a spline is asked to follow",
     "judgement: four digits are logged"

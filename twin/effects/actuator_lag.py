@@ -5,41 +5,47 @@ from __future__ import annotations
 import numpy as np
 
 from twin.compiled import jit
-from twin.effects.effect import Effect, Signals
+from twin.effects.effect import Effect, Signals, between_rows
 from twin.quantities import Parameter
 
 
 @jit
-def follow(time, command, lag, inertia, delivered):
-    """inertia lag^2 x'' + lag x' + x = c for commands (n, m) linear between `time` (n,), exact, from rest at the first; x to
-    `delivered` (n, m).
+def follow(time, cubics, lag, inertia, delivered):
+    """inertia lag^2 x'' + lag x' + x = c, exact, from rest at the first of `time` (n,), for commands that are `cubics` from row to
+    row (4, n - 1, m), coefficients from the third power down; x to `delivered` (n, m).
 
-    Behind the ramp that a drive settles to, c - lag c', it is e: of exp(-t / lag) in first order, in second order of
-    exp(-s t) (e C + (e' + s e) S) with s = 1 / (2 inertia lag), w^2 = s^2 - 1 / (inertia lag^2), C = cosh(w t), S = sinh(w t) / w.
+    Behind what a drive settles to, p = c - a c' + (a^2 - b) c'' - (a^3 - 2 a b) c''' with a = lag and b = inertia lag^2, it is e:
+    of exp(-t / a) in first order, in second order of exp(-s t) (e C + (e' + s e) S) with s = a / (2 b), w^2 = s^2 - 1 / b,
+    C = cosh(w t), S = sinh(w t) / w.
     """
-    for j in range(command.shape[1]):
-        x, v = command[0, j], 0.0
+    b = inertia * lag * lag
+    second, third = lag * lag - b, lag * (lag * lag - 2.0 * b)
+    for j in range(cubics.shape[2]):
+        x, v = cubics[3, 0, j], 0.0
         delivered[0, j] = x
         for i in range(1, time.size):
             t = time[i] - time[i - 1]
-            slope = (command[i, j] - command[i - 1, j]) / t
-            e = x - command[i - 1, j] + lag * slope
+            jerk, bend, slope, c = 6.0 * cubics[0, i - 1, j], 2.0 * cubics[1, i - 1, j], cubics[2, i - 1, j], cubics[3, i - 1, j]
+            e = x - (c - lag * slope + second * bend - third * jerk)
+            u = v - (slope - lag * bend + second * jerk)
+            c += t * (slope + t * (bend / 2.0 + t * jerk / 6.0))
+            slope += t * (bend + t * jerk / 2.0)
+            bend += t * jerk
             if inertia == 0.0:
                 e *= np.exp(-t / lag)
             else:
-                stiff = 1.0 / (inertia * lag * lag)
-                s = 0.5 * stiff * lag
-                w = np.sqrt(abs(s * s - stiff))
+                s = 0.5 * lag / b
+                w = np.sqrt(abs(s * s - 1.0 / b))
                 if w * t < 1e-6:  # critically damped: the error is the square of it
                     C, S = np.exp(-s * t), t * np.exp(-s * t)
-                elif s * s > stiff:
-                    fast, slow = np.exp(-(s + w) * t), np.exp(-stiff / (s + w) * t)
+                elif s * s > 1.0 / b:
+                    fast, slow = np.exp(-(s + w) * t), np.exp(-t / (b * (s + w)))
                     C, S = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
                 else:
                     C, S = np.exp(-s * t) * np.cos(w * t), np.exp(-s * t) * np.sin(w * t) / w
-                u = v - slope
-                e, v = e * C + (u + s * e) * S, slope + u * C - (stiff * e + s * u) * S
-            x = command[i, j] - lag * slope + e
+                e, u = e * C + (u + s * e) * S, u * C - (e / b + s * u) * S
+            x = c - lag * slope + second * bend - third * jerk + e
+            v = slope - lag * bend + second * jerk + u
             delivered[i, j] = x
 
 
@@ -49,7 +55,7 @@ class ActuatorLag(Effect):
     Damping ratio 1 / (2 sqrt(inertia)): up to 0.25 two first-order lags in series, beyond it the drive overshoots. Behind a steady
     ramp it is late by `time` whatever its inertia.
 
-    Acts on whatever drives the tendons, tension or displacement. Between two rows the command is a straight line.
+    Acts on whatever drives the tendons, tension or displacement. Between two rows the command is as `Signals.smooth` says.
 
     Source: linear system theory; a valve, a motor's current loop, a gearbox: 10 ms to 1 s.
 
@@ -70,12 +76,12 @@ class ActuatorLag(Effect):
     moves_with = "the rate of change of the pull"
 
     def drive(self, command: Signals) -> Signals:
-        tension, displacement = command.tension, command.displacement
         if self["time"] > 0.0 and len(command.time) > 1:
-            tension, displacement = self._lagged(command.time, tension), self._lagged(command.time, displacement)
-        return command.with_(tension=tension, displacement=displacement)
+            tension, displacement = (self._lagged(command, c) for c in (command.tension, command.displacement))
+            return command.with_(tension=tension, displacement=displacement)
+        return command
 
-    def _lagged(self, time: np.ndarray, command: np.ndarray) -> np.ndarray:
+    def _lagged(self, signals: Signals, command: np.ndarray) -> np.ndarray:
         out = np.empty_like(command)
-        follow(np.asarray(time, float), np.ascontiguousarray(command, float), self["time"], self["inertia"], out)
+        follow(np.asarray(signals.time, float), between_rows(signals, command).c, self["time"], self["inertia"], out)
         return out

@@ -25,6 +25,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator, PPoly
 
 from twin.errors import TwinError
 from twin.quantities import Parameter, Values, overrides
@@ -113,6 +114,7 @@ class Signals:
     at the motor; markers (n, n_marker, 3) m; temperature (n,) K of the room; `drives`, what drives each tendon, and current
     (n, n_tendon) A of the SMA springs. On the way in (`command`, `drive`) what does not drive a tendon is zero. `antagonists`: two
     tendons pretensioned against each other on a rigid joint. `others`: further groups a body shows, by name, (n, n_port) SI.
+    `smooth`: commands pass through their rows by monotone cubics, as a log's may; else they go straight from row to row.
     """
 
     time: np.ndarray
@@ -125,6 +127,7 @@ class Signals:
     current: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
     antagonists: bool = False
     others: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
+    smooth: bool = False
 
     @property
     def by_length(self) -> np.ndarray:
@@ -150,6 +153,14 @@ class Signals:
             return self.markers
         own = {"tension": self.tension, "displacement": self.displacement}
         return (own | dict(self.others))[name][..., None]
+
+
+def between_rows(signals: Signals, command: np.ndarray) -> PPoly:
+    """Commands (n, n_tendon) of a trial of two rows or more at any moment within it."""
+    if signals.smooth:
+        return PchipInterpolator(signals.time, command)
+    chords = np.diff(command, axis=0) / np.diff(signals.time)[:, None]
+    return PPoly(np.stack([0.0 * chords, 0.0 * chords, chords, command[:-1]]), signals.time)
 
 
 @dataclass(frozen=True)

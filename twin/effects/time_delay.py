@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
-from twin.effects.effect import Effect, Signals
+from twin.effects.effect import Effect, Signals, between_rows
 from twin.quantities import Parameter
 
 
 class TimeDelay(Effect):
-    """Outputs logged late: y_logged(t) = y(t - delay), driven by T(t - delay), by monotone cubics.
+    """Outputs logged late: y_logged(t) = y(t - delay), driven by T(t - delay), between rows as `Signals.smooth` says.
 
     The input is shifted, not the predicted output: a shape between two samples is one the robot can take; a straight line between
     two shapes is not. Before the log starts the first value holds.
@@ -34,8 +33,8 @@ class TimeDelay(Effect):
         if self["delay"] == 0.0 or len(t) < 2:
             return reported
         then = np.clip(t - self["delay"], t[0], t[-1])
-        pull, travel = PchipInterpolator(t, reported.tension), PchipInterpolator(t, reported.displacement)
-        return reported.with_(tension=pull(then), displacement=travel(then), current=self._heating(reported))
+        pull, travel = (between_rows(reported, c)(then) for c in (reported.tension, reported.displacement))
+        return reported.with_(tension=pull, displacement=travel, current=self._heating(reported))
 
     def _heating(self, reported: Signals) -> np.ndarray:
         """Currents, which hold from row to row, as shifted: over each row the one that heats as much. None flows before the log."""
