@@ -56,6 +56,12 @@ def test_a_set_with_an_immaterial_effect_does_not_count() -> None:
     assert probability(found, "friction", set()) > 0.5
 
 
+def test_an_effect_weighed_only_beside_an_immaterial_one_has_the_share_it_had_there() -> None:
+    found = sets(friction=0.0, friction__lag__delay=20.0)
+    assert probability(found, "lag", {"delay"}) == pytest.approx(np.e / (1.0 + np.e))
+    assert probability(found, "friction", {"delay"}) == pytest.approx(1.0)
+
+
 BASE, FRICTION, BOTH, CREEP, DELAY = (), ("friction",), ("creep", "friction"), ("creep",), ("delay",)
 
 

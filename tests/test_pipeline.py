@@ -33,6 +33,7 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
     stage("screen", screening)
     stage("search", "found")
     stage("choose", "chosen")
+    stage("lateness", "told")
     stage("gate", "gated")
     stage("judge", "judged")
     settings = Settings(seed=7)
@@ -42,10 +43,11 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         "screen": (study, "base", 7),
         "search": (study, "base", "patterns", "bars"),
         "choose": (study, "found", "bars"),
-        "gate": (study, "chosen", screening),
-        "judge": (study, "chosen", "gated", "bars"),
+        "lateness": (study, "chosen", "bars"),
+        "gate": (study, "told", screening),
+        "judge": (study, "told", "gated", "bars"),
     }
-    assert (made.study, made.found, made.gated, made.judged) == (study, "chosen", "gated", "judged")
+    assert (made.study, made.found, made.gated, made.judged) == (study, "told", "gated", "judged")
     assert made.notices[0] == "a note"
     assert "not tried: friction" in made.notices[1]
 

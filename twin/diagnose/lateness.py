@@ -18,6 +18,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from twin.bench import Bench
 from twin.calibrate import fit
+from twin.diagnose.null import Thresholds
 from twin.diagnose.objective import sensitivity
 from twin.diagnose.path import Path, path
 from twin.diagnose.search import Search
@@ -53,13 +54,13 @@ class Weight:
     values: Mapping[str, Mapping[str, float]]
 
 
-def lateness(study: Study, found: Search, accept: float) -> Search:
+def lateness(study: Study, found: Search, bars: Thresholds) -> Search:
     """`found` with its laws of lateness weighed anew, where its best set has one."""
     laws = LATE & set(found.best.effects)
     if not laws or study.bench.driven_by(Drive.CURRENT).any() or not study.budget.allows("what makes it late"):
         return found
     study.progress("what makes it late")
-    weights = weighed(given(study, found.best), typical(found.best), accept)
+    weights = weighed(given(study, found.best), typical(found.best), bars.accept)
     if weights is None:
         return found
     likely = max(weights, key=lambda f: weights[f].score)

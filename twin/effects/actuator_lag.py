@@ -68,7 +68,7 @@ class ActuatorLag(Effect):
     id = "actuator_lag"
     parameters = (
         Parameter("time", 0.0, "s", 0.0, 5.0, "time constant; what a bench log's rows can show", scale=0.05),
-        Parameter("inertia", 0.0, "", 0.0, 10.0, "1 / (4 damping ratio^2); 0: first order", scale=0.2),
+        Parameter("inertia", 0.0, "1", 0.0, 10.0, "1 / (4 damping ratio^2); 0: first order", scale=0.2),
     )
     richer = ("inertia",)
     akin = ("time_delay",)
