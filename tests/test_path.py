@@ -33,33 +33,32 @@ def test_a_smooth_command_is_known_better_than_it_is_read() -> None:
     """Its error between rows is below the reading's noise; straight lines between readings are off by more than that noise."""
     rng = np.random.default_rng(1)
     time, rows, fine, true = logged("smooth", rng)
-    found = path(time, rows, NOISE, rng)
+    found = path(time, rows, NOISE)
     error = np.sqrt(np.mean((at(fine, found.time, found.mean) - true) ** 2))
     assert error < 0.8 * NOISE
     assert np.sqrt(np.mean((at(fine, time, rows) - true) ** 2)) > 0.8 * NOISE
 
 
 @pytest.mark.parametrize(("kind", "least"), [("smooth", 0.85), ("corners", 0.75)])
-def test_the_paths_drawn_hold_the_true_one(kind: str, least: float) -> None:
-    """90 % intervals by the draws' spread, over eight logs. The looseness is found from these rows too, which costs some of their
-    cover; near corners the true path is no draw of any spline."""
+def test_the_true_path_is_where_it_is_said_to_be(kind: str, least: float) -> None:
+    """90 % intervals over eight logs. The looseness is found from these rows too, which costs some of their
+    cover; a true corner is no draw of any spline."""
     inside = []
     for seed in range(8):
         rng = np.random.default_rng(seed)
         time, rows, fine, true = logged(kind, rng)
-        found = path(time, rows, NOISE, rng)
+        found = path(time, rows, NOISE)
         true = at(found.time, fine, true)
-        inside.append(np.abs(true - found.mean) < norm.ppf(0.95) * found.drawn.std(axis=2))
+        inside.append(np.abs(true - found.mean) < norm.ppf(0.95) * np.sqrt(found.variance)[:, None])
     assert least < np.mean(inside) < 0.99
 
 
 def test_readings_without_noise_are_kept() -> None:
     """Down to a ten-thousandth of the range, and a command that does not move at all is fine."""
-    rng = np.random.default_rng(2)
     time = np.linspace(0.0, 2.0, 21)
     rows = np.stack([np.sin(3.0 * time), np.zeros(21), time], axis=1)
-    found = path(time, rows, 0.0, rng)
+    found = path(time, rows, 0.0)
     assert np.abs(found.mean[::4] - rows).max() < 5e-4
-    assert np.isfinite(found.drawn).all()
-    still = path(time, np.zeros((21, 3)), 0.0, rng)
-    assert np.abs(still.drawn).max() < 1e-9
+    assert np.isfinite(found.variance).all()
+    still = path(time, np.zeros((21, 3)), 0.0)
+    assert np.abs(still.mean).max() < 1e-9

@@ -43,7 +43,7 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         "screen": (study, "base", 7),
         "search": (study, "base", "patterns", "bars"),
         "choose": (study, "found", "bars"),
-        "lateness": (study, "chosen", "bars"),
+        "lateness": (study, "chosen"),
         "gate": (study, "told", screening),
         "judge": (study, "told", "gated", "bars"),
     }

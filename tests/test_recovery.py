@@ -21,12 +21,14 @@ from twin.bench import prepare
 from twin.calibrate import Fit, fit
 from twin.diagnose import Settings
 from twin.diagnose.evidence import Evidence
+from twin.diagnose.lateness import given, lateness, typical, weighed
 from twin.diagnose.objective import objective_of
 from twin.diagnose.patterns import dictionary
 from twin.diagnose.ranking import rank
+from twin.diagnose.search import Search
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import ACCEPT
-from twin.diagnose.weigh import fuller, weigh
+from twin.diagnose.thresholds import ACCEPT, CLEAR
+from twin.diagnose.weigh import extended, fuller, weigh
 from twin.effects import catalogue
 from twin.robots import load
 from twin.twin import Twin
@@ -77,6 +79,43 @@ def test_it_recovers_its_own_parameters(bench: Day, effect: str, design: str) ->
     before, after = (float(np.mean(f.z[f.z != 0] ** 2)) for f in (base, fitted))
     assert after - 1.0 < 0.25 * (before - 1.0)
     assert tolerance == OTHER or effect == "contact" or after < 1.15
+
+
+def taken_for(bench: Day, true: str, wrong: str) -> tuple[Study, Search, Truth]:
+    """A day on which something is late, fitted with the wrong law of lateness alone."""
+    recording, truth = bench(true, STRENGTH.get(true, 2.0))
+    assert truth is not None
+    robot = load("continuum")
+    prepared = prepare(recording, robot)
+    trials = list(range(len(prepared.inputs)))
+    start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
+    study = Study(objective, Evidence(prepared, trials))
+    base = weigh(study, fit(objective, start, refresh=True))
+    taken = extended(study, base, wrong, next(iter(catalogue()[wrong].starts([], 3))))
+    assert taken is not None
+    return study, Search(base, taken, (taken, base)), truth
+
+
+def test_a_lag_that_was_taken_for_a_delay_takes_its_place(bench: Day) -> None:
+    study, before, truth = taken_for(bench, "actuator_lag", "time_delay")
+    found = lateness(study, before)
+    assert found.best.effects == ("actuator_lag",)
+    assert found.best is found.all[0]
+    assert found.best.score > before.best.score
+    assert {w.effects for w in found.all} == {("actuator_lag",), ("time_delay",), ()}
+    values = next(e for e in found.best.fit.model.twin.effects if e.id == "actuator_lag").values
+    true, got, tolerance = COMPARED["actuator_lag"](truth, values)
+    assert distance(true, got) < tolerance
+
+
+def test_a_delay_that_was_taken_for_a_lag_is_nearly_as_likely_as_the_lag(bench: Day) -> None:
+    """To within what counts as clear: one of 0.08 s, where fast trials have a row every 0.12 s, is nearly a lag of damping 0.7."""
+    study, before, _ = taken_for(bench, "time_delay", "actuator_lag")
+    weights = weighed(given(study, before.best), typical(before.best))
+    assert weights is not None
+    delay, lag = (weights[frozenset({law})] for law in ("time_delay", "actuator_lag"))
+    assert abs(delay.score - lag.score) < CLEAR
+    assert delay.values["time_delay"]["delay"] == pytest.approx(0.08, rel=0.05)
 
 
 @pytest.mark.parametrize(("seed", "worn"), [(5, (0.0, 0.0, 1.0)), (7, (1.0, 1.0, 1.0))])

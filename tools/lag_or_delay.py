@@ -20,7 +20,6 @@ from twin.diagnose.calibrate import calibrate
 from twin.diagnose.lateness import LATE, given, typical, weighed
 from twin.diagnose.look import looked_at
 from twin.diagnose.study import silent
-from twin.diagnose.thresholds import ACCEPT
 from twin.diagnose.weigh import Weighed, extended
 from twin.effects import Start
 from twin.measurements import read
@@ -50,7 +49,7 @@ def main() -> None:
             study, base, _ = calibrate(looked.bench, twin, looked.sealed, looked.nominal, settings, silent)
             tried = [extended(study, base, name, start) for name, start in STARTS.items()]
             best: Weighed = max((w for w in tried if w is not None), key=lambda w: w.score)
-            weights = weighed(given(study, best), typical(best), ACCEPT)
+            weights = weighed(given(study, best), typical(best))
         if weights is None:
             print(f"{row['seed']} {row['true'][0]}: early by {-typical(best):.3f} s", flush=True)
             continue

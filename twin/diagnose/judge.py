@@ -118,8 +118,8 @@ def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
 
 
 def probability(found: Search, effect: str, small: set[str]) -> float:
-    """Share of the tempered weight exp(score / 20) of sets with the effect; sets with a `small`, immaterial one do not count, unless
-    the effect was weighed beside such a one only."""
+    """Share of the tempered weight exp(score / 20) of sets with the effect; sets with a `small`, immaterial one do not count,
+    unless the effect was weighed beside such a one only."""
     material = [w for w in found.all if not small & set(w.effects)]
     if not any(effect in w.effects for w in material):
         material = list(found.all)

@@ -4,8 +4,9 @@ The laws differ in what they make of a command within a few tenths of a second, 
 and only with the noise of its reading. The search takes commands to run straight from row to row; on such paths a lag, which
 smooths, beats a delay where readings are noisy, and loses to it where corners fall between rows. So the laws are weighed anew, by
 what the outputs say the tendons were given: at each row u, with covariance C, from residuals, their noise and the outputs'
-sensitivities. A law applied to what the command may have been (`path`) predicts it with mean m and covariance V, and is worth
-2 sum log t(u - m; V + C) - k log n, t Student's.
+sensitivities. What the command was between rows is known with a variance (`path`), of which V is that of commands as late as the
+robot is. A law that makes m of the likeliest path is worth 2 sum log t(u - m; C + V) - k log n, t Student's. V is one for all laws:
+each by its own would be a likelihood if rows were independent; a lag blurs over rows what is unknown and seems surer than it is.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize, minimize_scalar
 
 from twin.bench import Bench
 from twin.calibrate import fit
-from twin.diagnose.null import Thresholds
 from twin.diagnose.objective import sensitivity
 from twin.diagnose.path import Path, path
 from twin.diagnose.search import Search
@@ -37,12 +38,12 @@ Form = Callable[[np.ndarray], tuple[float, float, float]]  # free numbers -> del
 
 @dataclass(frozen=True)
 class Given:
-    """What the outputs of a trial say its tendons were given: `pull` (n, n_tendon) at `time` (n,), with covariance (n, n_tendon,
-    n_tendon); and what was commanded."""
+    """What the outputs of a trial say its tendons were given: `pull` (n, n_tendon) at `time` (n,), with precision (n, n_tendon,
+    n_tendon), that of commands counted; and what was commanded."""
 
     time: np.ndarray
     pull: np.ndarray
-    covariance: np.ndarray
+    precision: np.ndarray
     command: Path
 
 
@@ -54,13 +55,13 @@ class Weight:
     values: Mapping[str, Mapping[str, float]]
 
 
-def lateness(study: Study, found: Search, bars: Thresholds) -> Search:
+def lateness(study: Study, found: Search) -> Search:
     """`found` with its laws of lateness weighed anew, where its best set has one."""
     laws = LATE & set(found.best.effects)
     if not laws or study.bench.driven_by(Drive.CURRENT).any() or not study.budget.allows("what makes it late"):
         return found
     study.progress("what makes it late")
-    weights = weighed(given(study, found.best), typical(found.best), bars.accept)
+    weights = weighed(given(study, found.best), typical(found.best))
     if weights is None:
         return found
     likely = max(weights, key=lambda f: weights[f].score)
@@ -107,11 +108,11 @@ def _in_place(study: Study, best: Weighed, likely: Weight) -> Weighed | None:
         return None
 
 
-def weighed(trials: list[Given], late: float, accept: float) -> dict[Laws, Weight] | None:
+def weighed(trials: list[Given], late: float) -> dict[Laws, Weight] | None:
     """Every law by itself and both, for a robot some `late` seconds late; None for one that is early, which no drive is.
 
-    What a lag of second order or both laws bring must pay `accept` besides: they bend to what `path` does not know of corners. Both
-    must be clearly better than a lag of second order, of which an overdamped one is nearly a delay and a lag.
+    A lag of second order must be clearly better than what is simpler, since it bends to what `path` does not know of corners and
+    smooths its errors; both laws clearly better than that, of which an overdamped one is nearly a delay and a lag.
     """
     if late <= 0.0:
         return None
@@ -124,14 +125,14 @@ def weighed(trials: list[Given], late: float, accept: float) -> dict[Laws, Weigh
     cost = float(np.log(n))
     lagging = max(
         Weight(first[0] - cost, {"actuator_lag": {"time": first[1][1]}}),
-        Weight(second[0] - 2 * cost - accept, {"actuator_lag": {"time": second[1][1], "inertia": second[1][2]}}),
+        Weight(second[0] - 2 * cost - CLEAR, {"actuator_lag": {"time": second[1][1], "inertia": second[1][2]}}),
         key=lambda w: w.score,
     )
     together = {"time_delay": {"delay": both[1][0]}, "actuator_lag": {"time": both[1][1]}}
     return {
         delay: Weight(delayed[0] - cost, {"time_delay": {"delay": delayed[1][0]}}),
         lag: lagging,
-        delay | lag: Weight(both[0] - 2 * cost - accept - CLEAR, together),
+        delay | lag: Weight(both[0] - 2 * cost - 2 * CLEAR, together),
     }
 
 
@@ -156,22 +157,18 @@ def _best(trials: list[Given], form: Form, start: np.ndarray) -> tuple[float, tu
 
 def likelihood(seen: Given, delay: float, lag: float, inertia: float) -> float:
     """Log likelihood, up to a constant, of what the tendons of a trial were given, under such a law."""
-    way, (n, tendons) = seen.command, seen.pull.shape
-    columns = np.concatenate([way.mean[:, :, None], way.drawn], axis=2).reshape(len(way.time), -1)
+    way, tendons = seen.command, seen.pull.shape[1]
+    delivered = way.mean
     if lag > 0.0:
-        delivered = np.empty_like(columns)
-        straight = np.diff(columns, axis=0) / np.diff(way.time)[:, None]
-        follow(way.time, np.stack([0.0 * straight, 0.0 * straight, straight, columns[:-1]]), lag, inertia, delivered)
-        columns = delivered
-    then = np.clip(seen.time - delay, way.time[0], way.time[-1])
-    i = np.clip(np.searchsorted(way.time, then, side="right") - 1, 0, len(way.time) - 2)
-    share = ((then - way.time[i]) / (way.time[i + 1] - way.time[i]))[:, None]
-    rows = ((1.0 - share) * columns[i] + share * columns[i + 1]).reshape(n, tendons, -1)
-    off = rows[:, :, 1:] - rows[:, :, :1]
-    V = seen.covariance + np.einsum("nad,nbd->nab", off, off) / off.shape[2]
-    e = seen.pull - rows[:, :, 0]
-    square = np.einsum("na,na->n", e, np.linalg.solve(V, e[:, :, None])[:, :, 0])
-    return float(np.sum(-0.5 * (TAILS + tendons) * np.log1p(square / TAILS) - 0.5 * np.linalg.slogdet(V)[1]))
+        chords, delivered = np.diff(way.mean, axis=0) / np.diff(way.time)[:, None], np.empty_like(way.mean)
+        follow(way.time, np.stack([0.0 * chords, 0.0 * chords, chords, way.mean[:-1]]), lag, inertia, delivered)
+    e = seen.pull - then(way.time, delivered, seen.time - delay)
+    return float(-0.5 * (TAILS + tendons) * np.log1p(np.einsum("na,nab,nb->n", e, seen.precision, e) / TAILS).sum())
+
+
+def then(time: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
+    """Values (n, m) at `time` (n,) as they were at the moments `when`; what was before the first of them is as the first."""
+    return make_interp_spline(time, values, k=1)(np.clip(when, time[0], time[-1]))
 
 
 def given(study: Study, best: Weighed) -> list[Given]:
@@ -181,12 +178,11 @@ def given(study: Study, best: Weighed) -> list[Given]:
     laws = [e for e in twin.effects if e.id in LATE]
     chosen = _fastest(bench, study.trials)
     G = sensitivity(bench, chosen, twin, [readings(bench, report(twin.effects, at.traces[k].true)) for k in chosen], at.traces)
-    noise, rng = study.objective.whitener.noise, np.random.default_rng(0)
-    out = []
+    noise, late, out = study.objective.whitener.noise, max(0.0, typical(best)), []
     for k, g in zip(chosen, G, strict=True):
-        inputs, late = bench.inputs[k], bench.inputs[k].signals
+        inputs, delivered = bench.inputs[k], bench.inputs[k].signals
         for law in laws:
-            late = law.drive(law.command(late))
+            delivered = law.drive(law.command(delivered))
         raw = at.raw[place[k]]
         seen = np.isfinite(raw)
         per_sigma = np.where(seen[:, :, None], g / noise.sigma[:, None], 0.0)
@@ -194,8 +190,10 @@ def given(study: Study, best: Weighed) -> list[Given]:
         span = max(float(np.ptp(inputs.command)), 1e-9)  # what no output shows is somewhere within it
         covariance = np.linalg.inv(np.einsum("nma,nmb->nab", per_sigma, per_sigma) + np.eye(bench.n_tendon) / span**2)
         more = np.einsum("nab,nmb,nm->na", covariance, per_sigma, r)
-        way = path(inputs.time, _driving(bench, inputs.signals), float(np.mean(noise.drive)), rng)
-        out.append(Given(inputs.time, _driving(bench, late) + more, covariance, way))
+        way = path(inputs.time, _driving(bench, inputs.signals), float(np.mean(noise.drive)))
+        unknown = then(way.time, way.variance, inputs.time - late)
+        precision = np.linalg.inv(covariance + unknown[:, None, None] * np.eye(bench.n_tendon))
+        out.append(Given(inputs.time, _driving(bench, delivered) + more, precision, way))
     return out
 
 

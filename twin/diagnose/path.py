@@ -13,32 +13,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnose.thresholds import EVENLY, EXACT, NEIGHBOUR, PATHS, SPLINE, SUBROWS
+from twin.diagnose.thresholds import EVENLY, EXACT, NEIGHBOUR, SPLINE, SUBROWS
 
 
 @dataclass(frozen=True)
 class Path:
-    """Commands between rows: `time` (n_fine,), `mean` (n_fine, n_tendon), and what they may be as well, `drawn` (n_fine, n_tendon,
-    PATHS)."""
+    """Commands between rows: `time` (n_fine,), `mean` (n_fine, n_tendon), and the `variance` (n_fine,) of each of them."""
 
     time: np.ndarray
     mean: np.ndarray
-    drawn: np.ndarray
+    variance: np.ndarray
 
 
-def path(time: np.ndarray, command: np.ndarray, noise: float, rng: np.random.Generator) -> Path:
+def path(time: np.ndarray, command: np.ndarray, noise: float) -> Path:
     """Of rows at `time` (n,) s with `command` (n, n_tendon), read with `noise`; `SUBROWS` moments for each row."""
-    n, tendons = command.shape
+    n = len(command)
     unit = max(noise, EXACT * float(np.ptp(command, axis=0).max()), 1e-12)
     fine = np.interp(np.arange((n - 1) * SUBROWS + 1) / SUBROWS, np.arange(n), time)
-    step = np.diff(fine) / np.median(np.diff(time))
-    rows, read = command / unit, np.arange(n) * SUBROWS
-    q = np.repeat(_intensity(np.diff(time) / np.median(np.diff(time)), rows), SUBROWS)
-    drawn = _drawn(step, q, tendons * PATHS, rng)
-    seen = drawn[read] + rng.standard_normal((n, tendons * PATHS))
-    found = _smooth(step, q, read, np.hstack([rows, np.repeat(rows, PATHS, axis=1) - seen])).state[:, 0]
-    drawn = (drawn + found[:, tendons:]).reshape(len(fine), tendons, PATHS)
-    return Path(fine, unit * found[:, :tendons], unit * drawn)
+    interval = float(np.median(np.diff(time)))
+    q = _intensity(np.diff(time) / interval, command / unit)
+    found = _smooth(np.diff(fine) / interval, np.repeat(q, SUBROWS), np.arange(n) * SUBROWS, command / unit)
+    return Path(fine, unit * found.state[:, 0], unit**2 * found.spread[:, 0, 0])
 
 
 @dataclass(frozen=True)
@@ -103,13 +98,3 @@ def _smooth(step: np.ndarray, q: np.ndarray, read: np.ndarray, rows: np.ndarray)
         across[i + 1] = spread[i + 1] @ back.T
         spread[i] = spread[i] + back @ (spread[i + 1] - wide[i + 1]) @ back.T
     return _Smoothed(state, spread, across)
-
-
-def _drawn(step: np.ndarray, q: np.ndarray, columns: int, rng: np.random.Generator) -> np.ndarray:
-    """Commands (n, n_column) as likely as the spline takes them to be before a row is read, from rest at zero."""
-    F, Q = _steps(step)
-    push = np.linalg.cholesky(q[:, None, None] * Q) @ rng.standard_normal((len(step), 2, columns))
-    state = np.zeros((len(step) + 1, 2, columns))
-    for i in range(len(step)):
-        state[i + 1] = F[i] @ state[i] + push[i]
-    return state[:, 0]

@@ -100,7 +100,7 @@ def conclude(
     study, base, notes = calibrate(bench, twin, sealed, nominal, settings, progress)
     screening = screen(study, base, settings.seed)
     found = choose(study, search(study, base, screening.patterns, screening.bars), screening.bars)
-    found = lateness(study, found, screening.bars)
+    found = lateness(study, found)
     gated = gate(study, found, screening)
     return Conclusion(study, screening, found, gated, judge(study, found, gated, screening.bars), (*notes, *study.budget.words()))
 

@@ -248,7 +248,6 @@ SPLINE = _row(
     "SPLINE", 10, "rounds", "of expectation maximisation; after 20 paths are too stiff: outputs were met worse on 7 of 8 days",
     "python -m tools.lag_or_delay results/, neighbours not heard",
 )  # fmt: skip
-PATHS = _row("PATHS", 32, "paths", "of which a covariance of three tendons is taken, to a quarter", "derivation: sqrt(2 / 32)")
 TAILS = _row(
     "TAILS", 4.0, "degrees of freedom", "of Student's t: a corner of a command that no spline sees is an outlier, not a law",
     "judgement"
