@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from twin.diagnose.lateness import Given, likelihood, rescored, weighed
+from twin.diagnose.lateness import Given, lateness, likelihood, rescored, weighed
 from twin.diagnose.path import path
+from twin.effects import Drive
 
 LAG, DELAY = frozenset({"actuator_lag"}), frozenset({"time_delay"})
 SEEN = 0.02  # N, how well outputs show a pull
@@ -120,3 +123,18 @@ def test_sets_differ_by_what_their_laws_of_lateness_are_worth() -> None:
     assert after["time_delay", "tip_payload"] == pytest.approx(500.0 - behind)
     assert after["time_delay",] == pytest.approx(90.0 - behind)
     assert after[()] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("effects", "drives"),
+    [
+        (("tip_payload",), (Drive.TENSION,) * 3),
+        (("time_delay",), (Drive.CURRENT,) * 3),
+        (("time_delay",), (Drive.TENSION, Drive.DISPLACEMENT, Drive.TENSION)),
+    ],
+)
+def test_where_nothing_is_late_or_springs_remember_the_search_stays(effects: tuple[str, ...], drives: tuple[Drive, ...]) -> None:
+    """A study that has nothing but its drives: nothing else is asked for."""
+    found: Any = SimpleNamespace(best=Set(effects, 1.0))
+    study: Any = SimpleNamespace(bench=SimpleNamespace(drives=drives))
+    assert lateness(study, found) is found

@@ -63,6 +63,8 @@ GROUPS = {
     ),
     "evaluate": Group(("twin/evaluate.py",), ("tests/test_evaluate.py",)),
     "choose": _stage("choose"),
+    "lateness": _stage("lateness"),
+    "path": _stage("path"),
     "gate": _stage("gate"),
     "judge": _stage("judge"),
     "search": _stage("search"),

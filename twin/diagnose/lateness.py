@@ -1,12 +1,12 @@
 """Stage `lateness`: whether a drive that lags, a log that is delayed, or both make the robot late.
 
 The laws differ in what they make of a command within a few tenths of a second, and there a log knows the command only at its rows,
-and only with the noise of its reading. The search takes commands to run straight from row to row; on such paths a lag, which
-smooths, beats a delay where readings are noisy, and loses to it where corners fall between rows. So the laws are weighed anew, by
-what the outputs say the tendons were given: at each row u, with covariance C, from residuals, their noise and the outputs'
-sensitivities. What the command was between rows is known with a variance (`path`), of which V is that of commands as late as the
-robot is. A law that makes m of the likeliest path is worth 2 sum log t(u - m; C + V) - k log n, t Student's. V is one for all laws:
-each by its own would be a likelihood if rows were independent; a lag blurs over rows what is unknown and seems surer than it is.
+and only with the noise of its reading. The search takes one path through the rows for the true one; on it a lag, which smooths,
+beats a delay where readings are noisy, and loses to it where corners fall between rows. So the laws are weighed anew, by what the
+outputs say the tendons were given: at each row u, with covariance C, from residuals, their noise and the outputs' sensitivities.
+What the command was between rows is known with a variance (`path`), of which V is that of commands as late as the robot is. A law
+that makes m of the likeliest path is worth 2 sum log t(u - m; C + V) - k log n, t Student's. V is one for all laws: each by its own
+would be a likelihood if rows were independent; a lag blurs over rows what is unknown and seems surer than it is.
 """
 
 from __future__ import annotations
@@ -56,12 +56,14 @@ class Weight:
 
 
 def lateness(study: Study, found: Search) -> Search:
-    """`found` with its laws of lateness weighed anew, where its best set has one."""
-    laws = LATE & set(found.best.effects)
-    if not laws or study.bench.driven_by(Drive.CURRENT).any() or not study.budget.allows("what makes it late"):
+    """`found` with its laws of lateness weighed anew, where its best set has one and all tendons are driven alike, not by currents:
+    springs remember by themselves."""
+    laws, drives = LATE & set(found.best.effects), set(study.bench.drives)
+    if not laws or len(drives) > 1 or Drive.CURRENT in drives or not study.budget.allows("what makes it late"):
         return found
     study.progress("what makes it late")
-    weights = weighed(given(study, found.best), typical(found.best))
+    trials = given(study, found.best)
+    weights = weighed(trials, typical(found.best)) if trials else None
     if weights is None:
         return found
     likely = max(weights, key=lambda f: weights[f].score)
@@ -203,10 +205,11 @@ def _driving(bench: Bench, signals: Signals) -> np.ndarray:
 
 
 def _fastest(bench: Bench, trials: list[int]) -> list[int]:
-    """Trials by the rate of their commands, as many as `LATE_ROWS` hold and at least one."""
-    rate = {k: float(np.abs(np.diff(bench.inputs[k].command, axis=0)).sum() / np.ptp(bench.inputs[k].time)) for k in trials}
+    """Trials of three rows or more by the rate of their commands, as many as `LATE_ROWS` hold and at least one."""
+    long = [k for k in trials if len(bench.inputs[k].time) > 2]
+    rate = {k: float(np.abs(np.diff(bench.inputs[k].command, axis=0)).sum() / np.ptp(bench.inputs[k].time)) for k in long}
     out, rows = [], 0
-    for k in sorted(trials, key=lambda k: -rate[k]):
+    for k in sorted(long, key=lambda k: -rate[k]):
         rows += len(bench.inputs[k].time)
         if out and rows > LATE_ROWS:
             break
