@@ -174,7 +174,8 @@ def then(time: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
 
 
 def given(study: Study, best: Weighed) -> list[Given]:
-    """Of the fitted trials that move fastest, under the best set: what it has the tendons given, and what its residuals add."""
+    """Of the fitted trials that move fastest, `LATE_ROWS` of each at most, under the best set: what it has the tendons given, and
+    what its residuals add."""
     bench, at = study.bench, best.fit.evaluation
     twin, place = at.model.twin, {k: i for i, k in enumerate(study.trials)}
     laws = [e for e in twin.effects if e.id in LATE]
@@ -185,17 +186,18 @@ def given(study: Study, best: Weighed) -> list[Given]:
         inputs, delivered = bench.inputs[k], bench.inputs[k].signals
         for law in laws:
             delivered = law.drive(law.command(delivered))
-        raw = at.raw[place[k]]
+        rows = slice(0, LATE_ROWS)
+        raw, time, command = at.raw[place[k]][rows], inputs.time[rows], _driving(bench, inputs.signals)[rows]
         seen = np.isfinite(raw)
-        per_sigma = np.where(seen[:, :, None], g / noise.sigma[:, None], 0.0)
+        per_sigma = np.where(seen[:, :, None], g[rows] / noise.sigma[:, None], 0.0)
         r = np.where(seen, raw, 0.0) / noise.sigma
         span = max(float(np.ptp(inputs.command)), 1e-9)  # what no output shows is somewhere within it
         covariance = np.linalg.inv(np.einsum("nma,nmb->nab", per_sigma, per_sigma) + np.eye(bench.n_tendon) / span**2)
         more = np.einsum("nab,nmb,nm->na", covariance, per_sigma, r)
-        way = path(inputs.time, _driving(bench, inputs.signals), float(np.mean(noise.drive)))
-        unknown = then(way.time, way.variance, inputs.time - late)
+        way = path(time, command, float(np.mean(noise.drive)))
+        unknown = then(way.time, way.variance, time - late)
         precision = np.linalg.inv(covariance + unknown[:, None, None] * np.eye(bench.n_tendon))
-        out.append(Given(inputs.time, _driving(bench, delivered) + more, precision, way))
+        out.append(Given(time, _driving(bench, delivered)[rows] + more, precision, way))
     return out
 
 
