@@ -62,3 +62,15 @@ def test_readings_without_noise_are_kept() -> None:
     assert np.isfinite(found.variance).all()
     still = path(time, np.zeros((21, 3)), 0.0)
     assert np.abs(still.mean).max() < 1e-9
+
+
+def test_a_jump_among_still_rows_leaves_no_variance_below_zero() -> None:
+    """Looseness that differs by ten decades from one interval to the next cost a covariance by differences all its digits."""
+    rng = np.random.default_rng(3)
+    for n in (40, 75, 160):
+        time = np.cumsum(rng.uniform(0.3, 0.6, n))
+        rows = np.where(np.arange(n) < n // 3, 0.4, np.where(np.arange(n) < n // 2, 5.0, 2.5))[
+            :, None
+        ] + 1e-4 * rng.standard_normal((n, 3))
+        found = path(time, rows, 5e-4)
+        assert np.all(found.variance > 0.0)

@@ -96,5 +96,7 @@ def _smooth(step: np.ndarray, q: np.ndarray, read: np.ndarray, rows: np.ndarray)
         back = spread[i] @ F[i].T @ np.linalg.inv(wide[i + 1])
         state[i] = state[i] + back @ (state[i + 1] - ahead[i + 1])
         across[i + 1] = spread[i + 1] @ back.T
-        spread[i] = spread[i] + back @ (spread[i + 1] - wide[i + 1]) @ back.T
+        # P - G W G' as a sum of squares (Joseph's form): a difference of nearly equal numbers would come out below zero
+        keep = np.eye(2) - back @ F[i]
+        spread[i] = keep @ spread[i] @ keep.T + back @ (Q[i] + spread[i + 1]) @ back.T
     return _Smoothed(state, spread, across)
