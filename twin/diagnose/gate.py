@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from twin.diagnose.lateness import LATE, tells_laws
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Screening
@@ -98,11 +99,16 @@ def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[st
 
 def _doubt(study: Study, found: Search, screening: Screening, best: Weighed, without: dict[str, Weighed]) -> Doubt | None:
     """The first effect, of those smaller than what the design tells from its closest rival, that the rival in its place explains as
-    well to within five standard errors; None where there is none. A rival that is in the set itself was fitted beside it."""
+    well to within five standard errors; None where there is none. A rival that is in the set itself was fitted beside it. What
+    `lateness` weighed is claimed with its odds: either law predicts much better than none."""
     rows = {v.effect: v for v in screening.table}
     for effect in sorted(without, key=lambda e: contribution(study, best, without[e])):
         row = rows.get(effect)
-        if row is None or row.rival in ("", *best.effects) or contribution(study, best, without[effect]) >= row.apart:
+        if row is None or row.rival in ("", *best.effects):
+            continue
+        if {effect, row.rival} == LATE and tells_laws(study):
+            continue
+        if contribution(study, best, without[effect]) >= row.apart:
             continue
         other = _in_its_place(study, found, screening, without[effect], row.rival)
         if other is not None and other.score > best.score - CLEAR:

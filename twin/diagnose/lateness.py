@@ -58,8 +58,8 @@ class Weight:
 def lateness(study: Study, found: Search) -> Search:
     """`found` with its laws of lateness weighed anew, where its best set has one and all tendons are driven alike, not by currents:
     springs remember by themselves."""
-    laws, drives = LATE & set(found.best.effects), set(study.bench.drives)
-    if not laws or len(drives) > 1 or Drive.CURRENT in drives or not study.budget.allows("what makes it late"):
+    laws = LATE & set(found.best.effects)
+    if not laws or not tells_laws(study) or not study.budget.allows("what makes it late"):
         return found
     study.progress("what makes it late")
     trials = given(study, found.best)
@@ -73,6 +73,12 @@ def lateness(study: Study, found: Search) -> Search:
     ranked = rescored([best, *(w for w in found.all if w.effects != best.effects)], weights)
     best = next(w for w in ranked if w.effects == best.effects)
     return Search(found.base, best, tuple(sorted(ranked, key=lambda w: -w.score)))
+
+
+def tells_laws(study: Study) -> bool:
+    """Whether laws of lateness are weighed by what the tendons were given: all of them driven alike, not by currents."""
+    drives = set(study.bench.drives)
+    return len(drives) == 1 and Drive.CURRENT not in drives
 
 
 def rescored(sets: list[Weighed], weights: Mapping[Laws, Weight]) -> list[Weighed]:
