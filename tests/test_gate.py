@@ -13,6 +13,7 @@ from twin.diagnose.gate import gate
 from twin.diagnose.identifiability import Visibility
 from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Screening
+from twin.effects import Drive
 
 N = 10_000  # samples
 
@@ -55,8 +56,8 @@ class World:
     def gated(self, *effects: str, table: tuple[Visibility, ...] = (), accuracy: float = 0.0) -> Any:
         best = self.of(*effects)
         found: Any = SimpleNamespace(base=self.of(), best=best, all=(best, self.of()))
-        pattern: Any = SimpleNamespace(effect="rival", start=None)
-        screening = Screening(SimpleNamespace(patterns=(pattern,)), Thresholds(accuracy=accuracy), table)  # type: ignore[arg-type]
+        patterns: Any = tuple(SimpleNamespace(effect=v.rival, start=None) for v in table)
+        screening = Screening(SimpleNamespace(patterns=patterns), Thresholds(accuracy=accuracy), table)  # type: ignore[arg-type]
         return gate(self.study, found, screening)
 
 
@@ -136,15 +137,30 @@ def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(
     assert world.gated("friction", table=(row("friction", apart=0.6),)).best.effects == ("friction",), "the data tell them"
 
 
-def _as_good(world: World, effect: str, short: float) -> Any:
+@pytest.mark.parametrize(
+    ("drives", "kept"), [((Drive.TENSION,), ("time_delay",)), ((Drive.CURRENT,), ()), ((Drive.TENSION, Drive.DISPLACEMENT), ())]
+)
+def test_a_delay_weighed_against_a_lag_stays_and_one_that_was_not_is_in_doubt(
+    monkeypatch: pytest.MonkeyPatch, drives: tuple[Drive, ...], kept: tuple[str, ...]
+) -> None:
+    """What the tendons were given tells the two where all are driven alike, not by currents."""
+    world = World(monkeypatch, time_delay=0.5)
+    world.study.bench = SimpleNamespace(drives=drives)
+    world.of = _as_good(world, "time_delay", 20.0, rival="actuator_lag")  # type: ignore[method-assign]
+    found = world.gated("time_delay", table=(row("time_delay", apart=0.6, rival="actuator_lag"),))
+    assert found.best.effects == kept
+    assert len(found.doubts) == (0 if kept else 1)
+
+
+def _as_good(world: World, effect: str, short: float, rival: str = "rival") -> Any:
     """World.of in which the rival imitates the effect but for `short` of |z|^2."""
 
     def of(*effects: str) -> Any:
-        stands = tuple(effect if e == "rival" else e for e in effects)
+        stands = tuple(effect if e == rival else e for e in effects)
         made = World.of(world, *stands)
         made.effects = tuple(sorted(effects))
         made.fit.effects = made.effects
-        made.score -= short if "rival" in effects else 0.0
+        made.score -= short if rival in effects else 0.0
         return made
 
     return of

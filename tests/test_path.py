@@ -69,8 +69,7 @@ def test_a_jump_among_still_rows_leaves_no_variance_below_zero() -> None:
     rng = np.random.default_rng(3)
     for n in (40, 75, 160):
         time = np.cumsum(rng.uniform(0.3, 0.6, n))
-        rows = np.where(np.arange(n) < n // 3, 0.4, np.where(np.arange(n) < n // 2, 5.0, 2.5))[
-            :, None
-        ] + 1e-4 * rng.standard_normal((n, 3))
+        level = np.repeat([0.4, 5.0, 2.5], [n // 3, n // 2 - n // 3, n - n // 2])
+        rows = level[:, None] + 1e-4 * rng.standard_normal((n, 3))
         found = path(time, rows, 5e-4)
         assert np.all(found.variance > 0.0)

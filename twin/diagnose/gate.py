@@ -100,7 +100,7 @@ def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[st
 def _doubt(study: Study, found: Search, screening: Screening, best: Weighed, without: dict[str, Weighed]) -> Doubt | None:
     """The first effect, of those smaller than what the design tells from its closest rival, that the rival in its place explains as
     well to within five standard errors; None where there is none. A rival that is in the set itself was fitted beside it. What
-    `lateness` weighed is claimed with its odds: either law predicts much better than none."""
+    `lateness` weighed is claimed with its odds."""
     rows = {v.effect: v for v in screening.table}
     for effect in sorted(without, key=lambda e: contribution(study, best, without[e])):
         row = rows.get(effect)
