@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -35,6 +35,8 @@ TRUSTED = 0.75  # of the fall that derivatives foretold: where as much came, ste
 # off by 0.5 to 2 % where noise and the trials' disagreement gave errors of 0.2 to 0.7 %.
 LAW = 0.02
 UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
+
+Unsolved = Literal["raise", "zeros"]
 
 
 @dataclass(frozen=True)
@@ -145,15 +147,22 @@ class Objective:
     def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
 
-    def columns(self, at: Evaluation, models: Sequence[tuple[Model, float]], once: bool = False) -> np.ndarray:
+    def columns(
+        self, at: Evaluation, models: Sequence[tuple[Model, float]], *, once: bool = False, unsolved: Unsolved = "raise"
+    ) -> np.ndarray:
         """White change of the residual per unit, (n, n_model), for neighbouring models and the size of their difference;
-        with `once` to first order in it."""
+        with `once` to first order in it. What has no equilibrium raises SolveError, or has a column of `"zeros"`."""
 
         def column(model: Model, size: float) -> np.ndarray:
             if _same_simulation(at.model.twin, model.twin):
                 predicted = [readings(self.bench, report(model.twin.effects, at.traces[k].true)) for k in self.trials]
             else:
-                predicted = self.predict(model.twin, at.traces, once=once)[1]
+                try:
+                    predicted = self.predict(model.twin, at.traces, once=once)[1]
+                except SolveError:
+                    if unsolved == "raise":
+                        raise
+                    return np.zeros(at.z.size)
             raw = [self.bench.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]
             return self.white(raw) / size
 

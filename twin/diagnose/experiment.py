@@ -7,8 +7,10 @@ present covariance, of |W (y_A - y_B)|^2; T = 25 separates them by five standard
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from twin.bench import Bench, Inputs, Output
 from twin.calibrate import Evaluation, Fit, Objective
@@ -19,6 +21,8 @@ from twin.errors import SolveError
 from twin.information import solve
 from twin.measurements import Channel
 from twin.residual import Noise, Whitener
+
+_Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, what a's adds to it
 
 
 @dataclass(frozen=True)
@@ -97,8 +101,8 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
     """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
     rivals = tuple(e.id for e in of_robot(a.model.twin.effects)), tuple(e.id for e in of_robot(b.model.twin.effects))
     bench, noise = _foreseen(bench, noise)
-    apart = []
-    for words, inputs in menu(bench):
+
+    def told(words: str, inputs: Inputs) -> _Apart | None:
         n = len(inputs.time)
         empty = np.zeros((n, len(bench.outputs)))
         imagined = replace(bench, inputs=(inputs,), measured=(empty,))
@@ -107,9 +111,12 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         objective = Objective(imagined, [0], whitener, jobs)
         try:
             at = objective.evaluate(b.model)
-            apart.append((words, inputs, objective, at, objective.evaluate(a.model).z - at.z))
+            return words, inputs, objective, at, objective.evaluate(a.model).z - at.z
         except SolveError:
-            continue
+            return None
+
+    found: Any = Parallel(n_jobs=jobs, prefer="threads", require="sharedmem")(delayed(told)(*trial) for trial in menu(bench))
+    apart: list[_Apart] = [trial for trial in found if trial is not None]
     best: Experiment | None = None
     for words, inputs, objective, at, d in sorted(apart, key=lambda trial: -float(trial[-1] @ trial[-1])):
         if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it

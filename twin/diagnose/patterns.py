@@ -10,7 +10,7 @@ import numpy as np
 from twin.bench import Bench
 from twin.calibrate import Fit, Model, Objective
 from twin.effects import Start, catalogue
-from twin.errors import SolveError, TwinError
+from twin.errors import TwinError
 from twin.twin import Twin, report
 
 
@@ -58,7 +58,8 @@ def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = N
             where = tuple(index.setdefault(m.twin, len(index)) for m, _ in models)
             patterns.append(Pattern(identifier, start, tuple(names), where))
             neighbours |= {m.twin: (m, size) for m, size in models}
-    return Dictionary(tuple(patterns), _solvable_columns(objective, fit, list(neighbours.values())))
+    # one without an equilibrium gets a column of zeros and so no gain
+    return Dictionary(tuple(patterns), objective.columns(fit.evaluation, list(neighbours.values()), unsolved="zeros"))
 
 
 def _patterns(model: Model, bench: Bench, identifier: str, start: Start) -> tuple[list[tuple[Model, float]], list[str]]:
@@ -72,17 +73,3 @@ def _patterns(model: Model, bench: Bench, identifier: str, start: Start) -> tupl
         value = start.values.get(name, off[name])
         models.append((model.with_effect(identifier, {**shape, name: value}, (), bench.n_tendon), value - off[name]))
     return models, names
-
-
-def _solvable_columns(objective: Objective, fit: Fit, neighbours: list[tuple[Model, float]]) -> np.ndarray:
-    """Columns of all neighbours; one that has no equilibrium gets a zero column and so no gain."""
-    try:
-        return objective.columns(fit.evaluation, neighbours)
-    except SolveError:
-        out = np.zeros((fit.z.size, len(neighbours)))
-        for i, neighbour in enumerate(neighbours):
-            try:
-                out[:, i] = objective.columns(fit.evaluation, [neighbour])[:, 0]
-            except SolveError:
-                continue
-        return out
