@@ -11,8 +11,10 @@ Drawn anew in every diagnosis: they depend on the data and the seed, on nothing 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from twin.calibrate import Fit, prior_weight
 from twin.diagnose.evidence import Spectrum
@@ -88,9 +90,14 @@ def draws(study: Study, base: Fit, known: Dictionary, seed: int) -> Draws:
         gain = np.maximum(gain, falls - len(i) * np.log(objective.n))
         fall = np.maximum(fall, falls)
     spectrum = Spectrum.of(objective.bench, objective.trials)
-    found = [evidence.discrepancy(z[:, d]) for d in range(DRAWS)]
-    lines = [spectrum.peak(z[:, d].reshape(f.mean.shape) - f.mean)[0] for d, f in enumerate(found)]
-    return Draws(gain, np.sqrt(fall / objective.n), np.array([f.size for f in found]), np.array(lines))
+
+    def left(of: np.ndarray) -> tuple[float, float]:
+        smooth = evidence.discrepancy(of)
+        return smooth.size, spectrum.peak(of.reshape(smooth.mean.shape) - smooth.mean)[0]
+
+    found: Any = Parallel(n_jobs=objective.jobs, prefer="threads", require="sharedmem")(delayed(left)(column) for column in z.T)
+    size, line = np.array(list(found)).T
+    return Draws(gain, np.sqrt(fall / objective.n), size, line)
 
 
 def quantile(x: np.ndarray) -> float:
