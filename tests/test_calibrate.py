@@ -21,6 +21,7 @@ from twin.diagnose.doubts import strained, unlikely
 from twin.diagnose.ranking import projected
 from twin.diagnose.split import split
 from twin.effects import catalogue
+from twin.errors import SolveError
 from twin.information import solve, untold
 from twin.measurements import Recording, read
 from twin.quantities import Parameter
@@ -291,6 +292,28 @@ def test_a_model_that_is_too_far_off_is_seen_at_the_first_trials(bench: Day, mon
     e = 0.2 * np.eye(len(x))[i]
     central = (objective.evaluate(model.at(x + e)).z - objective.evaluate(model.at(x - e)).z) / 0.4
     np.testing.assert_allclose(objective.jacobian(whole, [i])[:, 0], central, rtol=0, atol=0.12 + 0.01 * np.abs(central).max())
+
+
+def test_a_neighbour_without_equilibrium_takes_no_other_with_it(bench: Day, monkeypatch: pytest.MonkeyPatch) -> None:
+    prepared = prepare(bench(None, seed=5)[0].select(["slow_1"]), ROBOT)
+    objective, model = Objective(prepared, [0], _white(prepared, [0]), 2), Model.base(ROBOT)
+    at, x = objective.evaluate(model), model.vector()
+    near = [(model.at(x + 0.2 * e), 0.2) for e in np.eye(len(x))[:2]]
+    lost = model.at(x + 0.1).twin
+
+    def solved(twin: Twin, *rest: Any) -> Trace:
+        if twin == lost:
+            raise SolveError("no static equilibrium")
+        return one(twin, *rest)
+
+    monkeypatch.setattr(twin_module, "_trial", solved)
+    models = [near[0], (model.at(x + 0.1), 0.1), near[1]]
+    with pytest.raises(SolveError, match="no static equilibrium"):
+        objective.columns(at, models)
+    columns = objective.columns(at, models, unsolved="zeros")
+    np.testing.assert_array_equal(columns[:, 1], 0.0)
+    assert np.abs(columns[:, [0, 2]]).max(axis=0).min() > 0.0
+    np.testing.assert_array_equal(columns[:, [0, 2]], objective.columns(at, near))
 
 
 # ---- coverage: do intervals hold the truth as often as they say ----------------------------------------------------------------
