@@ -25,11 +25,16 @@ class Laws:
 
     def edit(self, body: Any, robot: str) -> None:
         """Change a body that is not compiled yet. Raises DataError for an effect that finds nothing to act on in the `robot`."""
+        self.find(body, robot)
+        for effect in self.effects:
+            effect.edit(body)
+
+    def find(self, body: Any, robot: str) -> None:
+        """Raises DataError for an effect that finds nothing to act on in the body of the `robot`."""
         for effect in self.effects:
             if lacking := effect.needs - body.parts:
                 what = " and ".join(sorted(lacking))
                 raise DataError(f"effect {effect.id} acts on {what}, which robot {robot!r} has not: remove the effect")
-            effect.edit(body)
 
     def command(self, reported: Signals) -> Signals:
         """The true inputs behind what was reported."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from twin.measurements import Recording
 from twin.measurements.channels import MADE
 from twin.quantities import Values
 from twin.robots import Robot, family, load
+from twin.solvers import lent
 
 READINGS = 30.0  # of a drive (`Drive.reading`): a smaller range of commands moves a robot too little to excite it
 
@@ -48,6 +50,19 @@ class Twin:
         body = self.robot.build(self.values)
         self.laws.edit(body, self.robot.name)
         return body
+
+    @contextmanager
+    def statics(self) -> Iterator[tuple[Body, Solver]]:
+        """Its body and the solver of its equilibria, for as long as they are needed. Raises as `body`."""
+        shaped = replace(self, effects=tuple(e for e in self.effects if e.acts_in("edit")))
+
+        def made() -> tuple[Body, Solver]:
+            body = shaped.body()
+            return body, self.robot.solver(body)
+
+        with lent(shaped, made) as (body, solver):
+            self.laws.find(body, self.robot.name)
+            yield body, solver
 
     def heating(self, ambient: np.ndarray) -> Heating:
         """Its SMA springs in surroundings at `ambient` (n,) K. Raises DataError where the robot describes none."""
@@ -143,8 +158,17 @@ def simulated(
     twin: Twin, bench: Bench, wanted: Sequence[int], way: Way | None = None, dynamic: bool = False
 ) -> Iterator[tuple[int, Trace]]:  # fmt: skip
     """As `simulate`, one trial after another; with creep all before the last wanted one, since the body remembers."""
-    way, laws, body = way or Way(), twin.laws, twin.body()
-    solver, creep = twin.robot.solver(body, dynamic=dynamic and set(bench.drives) <= body.stepped), laws.creep
+    if dynamic and set(bench.drives) <= (body := twin.body()).stepped:
+        yield from _run(twin, body, twin.robot.solver(body, dynamic=True), bench, wanted, way or Way())
+        return
+    with twin.statics() as (body, solver):
+        yield from _run(twin, body, solver, bench, wanted, way or Way())
+
+
+def _run(
+    twin: Twin, body: Body, solver: Solver, bench: Bench, wanted: Sequence[int], way: Way
+) -> Iterator[tuple[int, Trace]]:  # fmt: skip
+    creep = twin.laws.creep
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.n_slow))
     rested = 0.0
@@ -159,9 +183,9 @@ def simulated(
 
 def alone(twin: Twin, inputs: Inputs) -> Trace:
     """One trial by statics, by itself: nothing came before it. Raises as `simulate`."""
-    body, creep = twin.body(), twin.laws.creep
-    solver = twin.robot.solver(body)
-    return _trial(twin, body, solver, inputs, np.zeros((len(creep.amplitude), solver.n_slow)), None, Way())
+    creep = twin.laws.creep
+    with twin.statics() as (body, solver):
+        return _trial(twin, body, solver, inputs, np.zeros((len(creep.amplitude), solver.n_slow)), None, Way())
 
 
 def _trial(

@@ -99,12 +99,19 @@ class Equilibrium:
         ends = data.site_xpos[hole]
         self._arclength = data.site_xpos[disk, 2] / body.length  # of each disk on the straight robot
         self.straight_path: np.ndarray = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)  # (n_tendon,) m
-        for t in range(len(self.chain.lever)):
-            for d in range(pieces[t]):
-                a, b = ends[t, d], ends[t, d + 1]
-                for i in range(self.chain.first[d], self.chain.first[d + 1]):
-                    turned = np.cross(data.xaxis[i], b - data.xanchor[i]) * (hinge[i] and not twists[i])
-                    self.chain.lever[t, i] = turned @ (b - a) / np.linalg.norm(b - a)
+        if self.chain.lever.size:
+            self._in_channels(ends)
+
+    def _in_channels(self, ends: np.ndarray) -> None:
+        """Sets `chain.lever`: how much longer a bend makes the channel's piece it is in, the body straight, its holes at `ends`."""
+        chain = self.chain
+        span = np.diff(ends, axis=1)
+        along = span / np.maximum(np.linalg.norm(span, axis=2, keepdims=True), np.finfo(float).tiny)
+        joints = np.arange(chain.first[0], chain.first[-1])
+        piece = np.searchsorted(chain.first, joints, side="right") - 1
+        turned = np.cross(self.data.xaxis[joints], ends[:, piece + 1] - self.data.xanchor[joints])
+        bends = (chain.hinge[joints] > 0.0) & ~chain.twists[joints] & (piece < chain.pieces[:, None])
+        chain.lever[:, joints] = bends * (turned * along[:, piece]).sum(axis=2)
 
     @property
     def n_slow(self) -> int:
