@@ -13,10 +13,10 @@ from tools.bench.design import bench_day
 from tools.bench.rod import Rod
 from twin.bench import prepare
 from twin.body import TOLERANCE, Path, Problem
-from twin.effects import Drive, Loads, Route
+from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.equilibrium.lengths import CLOSED, COMPRESSION, STIFFEST
-from twin.errors import DataError
+from twin.errors import DataError, SolveError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
 from twin.twin import Twin
@@ -79,6 +79,60 @@ def test_the_displacements_of_tensions_give_those_tensions(stretch: float) -> No
     found = by_length(displacement(truth, stretch), SIDEWAYS, Route(stretch=stretch))
     np.testing.assert_allclose(found.tension, T, rtol=0, atol=SAME_TENSION)
     np.testing.assert_allclose(found.markers, truth.markers, rtol=0, atol=SAME_SHAPE)
+
+
+@pytest.mark.parametrize("amount", [2e-4, 2e-3])
+@pytest.mark.parametrize("over", [0.3, 5.0])
+def test_tendons_that_bed_in_are_longer_by_their_law(amount: float, over: float) -> None:
+    """Motors that take up, beside what tensions need of a stiff tendon, amount (1 - exp(-T / over)), make those tensions."""
+    T = pulls()
+    truth = by_tension(T, SIDEWAYS)
+    u = displacement(truth) + amount * (1.0 - np.exp(-T / over))
+    found = by_length(u, SIDEWAYS, Route(bedding=amount, bedding_tension=over))
+    np.testing.assert_allclose(found.tension, T, rtol=0, atol=SAME_TENSION)
+    np.testing.assert_allclose(found.markers, truth.markers, rtol=0, atol=SAME_SHAPE)
+    stiff = by_length(u, SIDEWAYS)
+    assert np.abs(stiff.markers - truth.markers).max() > 5e-4, "it shows"
+
+
+def test_a_twin_shows_how_much_longer_its_tendons_are() -> None:
+    """Driven by tensions the displacement alone knows; driven by that displacement the tensions come back."""
+    robot, T = load("continuum"), pulls()
+    effect = named("constructional_stretch")({"elongation": 5e-4, "tension": 0.5}, 3)
+    names = [f"tendon_{i}" for i in (1, 2, 3)]
+
+    def day(driven: str, shown: str, values: np.ndarray) -> Recording:
+        unit = {"tension": "N", "displacement": "m"}
+        channels = [Channel(f"{n}_{driven}", "input", unit[driven]) for n in names]
+        channels += [Channel(f"{n}_{shown}", "output", unit[shown]) for n in names]
+        columns = {f"{n}_{driven}": values[:, i] for i, n in enumerate(names)} | {f"{n}_{shown}": 0.0 * values[:, 0] for n in names}
+        trial = Trial("a", np.arange(len(values), dtype=float), columns)
+        return Recording("continuum", "made", "simulation", None, tuple(channels), (trial,))
+
+    def predicted(effects: tuple, recording: Recording, shown: str) -> np.ndarray:
+        out = Twin(robot, {}, effects).predict(recording, dynamic=False).trials[0].values
+        return np.stack([out[f"{n}_{shown}"] for n in names], axis=1)
+
+    pulled = day("tension", "displacement", T)
+    longer = predicted((effect,), pulled, "displacement") - predicted((), pulled, "displacement")
+    np.testing.assert_allclose(longer, 5e-4 * (1.0 - np.exp(-T / 0.5)), rtol=0, atol=1e-9)
+    held = day("displacement", "tension", predicted((effect,), pulled, "displacement"))
+    # The twin's backbone gives way to tendons held at lengths by 1 um/N, which tensions do not have: 5 um of some 2 mm/N.
+    np.testing.assert_allclose(predicted((effect,), held, "tension"), T, rtol=0, atol=0.02)
+
+
+def test_tendons_that_bed_in_are_refused_where_nothing_solves_them() -> None:
+    robot = load("continuum")
+    effect = named("constructional_stretch")({"elongation": 5e-4}, 3)
+    outputs = (Channel("tip_x", "output", "m"),)
+    for kind, unit, dynamic in (("sma_{}_current", "A", False), ("tendon_{}_displacement", "m", True)):
+        names = [kind.format(i) for i in (1, 2, 3)]
+        trial = Trial("a", np.arange(4.0), {n: np.full(4, 1e-3) for n in names} | {"tip_x": np.zeros(4)})
+        channels = (*(Channel(n, "input", unit) for n in names), *outputs)
+        with pytest.raises(SolveError, match="bed in are not"):
+            Twin(robot, {}, (effect,)).predict(
+                Recording("continuum", "made", "simulation", None, channels, (trial,)), dynamic=dynamic
+            )
 
 
 @pytest.mark.parametrize("route", [Route(), Route(0.2, 4e-4), Route(0.2, 4e-4, 2e-4)], ids=["smooth", "friction", "and stretch"])

@@ -58,11 +58,11 @@ def fitted_alone(bench: Day, effect: str, seed: int = 5, design: str = "") -> tu
 
 
 # test_finger_day.py and test_transmission.py
-OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "constructional_stretch", "joint_friction"}
+OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "joint_friction"}
 
 
 DAYS = [(effect, "") for effect in sorted(set(catalogue()) - OF_OTHERS)] + [
-    ("actuator_saturation", "by_length"), ("backbone_precurvature", "by_current"),
+    ("actuator_saturation", "by_length"), ("constructional_stretch", "by_length"), ("backbone_precurvature", "by_current"),
 ]  # fmt: skip
 
 

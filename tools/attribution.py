@@ -1,6 +1,6 @@
 """Does the diagnosis name the right effect? Fresh sets of the independent bench, diagnosed one by one, scored and tabled.
 
-    python -m tools.attribution --out results/ [--sets 300] [--seed 5000] [--jobs 2] [--backend ray]
+    python -m tools.attribution --out results/ [--sets 300] [--seed 5000] [--jobs 2] [--backend ray] [--design by_length]
 
 Of the sets 15 % have no effect, 55 % one (all in turn), 15 % two, 15 % one that is not in the catalogue. Amplitudes are 1, 3 or 8
 sigma (marker noise, left after refitting the robot's own parameters); the robot is as described ("exact"), within its tolerances
@@ -42,7 +42,13 @@ AMPLITUDES = (1.0, 3.0, 8.0)
 DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length", "by_current")
 BLOCK = ("none", "one", "one", "one", "pair", "unknown", "one", "none", "one", "one", "one", "one", "pair", "unknown",
          "one", "one", "one", "pair", "unknown", "none")  # fmt: skip
-NO_SPRINGS = {"actuator_saturation", "actuator_lag", "tendon_backlash", "backbone_creep"}  # not on the bench where springs pull
+NO_SPRINGS = {
+    "actuator_saturation",
+    "actuator_lag",
+    "tendon_backlash",
+    "backbone_creep",
+    "constructional_stretch",
+}  # not on the bench where springs pull
 
 
 @dataclass(frozen=True)
@@ -58,10 +64,14 @@ class Case:
     coloured: bool
 
 
-def plan(sets: int, seed: int) -> list[Case]:
-    """The sets in the order they are run: any first part of it is a fair sample of the whole."""
+def plan(sets: int, seed: int, only: str | None = None) -> list[Case]:
+    """The sets in the order they are run: any first part of it is a fair sample of the whole. With `only`, all of one design, and
+    of the effects those that act there."""
     rng = np.random.default_rng(seed)
     named = sorted(set(catalogue()) & set(all_effects()))  # fingers and jaws are not on this bench
+    if only is not None:
+        named = [n for n in named if only == "by_current" or not all_effects()[n].by_current]
+        named = [n for n in named if only == "by_length" or not all_effects()[n].by_length]
     others = sorted(n for n, e in all_effects().items() if not e.in_catalogue)
     turn: dict[str, list[str]] = {"one": [], "unknown": []}
 
@@ -80,7 +90,7 @@ def plan(sets: int, seed: int) -> list[Case]:
             effects = tuple(str(n) for n in rng.choice(named, 2, replace=False))
         elif kind == "unknown":
             effects = (next_of("unknown", others),)
-        amplitude, design = float(rng.choice(AMPLITUDES)), str(rng.choice(DESIGNS))
+        amplitude, design = float(rng.choice(AMPLITUDES)), only or str(rng.choice(DESIGNS))
         if NO_SPRINGS & set(effects) and design == "by_current":
             design = "default"
         if any(all_effects()[e].by_length for e in effects):
@@ -148,13 +158,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--sets", type=int, default=300)
     parser.add_argument("--seed", type=int, default=5000)
+    parser.add_argument("--design", choices=DESIGNS[2:], help="all sets of this one; default: all designs in turn")
     parser.add_argument("--jobs", type=int, default=1, help="sets diagnosed side by side, each on one core")
     parser.add_argument("--backend", choices=BACKENDS, default="loky", help="processes here, or Ray: RAY_ADDRESS, else a local one")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     log = args.out / "attribution.jsonl"
     done = {r["seed"] for r in _rows(log)}
-    left = (delayed(_tried)(case, args.out) for case in plan(args.sets, args.seed) if case.seed not in done)
+    left = (delayed(_tried)(case, args.out) for case in plan(args.sets, args.seed, args.design) if case.seed not in done)
     with backend(args.backend, args.jobs):
         _keep(as_they_come(left, args.jobs), log)
     print(table(_rows(log)))

@@ -41,6 +41,7 @@ def _harmonic(v: dict[str, float]) -> np.ndarray:
     return TRAVEL + _each(v, "sine") * np.sin(phase) + _each(v, "cosine") * (1.0 - np.cos(phase))
 
 
+PULLS = np.linspace(0.2, 4.0, 20)  # N, of the bench's days
 DOWN = np.array([0.0, 0.0, 9.81])
 # an effect of the bench with fields of its own, the twin's parameters of it
 Compare = Callable[[Any, dict[str, float]], tuple[object, object, float]]
@@ -83,6 +84,9 @@ COMPARED: dict[str, Compare] = {
     # It swaps sides by another law there.
     "tendon_backlash": lambda t, v: (1e-4 * t.strength * np.array(t.worn), v["gap"] + np.array(_each(v, "gap")), OTHER),
     "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
+    "constructional_stretch": lambda t, v: (  # a hyperbola there
+        2e-4 * t.strength * PULLS / (PULLS + t.half), -v["elongation"] * np.expm1(-PULLS / v["tension"]), OTHER,
+    ),
     "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER),  # a whole drum there
     "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),
     # Starts and finishes of the phases move by different amounts there: their means are what this law knows.

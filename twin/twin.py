@@ -202,7 +202,7 @@ def _trial(
     if not path.status.all():
         bad = int(np.flatnonzero(path.status == 0)[0])
         raise SolveError(f"{inputs.name}: {path.ended}" if path.ended else _unsolved(inputs.name, problem, bad), bad)
-    shortening = solver.straight_path - path.path + problem.route.stretch * path.tension
+    shortening = solver.straight_path - path.path + problem.route.elongation(path.tension)
     travel = np.where(driven.by_length, driven.displacement, shortening)
     markers = body.frame.reported(path.markers)
     return Trace(driven.with_(tension=path.tension, displacement=travel, markers=markers, others=path.others), path)

@@ -94,6 +94,7 @@ def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial:
         fields=situation.fields,
         by_length=day.by_length,
         stretch=situation.stretch if day.by_length else 0.0,
+        bedding=situation.bedding if day.by_length else (0.0, 1.0),
         keep=np.arange(len(path)) >= lead,
         nodes=NODES,
     )

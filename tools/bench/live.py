@@ -44,7 +44,7 @@ class LiveRobot:
         force[-1] += s.payload * s.gravity
         load = Load(
             force, rod.backbone_mass / rod.length * s.gravity, s.fields, np.zeros(T), np.ones((N, T)), np.zeros(T),
-            np.full(T, STIFFEST), False,
+            np.full(T, STIFFEST), 0.0, 1.0, False,
         )  # fmt: skip
         friction = Friction(s.mu, s.stroke * IWAN_SPREAD, np.zeros((N - 1, T, len(IWAN_SPREAD))), np.zeros((N - 1, T)))
         creep = None if s.creep is None else Creep(*s.creep, np.zeros((len(s.creep[1]), N, NODES, 3)))

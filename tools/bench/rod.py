@@ -127,6 +127,7 @@ def follow(
     springs: Springs | None = None,  # that pull the tendons, heated by the drive's currents, each from its row to the next
     ambient: ArrayLike = 23.0,  # (n,) degC, around them
     stretch: float = 0.0,  # m/N, elasticity of a tendon between motor and tip
+    bedding: tuple[float, float] = (0.0, 1.0),  # m by which it beds in, and the tension (N) at half of it
     keep: ArrayLike | None = None,  # (n,) rows to return; all
     nodes: int = 4,  # Gauss nodes per interval; tip within 2e-4 mm with 4, 2e-3 mm with 3, at the fullest loads
 ) -> Shape:
@@ -152,7 +153,7 @@ def follow(
     ones = np.ones((N, T)) if share is None else np.array(share, float)
     load = Load(
         disk_force, rod.backbone_mass / rod.length * g, np.array(fields, float), np.zeros(T), ones, np.zeros(T),
-        np.full(T, max(float(stretch), STIFFEST)), by_length,
+        np.full(T, max(float(stretch), STIFFEST)), float(bedding[0]), float(bedding[1]), by_length,
     )  # fmt: skip
     friction = Friction(float(mu), stroke * IWAN_SPREAD, np.zeros((N - 1, T, len(IWAN_SPREAD))), np.zeros((N - 1, T)))
     path = Path(drive, _series(weight, n, 1.0), _series(softness, n, 1.0), _series(dt, n, 0.0))

@@ -39,7 +39,17 @@ class Load(NamedTuple):
     share: np.ndarray  # (N, T) prescribed tension of a segment over that at the base
     free_length: np.ndarray  # (T,) m of tendon between base hole and tip, unstretched
     stretch: np.ndarray  # (T,) m/N
+    bedding: float  # m by which a tendon beds in, half of it at
+    bedding_tension: float  # N
     by_length: bool
+
+
+@njit(cache=True, error_model="numpy")
+def longer(load, i, tension):
+    """By how much (m) tendon i is longer under a tension (N), and the slope: s T + b T / (T + T_b)."""
+    over = max(tension, 0.0) + load.bedding_tension
+    bedded = load.bedding * (1.0 - load.bedding_tension / over)
+    return load.stretch[i] * tension + bedded, load.stretch[i] + load.bedding * load.bedding_tension / over**2
 
 
 class Pose(NamedTuple):
@@ -142,7 +152,7 @@ def balance(u, T_base, mesh, body, load, friction, pose, F):
             n[a] += h * w[a]
     if load.by_length:
         for i in range(T):
-            gap = load.free_length[i] + load.stretch[i] * T_base[i] - pose.length[:, i].sum()
+            gap = load.free_length[i] + longer(load, i, T_base[i])[0] - pose.length[:, i].sum()
             F[3 * N * G + i] = min(T_base[i], TAUT * gap)
 
 
@@ -318,7 +328,7 @@ def jacobian(T_base, mesh, body, load, friction, pose, J):
                 _fill(J, col, (kb, qb, axis, p), T_base, dlog, dT, col, mesh, body, load, pose)
                 if load.by_length:
                     for i in range(T):
-                        gap = load.free_length[i] + load.stretch[i] * T_base[i] - pose.length[:, i].sum()
+                        gap = load.free_length[i] + longer(load, i, T_base[i])[0] - pose.length[:, i].sum()
                         if T_base[i] > TAUT * gap:
                             J[size + i, col] = -TAUT * dlength[i]
     if load.by_length:
@@ -328,8 +338,8 @@ def jacobian(T_base, mesh, body, load, friction, pose, J):
             dT[:] = 0.0
             dT[i] = 1.0
             _fill(J, size + i, (N, 0, nowhere, nowhere), T_base, dlog, dT, -1, mesh, body, load, pose)
-            gap = load.free_length[i] + load.stretch[i] * T_base[i] - pose.length[:, i].sum()
-            J[size + i, size + i] = TAUT * load.stretch[i] if T_base[i] > TAUT * gap else 1.0
+            gap = load.free_length[i] + longer(load, i, T_base[i])[0] - pose.length[:, i].sum()
+            J[size + i, size + i] = TAUT * longer(load, i, T_base[i])[1] if T_base[i] > TAUT * gap else 1.0
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ from twin.calibrate import Fit, fit
 from twin.diagnose.budget import Budget
 from twin.diagnose.diagnosis import Settings
 from twin.diagnose.evidence import Evidence
-from twin.diagnose.jumps import next_jump, stands
+from twin.diagnose.jumps import may_be_clamp, next_jump, stands
 from twin.diagnose.objective import objective_of
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind
@@ -19,6 +19,7 @@ from twin.diagnose.study import Progress, Study
 from twin.diagnose.thresholds import JUMPS
 from twin.diagnose.weigh import Weighed, weigh
 from twin.diagnose.zeros import Jump, jumping
+from twin.errors import SolveError
 from twin.twin import Twin
 
 
@@ -49,8 +50,11 @@ def _with_jumps(study: Study, base: Fit) -> Fit:
             return base
         study.progress(f"zeros that jump, {len(jumps) + 1}")
         more = sorted([*jumps, jump], key=lambda j: j.since)
-        fitted = fit(study.objective, jumping(base.model, more), near=base.evaluation, refresh=True)
-        if not stands(study, fitted, jump):
+        try:
+            fitted = fit(study.objective, jumping(base.model, more), near=base.evaluation, refresh=True)
+        except SolveError:  # a robot bent by a jump that is none: a neighbour of it has no equilibrium
+            break
+        if not stands(study, fitted, jump) or may_be_clamp(study, found, fitted, jump):
             break
         jumps, found = more, fitted
     return found

@@ -24,7 +24,7 @@ from twin.bench import Inputs
 from twin.calibrate import Fit
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import CLEAR, HALF, JUMPED, NEARBY, RIGID, SHUFFLES, STEP
-from twin.diagnose.zeros import ANGLE, Jump, Zeros, without
+from twin.diagnose.zeros import ANGLE, Jump, Zeros, jumps_of, without
 from twin.evaluate import POINTS
 from twin.twin import readings, report
 
@@ -43,6 +43,18 @@ def stands(study: Study, fit: Fit, jump: Jump) -> bool:
     raw = [study.bench.measured[k] - readings(study.bench, report(rest, traces[k].true)) for k in study.trials]
     found = _clearest(study, fit, raw, (), _by_chance(len(raw)))
     return found is not None and found.group == jump.group and found.last <= jump.since and jump.last <= found.since
+
+
+def may_be_clamp(study: Study, before: Fit, after: Fit, jump: Jump) -> bool:
+    """Whether a turn about the base alone explains `RIGID` of what a fitted jump does: leaving out its shift would cost, to second
+    order in it, so little. A turn about the robot's axis hardly moves the means that jumps are looked for in; a fit sees it."""
+    if len({o.index for o in study.bench.outputs if o.group in POINTS}) < 2 or jump.joints:
+        return False
+    n = jumps_of(after.model.twin).index(jump) + 1
+    names = {f"{x}_{n}" for x in jump.numbers[3:]}
+    own = [i for i, f in enumerate(after.model.free) if f.effect == Zeros.id and f.parameter.name in names]
+    shift, covariance = after.model.vector()[own], np.linalg.pinv(after.information())[np.ix_(own, own)]
+    return float(shift @ np.linalg.solve(covariance, shift)) < (1.0 - RIGID) * (before.cost - after.cost)
 
 
 def _clearest(study: Study, fit: Fit, raw: Sequence[np.ndarray], taken: Sequence[Jump], bar: float) -> Jump | None:

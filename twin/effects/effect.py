@@ -84,8 +84,8 @@ class Loads:
 
 @dataclass(frozen=True)
 class Route:
-    """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N). Of antagonists also by how much they bed in (m) and
-    over which tension (N), and the torque (N m) by which the joint that they turn rubs, with its pre-sliding turn (rad).
+    """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N); by how much it beds in (m) and over which tension
+    (N). Of antagonists also the torque (N m) by which the joint that they turn rubs, with its pre-sliding turn (rad).
     `mounted`: the share of its rest bend that the body had when SMA springs were put on."""
 
     mu: float = 0.0
@@ -96,6 +96,10 @@ class Route:
     bearing: float = 0.0
     bearing_presliding: float = 1e-2
     mounted: float = 0.0
+
+    def elongation(self, tension: np.ndarray) -> np.ndarray:
+        """By how much (m) a tendon is longer under a tension (N) than slack."""
+        return self.stretch * tension + self.bedding * -np.expm1(-tension / self.bedding_tension)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.lengths import STIFFEST
 from twin.equilibrium.trial import Driving, Found, How, Near, Slow
+from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs
 from twin.springs.spring import no_springs
 
@@ -131,9 +132,11 @@ class Equilibrium:
         return Load(gravity, float(loads.payload), force, aside, pushed)
 
     def driving(self, problem: Problem) -> Driving:
-        """What drives the trial."""
+        """What drives the trial. Raises SolveError for SMA springs that pull tendons which bed in."""
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
+        if problem.route.bedding and by_spring.any():
+            raise SolveError("tendons that bed in are not solved under SMA springs; remove constructional_stretch")
         heating = problem.heating
         # In one order in memory: the loop is compiled anew for another, which takes half a minute.
         command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))
@@ -144,6 +147,8 @@ class Equilibrium:
             by_spring=by_spring,
             straight=self.zero_path(problem.route, by_spring),
             stretch=float(problem.route.stretch),
+            bedding=float(problem.route.bedding),
+            bedding_tension=float(problem.route.bedding_tension),
             least_stretch=STIFFEST,
             stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),
             ambient=np.zeros(n) if heating is None else np.array(heating.ambient, float),
@@ -165,8 +170,7 @@ class Equilibrium:
     def solve(self, problem: Problem) -> ChainPath:
         """Equilibria in the order of `twin.equilibrium.pulled`, or `held` where a tendon is held at a length or by a spring.
 
-        Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before. Raises SolveError for held
-        lengths of tendons that stiffen.
+        Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before. Raises as `driving`.
         """
         (n, nt), nv, creep, near = problem.command.shape, self.n_slow, problem.creep, problem.near
         amplitude = np.array(creep.amplitude, float)

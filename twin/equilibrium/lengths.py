@@ -2,7 +2,8 @@
 
 For each such tendon   T >= 0,   gap = path(T) - free length - stretch T - COMPRESSION sum T <= 0,   T gap = 0,
 
-the sum over the tendons that motors hold: what all of them pull, the backbone carries in compression.
+the sum over the tendons that motors hold: what all of them pull, the backbone carries in compression. A tendon that beds in gives
+way by e = bedding (1 - exp(-T/T_b)) besides: at each step it is one of free length free + e - e' T whose stretch is e' more.
 
 An SMA spring holds its tendon in the same way: on each linear piece Y = Y_0 + slope (e - e_0) of its law (twin/springs/force.py),
 at an elongation e = e_start + path - straight path - stretch T, it is a tendon of free length path - stretch T - Y/slope whose
@@ -50,6 +51,9 @@ class Held(NamedTuple):
     temperature: np.ndarray  # K, of the springs
     elongation: np.ndarray  # m, of the springs when they last were at rest
     tension: np.ndarray  # N, theirs then
+    bedding: float  # m, of tendons that motors hold
+    bedding_tension: float  # N
+    bedded: np.ndarray  # (n_tendon,) m, e - e' T
 
 
 @inner
@@ -60,7 +64,8 @@ def elongation(held, t, path, tension):
 
 @inner
 def linearise(held, s, tension):
-    """Free length and stretch of the tendons that springs hold, from the piece of their law they are on; s[t, 0] is the path."""
+    """Free length and stretch of the tendons that springs hold, from the piece of their law they are on, and of those that bed in;
+    s[t, 0] is the path."""
     for t in range(tension.size):
         if held.by_spring[t]:
             e = elongation(held, t, s[t, 0], tension[t])
@@ -68,6 +73,11 @@ def linearise(held, s, tension):
             elastic = held.elastic / held.factor[0]
             held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
             held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
+        elif held.bedding > 0.0:
+            over = held.bedding_tension * held.factor[0]
+            loose = np.exp(-tension[t] / over)
+            held.bedded[t] = held.bedding * (1.0 - loose * (1.0 + tension[t] / over))
+            held.stretch[t] = max(held.elastic, STIFFEST) / held.factor[0] + held.bedding / over * loose
 
 
 @inner
@@ -82,7 +92,7 @@ def longer(held, i, j):
 @inner
 def lack(held, t, path, tension):
     """How much too long (m) tendon t is at a path length (m) and all tensions."""
-    gap = path - held.free[t]
+    gap = path - held.free[t] - held.bedded[t]
     for j in range(tension.size):
         gap -= longer(held, t, j) * tension[j]
     return gap

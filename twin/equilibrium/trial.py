@@ -25,6 +25,8 @@ class Driving(NamedTuple):
     by_spring: np.ndarray  # (n_tendon,) whether it is the current of an SMA spring
     straight: np.ndarray  # (n_tendon,) m, path lengths on the straight robot
     stretch: float  # m/N, of a tendon
+    bedding: float  # m, by which it beds in
+    bedding_tension: float  # N, over which it does
     least_stretch: float  # m/N, of one that a motor holds at a length
     stiffness: np.ndarray  # (n,) of the body over that at its reference temperature
     ambient: np.ndarray  # (n,) K, around the springs
@@ -143,7 +145,7 @@ def at_rest(plain, driving, slow, state):
         elongation[t], tension[t] = spring[t].initial_elongation, spring[t].initial_tension
     held = Held(
         driving.by_spring.copy(), driving.by_spring, straight.copy(), np.empty(nt), straight, driving.stretch, np.ones(1), spring,
-        warm.copy(), elongation, tension,
+        warm.copy(), elongation, tension, driving.bedding, driving.bedding_tension, np.zeros(nt),
     )  # fmt: skip
     now = Now(
         at, load.gravity, load.force, load.push, law.wall[4], plain.rest, state, no_factors(nv, nt), held,

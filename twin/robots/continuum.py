@@ -88,7 +88,19 @@ def _named(
         spec=spec,
         n_tendon=n_tendon,
         parts=frozenset(
-            {"weight", "elasticity", "backbone", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity"}
+            {
+                "weight",
+                "elasticity",
+                "backbone",
+                "markers",
+                "load cells",
+                "planes",
+                "length",
+                "holes",
+                "surface",
+                "viscosity",
+                "rope",
+            }
         ),
         drives=tendon_ports(n_tendon, values.get("springs.resistance", 1.0)),
         stepped=frozenset({Drive.TENSION, Drive.DISPLACEMENT, Drive.CURRENT}),

@@ -111,7 +111,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
     return Jaw(
         spec=spec,
         n_tendon=2,
-        parts=frozenset({"antagonists"}),
+        parts=frozenset({"antagonists", "rope"}),
         antagonists=True,
         tendons=tuple((f"tendon_{i}_base", f"tendon_{i}_anchor") for i in (1, 2)),
         drives=((Port("joint_1_angle", Drive.DISPLACEMENT, (drum, -drum)),),),

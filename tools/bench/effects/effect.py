@@ -25,6 +25,7 @@ class Situation:
     fields: np.ndarray = field(default_factory=NO_FIELDS.copy)
     latency: float = 0.0  # s by which outputs are logged late
     stretch: float = 0.0  # m/N, felt where the motor drives by length
+    bedding: tuple[float, float] = (0.0, 1.0)  # m, and N at half of it; felt there too
     springs: Springs = field(default_factory=Springs)  # that pull where the day is driven by currents
 
 
