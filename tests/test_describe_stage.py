@@ -30,6 +30,8 @@ class World:
         self.doubts: list[Any] = []
         for name in ("structure", "where", "since", "beyond", "unlikely", "left_out", "nearest"):
             monkeypatch.setattr(stage, name, getattr(self, name))
+        self.pulled: Any = None
+        monkeypatch.setattr(stage, "field", lambda study, final: self.pulled)
         monkeypatch.setattr(stage, "mixed", lambda bench, rigs: f" two {rigs}.")
         monkeypatch.setattr(stage, "unlike", lambda unseen, size: f" unlike {unseen} {size}.")
         monkeypatch.setattr(stage, "undecided", lambda effect, rival: f" {effect} or {rival}.")
@@ -94,6 +96,14 @@ def test_what_is_left_is_said_with_its_place_and_since_when(monkeypatch: pytest.
     world = World(monkeypatch)
     assert world.said().words == "Structure. where. since."
     world.size = BARS.left  # too little to have a place
+    assert world.said().words == "Structure. since."
+
+
+def test_a_force_on_the_tip_is_said_after_the_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch)
+    world.pulled = SimpleNamespace(words=lambda: " pulled.")
+    assert world.said().words == "Structure. where. pulled. since."
+    world.size = BARS.left
     assert world.said().words == "Structure. since."
 
 

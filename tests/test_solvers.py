@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,14 @@ def test_the_same_body_is_lent_again_and_another_is_not() -> None:
     tapered, bent = Twin(twin.robot, {"backbone.radius_taper": 0.01}), named("backbone_precurvature")({"about_x": 1.0}, 3)
     assert statics(tapered) is not first
     assert statics(Twin(twin.robot, {}, (bent,))) is not first
+
+
+def test_a_robot_read_anew_or_changed_is_another_one() -> None:
+    """Its description may have changed meanwhile, under the same name."""
+    twin = Twin.of("continuum")
+    first = statics(twin)
+    for other in (replace(twin.robot), replace(twin.robot, gravity=-twin.robot.gravity)):
+        assert statics(Twin(other)) is not first
 
 
 def test_two_borrowers_at_once_have_two_solvers() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from twin.diagnose.beyond import beyond
 from twin.diagnose.doubts import unlikely
+from twin.diagnose.field import field
 from twin.diagnose.gate import Gated
 from twin.diagnose.judge import Judgement
 from twin.diagnose.leaps import leaps
@@ -56,6 +57,8 @@ def _left(study: Study, found: Search, judged: Judgement, bars: Thresholds, stro
         off = final.discrepancy.mean * study.objective.whitener.noise.sigma  # SI
         predicted = [bench.measured[k] - r for k, r in zip(trials, final.fit.evaluation.raw, strict=True)]
         words += where(bench, trials, off, predicted)
+        pulled = field(study, final)
+        words += pulled.words() if pulled else ""
     words += since(bench, trials, found.base.fit.z.reshape(shape))
     words += mixed(bench, judged.rigs) if judged.rigs else ""
     words += "".join(f" The {limit}." for limit in signs.strained)

@@ -321,6 +321,9 @@ STEP = _row(
     "derivation: a line of slope one less its best step keeps 1/4 of its variance",
 )  # fmt: skip
 SHOWN = _row("SHOWN", 6, "trials", "named one by one", "judgement")
+FELT = _row(
+    "FELT", 0.5, "of what is left", "that a force on the tip must take to be named as a possible cause", "judgement: as HALF"
+)
 NEAR = _row("NEAR", 0.1, "of the error left out", "a known effect must take off to be worth a hint", "judgement")
 
 # ---- the next experiment -----------------------------------------------------------------------------------------------------

@@ -29,9 +29,9 @@ FILE = "robot.toml"
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robot:
-    """A described robot; nothing in it is hidden in code.
+    """A described robot; nothing in it is hidden in code. One read anew is another one.
 
     `parameters` hold SI values; those with a `std` are uncertain in a built robot (the nuisance parameters). `effects` are
     the laws the robot is known to have: (identifier, parameter values). `accuracy` is the description's own error,
