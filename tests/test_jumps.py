@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +20,7 @@ from twin.diagnose import jumps
 from twin.diagnose.thresholds import CLEAR, NEARBY
 from twin.diagnose.zeros import SHIFT, TURN, Jump, Zeros, anew, jumping, jumps_of, lasting, without, words
 from twin.effects import Signals
+from twin.errors import SolveError
 from twin.measurements import Channel
 from twin.twin import Twin
 
@@ -370,3 +372,28 @@ def test_a_trials_zero_is_taken_anew_from_its_first_rows() -> None:
     np.testing.assert_array_equal(joints[:, : n - 2], raw[:, : n - 2])
     unseen = np.full_like(raw, np.nan)
     np.testing.assert_array_equal(anew(day, "marker", unseen), unseen)
+
+
+@pytest.mark.parametrize(
+    ("lost", "stands", "clamp", "taken"),
+    [(False, True, False, True), (True, True, False, False), (False, False, False, False), (False, True, True, False)],
+    ids=["a jump", "no equilibrium with it", "not clear in its fit", "perhaps the clamp"],
+)
+def test_a_jump_is_taken_if_its_fit_says_so(
+    lost: bool, stands: bool, clamp: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage = importlib.import_module("twin.diagnose.calibrate")
+    base, fitted = (SimpleNamespace(model=None, evaluation=None) for _ in range(2))
+
+    def fit(*_: Any, **__: Any) -> Any:
+        if lost:
+            raise SolveError("no neighbour has an equilibrium")
+        return fitted
+
+    for name, stand_in in (
+        ("next_jump", lambda study, found, jumps: CAMERA if found is base else None), ("jumping", lambda *_: None), ("fit", fit),
+        ("stands", lambda *_: stands), ("may_be_clamp", lambda study, before, after, jump: clamp and before is base),
+    ):  # fmt: skip
+        monkeypatch.setattr(stage, name, stand_in)
+    study: Any = SimpleNamespace(objective=None, progress=lambda words: None)
+    assert stage._with_jumps(study, base) is (fitted if taken else base)

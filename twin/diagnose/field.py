@@ -17,20 +17,18 @@ import numpy as np
 
 from twin.calibrate import Model, prior_weight
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import ACCEPT, FELT
+from twin.diagnose.thresholds import ACCEPT, FELT, PROBE
 from twin.diagnose.weigh import Weighed
 from twin.effects import Loads
 from twin.effects.effect import Effect
 from twin.quantities import Parameter
-
-TINY = 1e-3  # N: a force to first order
 
 
 class TipForce(Effect):
     """A constant force on the tip, in the base frame."""
 
     id = "tip_force"
-    parameters = tuple(Parameter(f"along_{a}", 0.0, "N", -10.0, 10.0, "of a difference", scale=TINY) for a in "xyz")
+    parameters = tuple(Parameter(f"along_{a}", 0.0, "N", -10.0, 10.0, "of a difference", scale=PROBE) for a in "xyz")
     moves_with = "nothing"
 
     def surround(self, loads: Loads) -> Loads:
@@ -60,7 +58,7 @@ def field(study: Study, final: Weighed) -> Field | None:
     at = body.senses["tip_x"].index
     tip = np.concatenate([fit.evaluation.traces[k].true.markers[:, at] for k in study.trials])
     twin = fit.model.twin
-    pushed = [(Model(replace(twin, effects=(*twin.effects, TipForce({f"along_{a}": TINY}))), ()), TINY) for a in "xyz"]
+    pushed = [(Model(replace(twin, effects=(*twin.effects, TipForce({f"along_{a}": PROBE}))), ()), PROBE) for a in "xyz"]
     C = study.objective.columns(fit.evaluation, pushed, unsolved="zeros")
     away = tip - tip.mean(axis=0)
     rows = np.repeat(away, len(fit.z) // len(tip), axis=0)

@@ -324,6 +324,7 @@ SHOWN = _row("SHOWN", 6, "trials", "named one by one", "judgement")
 FELT = _row(
     "FELT", 0.5, "of what is left", "that a force on the tip must take to be named as a possible cause", "judgement: as HALF"
 )
+PROBE = _row("PROBE", 1e-3, "N", "a force that moves a robot to first order", "derivation: 2 % of the weight of 5.6 g")
 NEAR = _row("NEAR", 0.1, "of the error left out", "a known effect must take off to be worth a hint", "judgement")
 
 # ---- the next experiment -----------------------------------------------------------------------------------------------------
