@@ -8,25 +8,36 @@ from typing import Any, cast
 import pytest
 
 from twin.diagnose import choose as stage
-from twin.diagnose.choose import beside, choose, halved, most_predictive, predicting, solves
+from twin.diagnose.choose import choose, halved, most_predictive, predicting, solves
+from twin.diagnose.halves import Unseen
 from twin.diagnose.null import Thresholds
 from twin.diagnose.search import Search
+from twin.diagnose.thresholds import FAR
 from twin.diagnose.weigh import better
 from twin.errors import SolveError
 
 STUDY = cast(Any, None)
 
 
-def weighed(*effects: str, score: float, size: float, unseen: float, headline: float | None = None) -> Any:
-    """A set of effects with its evidence, smooth error, and RMS on trials left out (all outputs, headline)."""
-    twin = SimpleNamespace(effects=effects)
-    fit = SimpleNamespace(model=SimpleNamespace(twin=twin), unseen=unseen, headline=unseen if headline is None else headline)
+def weighed(
+    *effects: str, score: float, size: float, unseen: float, headline: float | None = None, far: float | None = None
+) -> Any:
+    """A set of effects with its evidence, smooth error, and RMS on trials left out (all outputs, headline) and on halves."""
+    model = SimpleNamespace(twin=SimpleNamespace(effects=effects))
+    headline = unseen if headline is None else headline
+    beyond = errors(unseen, headline) if far is None else errors(far, far)
+    fit = SimpleNamespace(model=model, unseen=unseen, headline=headline, far=beyond)
     return SimpleNamespace(effects=effects, score=score, discrepancy=SimpleNamespace(size=size), fit=fit)
+
+
+def errors(rms: float, headline: float) -> Any:
+    return SimpleNamespace(square=rms**2, headline=headline**2)
 
 
 @pytest.fixture(autouse=True)
 def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stage, "left_out", lambda study, fit: SimpleNamespace(square=fit.unseen**2, headline=fit.headline**2))
+    monkeypatch.setattr(stage, "left_out", lambda study, fit: errors(fit.unseen, fit.headline))
+    monkeypatch.setattr(stage, "unseen", lambda study, w: Unseen(errors(w.fit.unseen, w.fit.headline), w.fit.far))
     monkeypatch.setattr(stage, "solves", lambda study, twin: True)
 
 
@@ -84,22 +95,40 @@ def test_a_set_that_leaves_a_fitted_trial_without_equilibrium_is_passed_over(mon
     assert predicting(STUDY, searched(base, falls, stands), 10.0) is stands
 
 
-@pytest.mark.parametrize("stands", [True, False])
-def test_what_is_found_beside_the_core_is_taken_if_every_trial_can_be_predicted_with_it(
-    monkeypatch: pytest.MonkeyPatch, stands: bool
-) -> None:
-    base, core = weighed(score=9.0, size=6.0, unseen=4.0), weighed("drive", score=5.0, size=3.0, unseen=2.0)
-    both = weighed("drive", "play", score=7.0, size=2.0, unseen=1.0)
-    core.fit.evaluation = None
-    monkeypatch.setattr(stage, "fit", lambda *_, **__: core.fit)
-    monkeypatch.setattr(stage, "weigh", lambda *_: core)
-    monkeypatch.setattr(stage, "dictionary", lambda *_: None)
-    monkeypatch.setattr(stage, "search", lambda *_: SimpleNamespace(best=both, all=(both, core)))
-    monkeypatch.setattr(stage, "solves", lambda study, twin: stands or "play" not in twin.effects)
-    widened = beside(cast(Any, SimpleNamespace(objective=None)), core, searched(base, core), Thresholds())
-    assert widened.best is (both if stands else core)
-    assert widened.base is base
-    assert [w.effects for w in widened.all] == [(), ("drive", "play"), ("drive",)]
+def test_what_is_gone_on_with_for_what_it_predicts_is_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = weighed(score=30.0, size=6.0, unseen=4.0)
+    rough, done = (weighed("drive", score=20.0, size=3.5, unseen=u) for u in (2.0, 1.9))
+    rough.fit.evaluation, kept = "there", []
+    monkeypatch.setattr(stage, "fit", lambda objective, model, **how: kept.append(how) or "to the end")
+    monkeypatch.setattr(stage, "weigh", lambda study, fitted: done)
+    found = choose(cast(Any, SimpleNamespace(objective=None)), searched(base, rough), Thresholds())
+    assert kept == [{"near": "there", "refresh": True}]
+    assert found.best is done
+    assert found.all == (base, done)
+    assert found.base is base
+
+
+def test_what_predicts_a_trial_and_not_a_half_of_the_session_is_passed_over() -> None:
+    """A law that bends to the poses that were fitted: a quarter of the squared error of single trials, five of halves'."""
+    base = weighed(score=30.0, size=6.0, unseen=4.0)
+    bent = weighed("drive", score=20.0, size=3.5, unseen=2.0, far=9.0)
+    ropes = weighed("ropes", score=10.0, size=3.5, unseen=2.9, far=2.5)
+    assert most_predictive(STUDY, searched(base, bent, ropes)) is ropes
+    assert most_predictive(STUDY, searched(base, bent)) is None
+    assert not halved(STUDY, base, bent)
+    assert not halved(STUDY, base, weighed("drift", score=9.0, size=3.5, unseen=0.0, far=float("inf")))
+
+
+def test_halves_are_fitted_for_the_sets_that_promise_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, ...]] = []
+    seen = stage.unseen
+    monkeypatch.setattr(stage, "unseen", lambda study, w: asked.append(w.effects) or seen(study, w))
+    base = weighed(score=30.0, size=6.0, unseen=4.0)
+    worse = weighed("worse", score=25.0, size=5.0, unseen=4.1)
+    sets = [weighed(f"law {k}", score=20.0 - k, size=5.0, unseen=3.5 - 0.1 * k, far=1.0) for k in range(FAR + 2)]
+    pair = weighed("a", "b", score=20.0, size=5.0, unseen=2.9)  # every effect pays for itself: less than the last of the singles
+    assert most_predictive(STUDY, searched(base, worse, pair, *sets)) is sets[-1]
+    assert set(asked) == {(), *(w.effects for w in sets[-FAR:])}
 
 
 def test_of_two_fits_of_one_law_the_lower_cost_wins_and_of_two_laws_the_evidence() -> None:

@@ -111,6 +111,10 @@ class Objective:
         self.bench, self.trials, self.whitener, self.jobs = bench, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(bench.measured[k]).sum() for k in trials))
 
+    def of(self, which: Sequence[int]) -> Objective:
+        """The same of some of its trials alone, by their positions."""
+        return Objective(self.bench, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
+
     def predict(
         self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
     ) -> tuple[dict[int, Trace], list[np.ndarray]]:

@@ -11,6 +11,7 @@ samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,6 +68,12 @@ class Whitener:
         eigen = np.maximum(eigen, 1e-12)
         core = np.einsum("nij,nj,nkj->nik", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
         return A, core
+
+    def of(self, which: Sequence[int]) -> Whitener:
+        """The same of some of its trials alone, by their positions."""
+        part = copy(self)
+        part.present, part._mix, part._memory = ([x[k] for k in which] for x in (self.present, self._mix, self._memory))
+        return part
 
     def trial(self, k: int, r: np.ndarray) -> np.ndarray:
         """Whitened residual (n, m) of trial k; zero where nothing was measured. Works for columns of a Jacobian alike."""

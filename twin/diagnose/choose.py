@@ -1,30 +1,35 @@
-"""Stage `choose`: of the sets weighed, the one to go on with, by what it would predict of trials left out in turn."""
+"""Stage `choose`: of the sets weighed, the one to go on with, by what it would predict of trials that no fit has seen."""
 
 from __future__ import annotations
 
+from math import isfinite
+
 from twin.calibrate import fit
+from twin.diagnose.halves import unseen
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
-from twin.diagnose.patterns import dictionary
-from twin.diagnose.search import Search, search
+from twin.diagnose.search import Search
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import HALF
+from twin.diagnose.thresholds import FAR, HALF
 from twin.diagnose.weigh import Weighed, weigh
 from twin.errors import SolveError
 from twin.twin import Twin, simulate
 
 
 def choose(study: Study, found: Search, bars: Thresholds) -> Search:
-    """The best set by evidence where it halves the error; else the one that predicts best, and what else there is beside it."""
+    """The best set by evidence where it halves the smooth error; else the one that predicts best, fitted to the end.
+
+    Where laws and robot are far from the data, what no law follows is smooth, and to the evidence a smooth error costs the same
+    small or large: its names are worth little. What an effect predicts does not depend on that.
+    """
     best = predicting(study, found, bars.accept)
-    if halved(study, found.base, best):
+    if _smaller(found.base, best):
         return Search(found.base, best, found.all)
     core = most_predictive(study, found)
     if core is None:
         return Search(found.base, best, found.all)
-    if not study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
-        return Search(found.base, core, found.all)
-    return beside(study, core, found, bars)
+    core = weigh(study, fit(study.objective, core.fit.model, near=core.fit.evaluation, refresh=True))
+    return Search(found.base, core, tuple(core if w.effects == core.effects else w for w in found.all))
 
 
 def predicting(study: Study, found: Search, accept: float) -> Weighed:
@@ -34,33 +39,31 @@ def predicting(study: Study, found: Search, accept: float) -> Weighed:
 
 
 def most_predictive(study: Study, found: Search) -> Weighed | None:
-    """Of the sets whose every effect halves the squared error on trials left out in turn, the one that errs least there.
-
-    Where laws and robot are far from the data, what no law follows is smooth, and to the evidence a smooth error costs the same
-    small or large: its names are worth little. What an effect predicts does not depend on that.
-    """
-    errors = {w.effects: left_out(study, w.fit).square / HALF ** len(w.effects) for w in (found.base, *found.all)}
-    better = [w for w in found.all if errors[w.effects] < errors[found.base.effects]]
-    ranked = sorted(better, key=lambda w: errors[w.effects])
+    """Of the sets whose every effect halves the squared error on what was not fitted, near and far (`unseen`), the one that errs
+    least there. Halves of the session are fitted for the few that err least on single trials."""
+    near = {w.effects: left_out(study, w.fit).square for w in found.all}
+    helpful = [w for w in found.all if near[w.effects] < left_out(study, found.base.fit).square]
+    few = sorted(helpful, key=lambda w: _each(w, near[w.effects]))[:FAR]
+    errors = {w.effects: _each(w, unseen(study, w).square) for w in (found.base, *few)}
+    ranked = sorted((w for w in few if errors[w.effects] < errors[found.base.effects]), key=lambda w: errors[w.effects])
     return next((w for w in ranked if halved(study, found.base, w)), None)
 
 
-def beside(study: Study, core: Weighed, found: Search, bars: Thresholds) -> Search:
-    """What else there is, sought as beside any base: converged first, and nothing of it is dropped."""
-    converged = fit(study.objective, core.fit.model, near=core.fit.evaluation, refresh=True)
-    core = weigh(study, converged)
-    around = search(study, core, dictionary(study.objective, converged), bars)
-    best = around.best if solves(study, around.best.fit.model.twin) else core
-    known = {w.effects: w for w in (*found.all, *around.all)}
-    return Search(found.base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+def _each(weighed: Weighed, square: float) -> float:
+    """A squared error that every effect of the set must pay for by halving it."""
+    return square / HALF ** len(weighed.effects)
 
 
 def halved(study: Study, base: Weighed, best: Weighed) -> bool:
-    """Whether effects halve the smooth error; or the squared error on trials left out, of all outputs and of the headline."""
-    if best.discrepancy.size <= HALF * base.discrepancy.size:
+    """Whether effects halve the smooth error; or the squared error on what was not fitted, of all outputs and of the headline."""
+    if _smaller(base, best):
         return True
-    after, before = (left_out(study, w.fit) for w in (best, base))
-    return after.square <= HALF * before.square and after.headline <= HALF * before.headline
+    after, before = unseen(study, best), unseen(study, base)
+    return isfinite(after.square) and after.square <= HALF * before.square and after.headline <= HALF * before.headline
+
+
+def _smaller(base: Weighed, best: Weighed) -> bool:
+    return best.discrepancy.size <= HALF * base.discrepancy.size
 
 
 def solves(study: Study, twin: Twin) -> bool:

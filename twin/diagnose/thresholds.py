@@ -225,6 +225,13 @@ WORSE = _row(
     "WORSE", 1.005, "ratio", "of the headline's error on trials left out; refitting alone moves it by some thousandth, as it does "
     "where an effect shows elsewhere", "python -m pytest tests/test_choose.py",
 )  # fmt: skip
+HALVED = _row(
+    "HALVED", 4, "trials", "of fewer a half of the session is hardly more than a trial", "derivation: two and two"
+)  # fmt: skip
+FAR = _row(
+    "FAR", 4, "sets", "that are fitted to halves of the session: those that err least on trials left out, to first order",
+    "judgement: as TOP",
+)  # fmt: skip
 BLOCKS = _row("BLOCKS", 4, "parts", "where one trial alone is fitted, it is left out by quarters", "judgement")
 
 # ---- what makes the robot late -----------------------------------------------------------------------------------------------
