@@ -50,7 +50,7 @@ def weighed(J: np.ndarray, y: np.ndarray, effects: tuple[str, ...]) -> Any:
     free = [SimpleNamespace(parameter=SimpleNamespace(std=None, step=1.0, value=0.0)) for _ in x]
     model = SimpleNamespace(free=free, vector=lambda: x)
     fit = SimpleNamespace(J=-J, z=y - J @ x, model=model, at_bound=lambda: np.zeros(len(x), bool))
-    return SimpleNamespace(fit=fit, effects=effects, discrepancy=SimpleNamespace(size=0.4 if effects else 1.0))
+    return SimpleNamespace(fit=fit, effects=effects)
 
 
 @pytest.mark.parametrize(
@@ -64,29 +64,24 @@ def test_an_effect_harms_that_helps_inside_and_enlarges_the_error_beyond(
     monkeypatch.setattr(stage, "left_out", lambda study, fit, groups=None: SimpleNamespace(square=squares[fit, groups]))
     monkeypatch.setattr(stage, "levels", lambda bench, trials: {"payload": "groups"})
     study: Any = SimpleNamespace(bench=None, trials=[])
-    final: Any = SimpleNamespace(fit="with", effects=("creep",), discrepancy=SimpleNamespace(size=1.0))
-    base: Any = SimpleNamespace(discrepancy=SimpleNamespace(size=2.0))
+    final: Any = SimpleNamespace(fit="with", effects=("creep",))
     gated: Any = SimpleNamespace(without={e: SimpleNamespace(fit="less") for e in ("creep", "gone")})  # the second was not kept
-    (found,) = beyond(study, base, final, gated)
+    (found,) = beyond(study, final, gated, False)
     assert (found.inside, found.beyond, found.levels) == (2.0, 3.0, 6)
     assert found.harmful == (("creep",) if harms else ())
 
 
-@pytest.mark.parametrize(
-    ("size", "trials", "effects", "told"),
-    [(1.01, 4, ("creep",), True), (1.0, 4, ("creep",), False), (1.01, 3, ("creep",), False), (1.01, 4, (), False)],
-)
-def test_where_effects_leave_more_than_half_the_session_is_left_out_by_halves(
-    size: float, trials: int, effects: tuple[str, ...], told: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("asked", "trials", "told"), [(True, 4, True), (False, 4, False), (True, 3, False)])
+def test_where_it_is_asked_for_the_session_is_left_out_by_halves(
+    asked: bool, trials: int, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     squares = {"with": (1.0, 9.0), "less": (4.0, 4.0)}  # on trials, and on halves
     monkeypatch.setattr(stage, "left_out", lambda study, fit, groups=None: SimpleNamespace(square=squares[fit][0]))
     monkeypatch.setattr(stage, "halves", lambda study, weighed: SimpleNamespace(square=squares[weighed.fit][1]))
     monkeypatch.setattr(stage, "levels", lambda bench, trials: {})
     study: Any = SimpleNamespace(bench=None, trials=range(trials))
-    final: Any = SimpleNamespace(fit="with", effects=effects, discrepancy=SimpleNamespace(size=size))
-    base: Any = SimpleNamespace(discrepancy=SimpleNamespace(size=2.0))
-    found = beyond(study, base, final, cast(Any, SimpleNamespace(without={e: SimpleNamespace(fit="less") for e in effects})))
+    final: Any = SimpleNamespace(fit="with", effects=("creep",))
+    found = beyond(study, final, cast(Any, SimpleNamespace(without={"creep": SimpleNamespace(fit="less")})), asked)
     assert [(b.condition, b.levels, b.inside, b.beyond, b.harmful) for b in found] == (
         [("half of the session", 2, 1.0, 3.0, ("creep",))] if told else []
     )
@@ -105,7 +100,7 @@ def test_an_effect_that_takes_what_grows_with_the_payload_for_a_square_is_told_t
     line = np.column_stack([np.ones(160), load])
     for name, column, harms in (("cube", load**3 - 4 * load**2, True), ("right", np.tanh(2.0 * load), False)):
         final, without = weighed(np.column_stack([line, column]), y, (name,)), weighed(line, y, ())
-        (found,) = beyond(study, without, final, cast(Any, SimpleNamespace(without={name: without})))
+        (found,) = beyond(study, final, cast(Any, SimpleNamespace(without={name: without})), False)
         assert (found.condition, found.levels, found.harmful) == ("payload", 4, (name,) if harms else ())
         assert found.beyond >= found.inside
         assert ("harms beyond" in found.words()) is harms

@@ -8,7 +8,7 @@ from typing import Any, cast
 import pytest
 
 from twin.diagnose import choose as stage
-from twin.diagnose.choose import choose, halved, most_predictive, predicting, solves
+from twin.diagnose.choose import beside, choose, halved, most_predictive, predicting, solves
 from twin.diagnose.halves import Unseen
 from twin.diagnose.null import Thresholds
 from twin.diagnose.search import Search
@@ -95,17 +95,45 @@ def test_a_set_that_leaves_a_fitted_trial_without_equilibrium_is_passed_over(mon
     assert predicting(STUDY, searched(base, falls, stands), 10.0) is stands
 
 
-def test_what_is_gone_on_with_for_what_it_predicts_is_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("time_left", [True, False])
+def test_what_is_gone_on_with_for_what_it_predicts_is_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch, time_left: bool) -> None:
     base = weighed(score=30.0, size=6.0, unseen=4.0)
-    rough, done = (weighed("drive", score=20.0, size=3.5, unseen=u) for u in (2.0, 1.9))
+    rough, done, both = (
+        weighed(*e, score=s, size=3.5, unseen=2.0) for e, s in ((["drive"], 20.0), (["drive"], 21.0), ("ab", 40.0))
+    )
     rough.fit.evaluation, kept = "there", []
     monkeypatch.setattr(stage, "fit", lambda objective, model, **how: kept.append(how) or "to the end")
     monkeypatch.setattr(stage, "weigh", lambda study, fitted: done)
-    found = choose(cast(Any, SimpleNamespace(objective=None)), searched(base, rough), Thresholds())
+    monkeypatch.setattr(stage, "beside", lambda study, core, found, bars: both if core is done else None)
+    study: Any = SimpleNamespace(objective=None, budget=SimpleNamespace(allows=lambda what: time_left))
+    found = choose(study, searched(base, rough), Thresholds())
     assert kept == [{"near": "there", "refresh": True}]
-    assert found.best is done
-    assert found.all == (base, done)
     assert found.base is base
+    assert found.best is (both if time_left else done)
+    assert found.all == ((both, base, rough) if time_left else (base, done))
+
+
+@pytest.mark.parametrize(
+    ("score", "unseen", "stands", "taken"),
+    [(12.1, 1.73, True, True), (11.9, 1.73, True, False), (12.1, 1.74, True, False), (12.1, 1.73, False, False)],
+)  # the core: no evidence either way, 2 sigma left out, three quarters of whose square are 1.732^2
+def test_beside_the_core_stays_what_has_evidence_and_predicts(
+    score: float, unseen: float, stands: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base, core = weighed(score=30.0, size=6.0, unseen=4.0), weighed("drive", score=0.0, size=3.0, unseen=2.0)
+    more = weighed("drive", "play", score=score, size=2.0, unseen=unseen)
+    bent = weighed("drive", "routing", score=50.0, size=2.0, unseen=1.9)
+
+    def extend(study: Any, of: Any, member: Any, lacks: Any, bars: Any, fresh: dict[tuple[str, ...], Any]) -> None:
+        assert (of, member, lacks) == (base, core, "patterns")
+        fresh |= {w.effects: w for w in (bent, more)}
+
+    monkeypatch.setattr(stage, "extend", extend)
+    monkeypatch.setattr(stage, "dictionary", lambda objective, fit: "patterns" if fit is core.fit else None)
+    monkeypatch.setattr(stage, "solves", lambda study, twin: stands or "play" not in twin.effects)
+    monkeypatch.setattr(stage, "_converged", lambda study, rough: rough)
+    study: Any = SimpleNamespace(objective=None, progress=lambda words: None)
+    assert beside(study, core, searched(base, core), Thresholds(accept=12.0)) is (more if taken else core)
 
 
 def test_what_predicts_a_trial_and_not_a_half_of_the_session_is_passed_over() -> None:

@@ -57,7 +57,8 @@ class World:
         np.testing.assert_array_equal(z, np.arange(4.0).reshape(2, 2))
         return " since."
 
-    def beyond(self, study: Any, base: Any, final: Any, gated: Any) -> list[Any]:
+    def beyond(self, study: Any, final: Any, gated: Any, by_time: bool) -> list[Any]:
+        assert by_time is (self.verdict == "partly_explained")
         return [SimpleNamespace(words=lambda: "far")]
 
     def unlikely(self, fit: Any) -> list[str]:

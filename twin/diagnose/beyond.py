@@ -1,8 +1,8 @@
 """Inside and beyond what was fitted: what the model in force predicts of a trial, and of a whole level of a condition, left out.
 
 A law that holds at every payload that was fitted need not hold at the next one. Where trials span a condition, each of its levels
-is left out at once, to first order as single trials are; where effects leave more than half of the smooth error, each half of the
-session too, fitted in truth. An effect that helps on trials left out and harms on levels is named.
+is left out at once, to first order as single trials are; where a day is only partly explained each half of the session too, by fits
+to the other. An effect that helps on trials left out and harms on levels is named.
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ from twin.diagnose.gate import Gated
 from twin.diagnose.halves import halves
 from twin.diagnose.left_out import left_out
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import EDGE, HALF, HALVED, PACE, WORSE
+from twin.diagnose.thresholds import EDGE, HALVED, PACE, WORSE
 from twin.diagnose.weigh import Weighed
 
-SESSION_PART = "half of the session"
 SHOWN = {"payload": "payload", "torque": "load torque", "rate": "rate of pull", "mount": "mount"}
 
 
@@ -46,8 +45,8 @@ class Beyond:
         return f"{told}; {named} helps inside and harms beyond: do not trust it at another {self.condition}"
 
 
-def beyond(study: Study, base: Weighed, final: Weighed, gated: Gated) -> tuple[Beyond, ...]:
-    """One for each condition that the fitted trials span; `final` is the model in force, `base` the calibrated robot's."""
+def beyond(study: Study, final: Weighed, gated: Gated, by_time: bool) -> tuple[Beyond, ...]:
+    """One for each condition that the fitted trials span, if asked for time too; `final` is the model in force."""
     added = [e for e in gated.without if e in final.effects]
     models = {"": final, **{e: gated.without[e] for e in added}}
     inside = {e: left_out(study, w.fit).square for e, w in models.items()}
@@ -59,8 +58,8 @@ def beyond(study: Study, base: Weighed, final: Weighed, gated: Gated) -> tuple[B
     out = []
     for condition, groups in levels(study.bench, study.trials).items():
         out.append(told(condition, len(groups), {e: left_out(study, w.fit, groups).square for e, w in models.items()}))
-    if added and final.discrepancy.size > HALF * base.discrepancy.size and len(study.trials) >= HALVED:
-        out.append(told(SESSION_PART, 2, {e: halves(study, w).square for e, w in models.items()}))
+    if by_time and len(study.trials) >= HALVED:
+        out.append(told("half of the session", 2, {e: halves(study, w).square for e, w in models.items()}))
     return tuple(out)
 
 

@@ -8,16 +8,17 @@ from twin.calibrate import fit
 from twin.diagnose.halves import unseen
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
-from twin.diagnose.search import Search
+from twin.diagnose.patterns import dictionary
+from twin.diagnose.search import Known, Search, extend
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import FAR, HALF
+from twin.diagnose.thresholds import BESIDE, FAR, HALF
 from twin.diagnose.weigh import Weighed, weigh
 from twin.errors import SolveError
 from twin.twin import Twin, simulate
 
 
 def choose(study: Study, found: Search, bars: Thresholds) -> Search:
-    """The best set by evidence where it halves the smooth error; else the one that predicts best, fitted to the end.
+    """The best set by evidence where it halves the smooth error; else the one that predicts best, and what else there is beside it.
 
     Where laws and robot are far from the data, what no law follows is smooth, and to the evidence a smooth error costs the same
     small or large: its names are worth little. What an effect predicts does not depend on that.
@@ -28,8 +29,11 @@ def choose(study: Study, found: Search, bars: Thresholds) -> Search:
     core = most_predictive(study, found)
     if core is None:
         return Search(found.base, best, found.all)
-    core = weigh(study, fit(study.objective, core.fit.model, near=core.fit.evaluation, refresh=True))
-    return Search(found.base, core, tuple(core if w.effects == core.effects else w for w in found.all))
+    core = _converged(study, core)
+    if study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
+        core = beside(study, core, found, bars)
+    known = {w.effects: w for w in (*found.all, core)}
+    return Search(found.base, core, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
 def predicting(study: Study, found: Search, accept: float) -> Weighed:
@@ -52,6 +56,22 @@ def most_predictive(study: Study, found: Search) -> Weighed | None:
 def _each(weighed: Weighed, square: float) -> float:
     """A squared error that every effect of the set must pay for by halving it."""
     return square / HALF ** len(weighed.effects)
+
+
+def beside(study: Study, core: Weighed, found: Search, bars: Thresholds) -> Weighed:
+    """The set with one effect more that has the most evidence, if that is enough to be accepted, of those that take a quarter of
+    the squared error on trials left out. What harms beyond the trials fitted is named in the report (`beyond`)."""
+    study.progress(f"beside {' + '.join(core.effects)}")
+    fresh: Known = {}
+    extend(study, found.base, core, dictionary(study.objective, core.fit), bars, fresh)
+    bar = BESIDE * left_out(study, core.fit).square
+    helpful = [w for w in fresh.values() if left_out(study, w.fit).square <= bar and solves(study, w.fit.model.twin)]
+    best = max(helpful, key=lambda w: w.score, default=core)
+    return _converged(study, best) if best.score >= core.score + bars.accept else core
+
+
+def _converged(study: Study, rough: Weighed) -> Weighed:
+    return weigh(study, fit(study.objective, rough.fit.model, near=rough.fit.evaluation, refresh=True))
 
 
 def halved(study: Study, base: Weighed, best: Weighed) -> bool:

@@ -43,7 +43,7 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     words += "".join(undecided(d.effect, d.rival) for d in gated.doubts)
     z = final.fit.z.reshape(final.discrepancy.mean.shape)
     rebuilt = (mixed(study.bench, judged.rigs).strip(),) if judged.rigs else ()
-    far = tuple(b.words() for b in beyond(study, found.base, final, gated))
+    far = tuple(b.words() for b in beyond(study, final, gated, by_time=judged.verdict == "partly_explained"))
     late = leaps(study.bench, study.trials, final.fit)
     notices = (*unlikely(final.fit), *judged.signs.strained, *late, *rebuilt, *far)
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)

@@ -41,7 +41,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
                 promise = rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
                 lacks = dictionary(study.objective, member.fit, {c.effect for c in promise})
             study.progress(f"effects, {level} at once")
-            _extend(study, base, member, lacks, bars, fresh)
+            extend(study, base, member, lacks, bars, fresh)
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
         fresh = {k: fuller(study, w, k, bars.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
@@ -53,7 +53,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
-def _extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
+def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
     """Into `fresh`: `member` with each of the effects whose pattern promises most."""
     for candidate in rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks):
         if candidate.gain < PROMISE * max(bars.accept, _material(study, base, member, bars.visible)):

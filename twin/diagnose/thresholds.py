@@ -232,6 +232,10 @@ FAR = _row(
     "FAR", 4, "sets", "that are fitted to halves of the session: those that err least on trials left out, to first order",
     "judgement: as TOP",
 )  # fmt: skip
+BESIDE = _row(
+    "BESIDE", 0.75, "of the squared error on trials left out", "what stands beside a set that was chosen for what it predicts must "
+    "take half of what each of that set must", "derivation: half of HALF",
+)  # fmt: skip
 BLOCKS = _row("BLOCKS", 4, "parts", "where one trial alone is fitted, it is left out by quarters", "judgement")
 
 # ---- what makes the robot late -----------------------------------------------------------------------------------------------
