@@ -23,12 +23,12 @@ CHANNELS = (
 DEAF = [np.zeros((N, 3, 3))] * 2  # outputs that do not feel the inputs
 
 
-def bench(*, payload: float = 0.0, further: float = 0.0, channels: tuple[Channel, ...] = CHANNELS) -> Bench:
-    """Two trials with the same commands, the second with a payload and its tensions `further` (N)."""
+def bench(*, payload: float = 0.0, further: float = 0.0, slower: float = 1.0, channels: tuple[Channel, ...] = CHANNELS) -> Bench:
+    """Two trials with the same commands, the second with a payload, its tensions `further` (N) and `slower` by a factor."""
     trials = []
-    for k, (mass, more) in enumerate([(0.0, 0.0), (payload, further)]):
+    for k, (mass, more, pace) in enumerate([(0.0, 0.0, 1.0), (payload, further, slower)]):
         values = {c.name: np.zeros(N) for c in CHANNELS} | {f"tendon_{i + 1}_tension": PULL[:, i] + more for i in range(3)}
-        trials.append(Trial(f"{k}.csv", TIME, values, {"tip_payload": mass}, start=100.0 * k))
+        trials.append(Trial(f"{k}.csv", pace * TIME, values, {"tip_payload": mass}, start=100.0 * k))
     return prepare(Recording("continuum", "made", "simulation: none", np.zeros(3), channels, tuple(trials)), ROBOT)
 
 
@@ -109,6 +109,9 @@ def test_repeats_have_the_same_loads_and_the_same_commands_but_for_noise() -> No
     # Commands span 2 N: 3 % of it, 0.06 N, is within what repeats differ by.
     assert repeats(bench(further=0.05)) == [(0, 1)]
     assert repeats(bench(further=0.08)) == []
+    # The same way at another pace shows what depends on the rate; clocks and hands differ by less than 3 %.
+    assert repeats(bench(slower=1.02)) == [(0, 1)]
+    assert repeats(bench(slower=1.04)) == repeats(bench(slower=0.5)) == []
 
 
 def test_whitened_noise_is_white_whatever_drives_and_wherever_samples_lack() -> None:

@@ -132,6 +132,21 @@ def test_the_loop_of_joint_friction_is_its_torque_times_the_compliance_whatever_
         assert width_of(a, q) == pytest.approx(2 * held * STRETCH / (2 * PULLEY**2), rel=1e-9)
 
 
+@pytest.mark.parametrize("rate", [0.05, 0.4, 3.0])
+def test_the_loop_is_as_wide_as_the_bearing_rubs_at_the_rate(rate: float) -> None:
+    """Triangles of one rate: torque + breakaway exp(-(v / v_s)^2) + viscous v, of the joint, by the pair's compliance."""
+    torque, breakaway, stribeck, viscous = 0.006, 0.004, 0.3, 0.002
+    leg = np.linspace(-0.5, 0.5, 100)
+    q = np.concatenate([leg, leg[::-1], leg, leg[::-1]])
+    trial = run(q, 0.01)
+    trial = replace(trial, time=np.arange(len(q)) * (leg[1] - leg[0]) * abs(DRUM / PULLEY) / rate)
+    rubs = law("joint_friction", torque=torque, presliding=5e-3, breakaway=breakaway, stribeck=stribeck, viscous=viscous)
+    a = solved(ELASTIC, (rubs,), trial).others["angle"][:, 1]
+    there, back = a[250], a[349]  # the middle of the last two legs, at one turn of the drum
+    held = torque + breakaway * np.exp(-((rate / stribeck) ** 2)) + viscous * rate
+    assert abs(there - back) == pytest.approx(2 * held * STRETCH / (2 * PULLEY**2), rel=1e-9)
+
+
 def test_where_a_cable_falls_slack_the_capstans_loop_grows_with_the_load() -> None:
     """One cable alone holds the load F: T = F exp(+-f), so that the ways lie 2 stretch F sinh f apart; no pretension in it."""
     mu, q, pretension = 0.01, sine(), 5.0
@@ -206,11 +221,11 @@ def test_what_does_not_fit_a_jaw_is_refused_with_the_way_out() -> None:
         Twin(load("continuum"), {}, (named("joint_friction")({"torque": 0.01}, 3),)).predict(held)
 
 
-def played(target: np.ndarray, half: float) -> np.ndarray:
-    """The play operator: the jaw follows `target` (n,) at a distance of `half` at most."""
+def played(target: np.ndarray, half: np.ndarray | float) -> np.ndarray:
+    """The play operator: the jaw follows `target` (n,) at a distance of `half` at most, which may change from row to row."""
     out, at = np.empty_like(target), target[0]
-    for i, t in enumerate(target):
-        at = min(max(at, t - half), t + half)
+    for i, (t, h) in enumerate(zip(target, np.broadcast_to(half, len(target)), strict=True)):
+        at = min(max(at, t - h), t + h)
         out[i] = at
     return out
 
@@ -244,3 +259,38 @@ def test_a_diagnosis_names_friction_where_there_is_friction_and_nothing_where_th
     nothing = diagnose(day(0.0), Twin.of(ROBOT), Settings(jobs=1))
     assert nothing.verdict == "noise"
     assert not nothing.claims
+
+
+def rubbing(rate: np.ndarray, torque: float, breakaway: float, stribeck: float, viscous: float) -> np.ndarray:
+    """Stribeck's curve (N m) over the rate (rad/s)."""
+    return torque + breakaway * np.exp(-((rate / stribeck) ** 2)) + viscous * np.abs(rate)
+
+
+def paced_day(**curve: float) -> Recording:
+    """Sines of four paces under two loads; the play's half width by `curve` at the rate that the jaw would have."""
+    rng = np.random.default_rng(1)
+    gives, phase, trials = STRETCH / (2 * PULLEY**2), np.linspace(0.0, 4 * np.pi, 300), []
+    for period in (100.0, 20.0, 5.0, 1.0):
+        for held in (0.01, 0.03):
+            q, rate = 0.5 * np.sin(phase), DRUM / PULLEY * np.pi / period * np.cos(phase)
+            jaw = played(0.3 + 0.95 * DRUM / PULLEY * q + gives * held, gives * rubbing(rate, **curve))
+            made = run(q, held, f"{period}_{held}.csv")
+            values = {**made.values, "joint_2_angle": jaw + rng.normal(0, NOISE, len(q))}
+            trials.append(replace(made, time=phase / (2 * np.pi) * period, values=values))
+    made = recording(*trials)
+    return replace(made, channels=tuple(replace(c, role="context") if c.name == "joint_1_torque" else c for c in made.channels))
+
+
+def test_a_diagnosis_tells_how_friction_depends_on_the_rate() -> None:
+    curve = {"torque": 0.012, "breakaway": 0.01, "stribeck": 0.3, "viscous": 0.003}
+    found = diagnose(paced_day(**curve), Twin.of(ROBOT), Settings(jobs=1))
+    (claim,) = found.claims
+    assert claim.effect == "joint_friction"
+    rates = np.array([0.03, 0.15, 0.6, 3.0])
+    seen = rubbing(rates, **{n: claim.parameters[n].value for n in curve})
+    # 5 %: the jaw's rate is taken from the drive's rows, and a play has no pre-sliding
+    np.testing.assert_allclose(seen, rubbing(rates, **curve), rtol=0.05)
+    constant = diagnose(paced_day(torque=0.012, breakaway=0.0, stribeck=0.3, viscous=0.0), Twin.of(ROBOT), Settings(jobs=1))
+    (claim,) = constant.claims
+    assert claim.effect in {"joint_friction", "tendon_friction"}
+    assert "viscous" not in claim.parameters, "what does not depend on the rate is not said to"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from twin.effects import Creep, Effect, Loads, Route, Signals
+from twin.effects import Bearing, Creep, Effect, Loads, Route, Signals
 from twin.errors import DataError
 from twin.springs import Spring
 
@@ -69,12 +69,11 @@ class Laws:
     def route(self) -> Route:
         """Along the tendons: the first friction of each kind, the first that beds in, and all stretch."""
         routes = [e.route() for e in self.effects]
-        rubbing, beds, bearing = (
-            next((r for r in routes if getattr(r, kind) > 0.0), Route()) for kind in ("mu", "bedding", "bearing")
-        )
+        rubbing, beds = (next((r for r in routes if getattr(r, kind) > 0.0), Route()) for kind in ("mu", "bedding"))
+        bearing = next((r.bearing for r in routes if r.bearing != Bearing()), Bearing())
         return Route(
             rubbing.mu, rubbing.presliding, sum(r.stretch for r in routes), beds.bedding, beds.bedding_tension,
-            bearing.bearing, bearing.bearing_presliding, max((r.mounted for r in routes), default=0.0),
+            bearing, max((r.mounted for r in routes), default=0.0),
         )  # fmt: skip
 
     @property

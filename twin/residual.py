@@ -93,7 +93,7 @@ class Whitener:
 
 
 def repeats(bench: Bench) -> list[tuple[int, int]]:
-    """Pairs of trials that repeat each other: same loads, same number of samples, same commands but for noise."""
+    """Pairs of trials that repeat each other: same loads, same samples at the same times, same commands but for noise."""
     pairs = []
     for a in range(len(bench.inputs)):
         for b in range(a + 1, len(bench.inputs)):
@@ -105,6 +105,8 @@ def repeats(bench: Bench) -> list[tuple[int, int]]:
             )
             if not same_loads or len(A.time) != len(B.time):
                 continue
+            if np.abs((A.time - A.time[0]) - (B.time - B.time[0])).max() > SAME * np.ptp(A.time):
+                continue  # the same way at another pace
             torque = np.broadcast_arrays(A.loads.torque, B.loads.torque)
             if np.sqrt(np.mean((torque[0] - torque[1]) ** 2)) > SAME * np.abs(torque).max():
                 continue

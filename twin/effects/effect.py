@@ -83,9 +83,31 @@ class Loads:
 
 
 @dataclass(frozen=True)
+class Bearing:
+    """By which torque (N m) the joint that antagonists turn rubs, with its pre-sliding turn (rad): what it always is, what comes
+    on top at rest and fades beyond a rate (rad/s), and what goes with the rate (N m s/rad)."""
+
+    torque: float = 0.0
+    presliding: float = 1e-2
+    breakaway: float = 0.0
+    stribeck: float = 0.2
+    viscous: float = 0.0
+
+    @property
+    def stiffness(self) -> float:
+        """N m/rad, before it slides at rest."""
+        return (self.torque + self.breakaway) / self.presliding
+
+    def at(self, rate: np.ndarray | float) -> np.ndarray:
+        """(n,) N m at rates (n,) rad/s, either way."""
+        rate = np.abs(rate)
+        return self.torque + self.breakaway * np.exp(-((rate / self.stribeck) ** 2)) + self.viscous * rate
+
+
+@dataclass(frozen=True)
 class Route:
     """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N); by how much it beds in (m) and over which tension
-    (N). Of antagonists also the torque (N m) by which the joint that they turn rubs, with its pre-sliding turn (rad).
+    (N). Of antagonists also how the joint that they turn rubs.
     `mounted`: the share of its rest bend that the body had when SMA springs were put on."""
 
     mu: float = 0.0
@@ -93,8 +115,7 @@ class Route:
     stretch: float = 0.0
     bedding: float = 0.0
     bedding_tension: float = 1.0
-    bearing: float = 0.0
-    bearing_presliding: float = 1e-2
+    bearing: Bearing = field(default_factory=Bearing)
     mounted: float = 0.0
 
     def elongation(self, tension: np.ndarray) -> np.ndarray:

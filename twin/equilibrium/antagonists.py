@@ -6,10 +6,12 @@ than at rest by u_1 - y and u_2 + y, which gives their tensions T_i at the drum,
     e(T) = stretch (T - T_0) + S (1 - exp(-(T - T_0) / T_b)),    S, T_b: by how much and over which tension they bed in
 
 and the jaw stands where its hinge is in balance under the outer torque tau, friction taking its share over the wrap angle w, and
-the bearing a force F_b = torque / |pulley| of its own:
+the bearing up to F_b = torque / |pulley| of its own, which may change from sample to sample with the rate:
 
-    G(y) = T_1(u_1 - y) exp(-mu w z) - T_2(u_2 + y) exp(mu w z) - F_b b + tau / pulley = 0
-    z = clip(z_0 + (y - y_0) / presliding, -1, 1),   b likewise, with its own pre-sliding
+    G(y) = T_1(u_1 - y) exp(-mu w z) - T_2(u_2 + y) exp(mu w z) - f + tau / pulley = 0
+    z = clip(z_0 + (y - y_0) / presliding, -1, 1),    f = clip(f_0 + k (y - y_0), -F_b, F_b)
+
+A limit that grows as the jaw comes to rest does not push it: f follows by motion alone.
 
 G falls with y, so that there is one answer: Newton's method within a bracket that shrinks.
 """
@@ -40,8 +42,7 @@ class Pair(NamedTuple):
     bedding_tension: float  # N, T_b
     loss: float  # mu w
     presliding: float  # m
-    bearing: float  # N, F_b
-    bearing_presliding: float  # m
+    bearing_stiffness: float  # N/m, k
 
 
 @jit
@@ -85,30 +86,32 @@ def pull(e, pair):
 
 
 class At(NamedTuple):
-    """A sample: what the drum pulls in (m), the load tau / pulley (N), and where the jaw last stood: y (m) and slip states z, b."""
+    """A sample: what the drum pulls in (m), the load tau / pulley (N), the most that the bearing holds F_b (N), and where the jaw
+    last stood: y (m), slip state z, the bearing's f (N)."""
 
     u1: float
     u2: float
     load: float
+    most: float
     y0: float
     z0: float
-    b0: float
+    f0: float
 
 
 @jit
 def unbalance(y, at, pair):
-    """G and dG/dy at y, with the tensions and the slip states there."""
+    """G and dG/dy at y, with the tensions, the slip state and the bearing's force there."""
     T1, k1 = pull(at.u1 - y, pair)
     T2, k2 = pull(at.u2 + y, pair)
     z = slip_state(at.z0, y - at.y0, pair.presliding)
-    b = slip_state(at.b0, y - at.y0, pair.bearing_presliding)
+    f = min(max(at.f0 + pair.bearing_stiffness * (y - at.y0), -at.most), at.most)
     down, up = math.exp(-pair.loss * z), math.exp(pair.loss * z)
     slope = -k1 * down - k2 * up
     if abs(z) < 1.0:
         slope -= pair.loss / pair.presliding * (T1 * down + T2 * up)
-    if abs(b) < 1.0:
-        slope -= pair.bearing / pair.bearing_presliding
-    return T1 * down - T2 * up - pair.bearing * b + at.load, slope, T1, T2, z, b
+    if abs(f) < at.most:
+        slope -= pair.bearing_stiffness
+    return T1 * down - T2 * up - f + at.load, slope, T1, T2, z, f
 
 
 @jit
@@ -124,18 +127,18 @@ def bracket(at, pair):
 
 
 @jit
-def run(u, load, pair, smooth, y_out, T_out):
-    """Follow displacements u (n, 2) m and loads (n,) N: y (n,) m and base tensions (n, 2) N out.
+def run(u, load, most, pair, smooth, y_out, T_out):
+    """Follow displacements u (n, 2) m and loads and `most` (n,) N: y (n,) m and base tensions (n, 2) N out.
 
     The start is without friction, of the `smooth` pair: where a trial comes from is not known.
     """
-    y, z, b = 0.5 * (u[0, 0] - u[0, 1]), 0.0, 0.0
+    y, z, f = 0.5 * (u[0, 0] - u[0, 1]), 0.0, 0.0
     for i in range(u.shape[0]):
-        at = At(u[i, 0], u[i, 1], load[i], y, z, b)
+        at = At(u[i, 0], u[i, 1], load[i], most[i] if i > 0 else 0.0, y, z, f)
         now = pair if i > 0 else smooth
         low, high = bracket(at, now)
         for _ in range(ROUNDS):
-            G, slope, T1, T2, z, b = unbalance(y, at, now)
+            G, slope, T1, T2, z, f = unbalance(y, at, now)
             if G > 0.0:
                 low = max(low, y)
             elif G < 0.0:
@@ -149,14 +152,15 @@ def run(u, load, pair, smooth, y_out, T_out):
                 break
             y = new
         if i == 0:
-            z, b = 0.0, 0.0
+            z, f = 0.0, 0.0
         y_out[i], T_out[i, 0], T_out[i, 1] = y, T1, T2
 
 
-def follow(u: np.ndarray, load: np.ndarray, pair: Pair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Tendon y (n,) m that the jaw has taken of tendon 1, base tensions (n, 2) N and status (n,), under displacements u (n, 2) m
-    and loads tau / pulley (n,) N."""
+def follow(u: np.ndarray, load: np.ndarray, most: np.ndarray, pair: Pair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Tendon y (n,) m that the jaw has taken of tendon 1, base tensions (n, 2) N and status (n,), under displacements u (n, 2) m,
+    loads tau / pulley (n,) N and the most F_b (n,) N that the bearing holds."""
     y, tension = np.empty(len(u)), np.empty((len(u), 2))
     pair = Pair(*(float(x) for x in pair))
-    run(np.ascontiguousarray(u, float), np.ascontiguousarray(load, float), pair, pair._replace(loss=0.0, bearing=0.0), y, tension)
+    rows = (np.ascontiguousarray(x, float) for x in (u, load, most))
+    run(*rows, pair, pair._replace(loss=0.0), y, tension)
     return y, tension, np.where(np.isfinite(y), DIRECT, NOT_FOUND)

@@ -59,9 +59,10 @@ class Antagonists:
         arm = abs(body.pulley)
         pair = Pair(
             body.pretension, body.stretch + route.stretch, route.bedding, route.bedding_tension, route.mu * body.wrap,
-            route.presliding, route.bearing / arm, route.bearing_presliding * arm,
+            route.presliding, route.bearing.stiffness / arm**2,
         )  # fmt: skip
-        y, tension, status = follow(u, torque / body.pulley, pair)
+        rubs = route.bearing.at(rate(u, problem.time) / arm) / arm
+        y, tension, status = follow(u, torque / body.pulley, rubs, pair)
         q = body.rest + y / body.pulley
         drum = 0.5 * (u[:, 0] - u[:, 1]) / body.drum  # what both tendons have lost is slack
         others = {
@@ -72,6 +73,11 @@ class Antagonists:
             tension=tension, path=np.column_stack([-y, y]), markers=np.empty((len(u), 0, 3)), status=status, q=q[:, None],
             others=others,
         )  # fmt: skip
+
+
+def rate(u: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """(n,) m/s at which a drum moves its two tendons, over three rows, so that an encoder's noise alone is no motion."""
+    return np.gradient(0.5 * (u[:, 0] - u[:, 1]), time) if len(u) > 1 else np.zeros(len(u))
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
