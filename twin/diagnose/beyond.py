@@ -42,7 +42,7 @@ class Beyond:
         if not self.harmful:
             return told
         named = " and ".join(e.replace("_", " ") for e in self.harmful)
-        return f"{told}; {named} helps inside and harms beyond: do not trust it at another {self.condition}"
+        return f"{told}; {named} helps inside and harms beyond: do not trust it there"
 
 
 def beyond(study: Study, final: Weighed, gated: Gated, by_time: bool) -> tuple[Beyond, ...]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from math import isfinite
 
 from twin.calibrate import fit
-from twin.diagnose.halves import unseen
+from twin.diagnose.halves import Unseen, unseen
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.patterns import dictionary
@@ -30,7 +31,8 @@ def choose(study: Study, found: Search, bars: Thresholds) -> Search:
     if core is None:
         return Search(found.base, best, found.all)
     core = _converged(study, core)
-    if study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
+    alone = len(core.effects) == len(found.base.effects) + 1
+    if alone and study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
         core = beside(study, core, found, bars)
     known = {w.effects: w for w in (*found.all, core)}
     return Search(found.base, core, tuple(sorted(known.values(), key=lambda w: -w.score)))
@@ -43,19 +45,27 @@ def predicting(study: Study, found: Search, accept: float) -> Weighed:
 
 
 def most_predictive(study: Study, found: Search) -> Weighed | None:
-    """Of the sets whose every effect halves the squared error on what was not fitted, near and far (`unseen`), the one that errs
-    least there. Halves of the session are fitted for the few that err least on single trials."""
-    near = {w.effects: left_out(study, w.fit).square for w in found.all}
-    helpful = [w for w in found.all if near[w.effects] < left_out(study, found.base.fit).square]
-    few = sorted(helpful, key=lambda w: _each(w, near[w.effects]))[:FAR]
-    errors = {w.effects: _each(w, unseen(study, w).square) for w in (found.base, *few)}
-    ranked = sorted((w for w in few if errors[w.effects] < errors[found.base.effects]), key=lambda w: errors[w.effects])
-    return next((w for w in ranked if halved(study, found.base, w)), None)
+    """Of the sets that halve the squared error on what was not fitted, near and far (`unseen`), and whose every effect takes a
+    quarter of it, the one that errs least there. Halves of the session are fitted for the few that err least on single trials."""
+    base, sets, seen = found.base, {w.effects: w for w in found.all}, dict[tuple[str, ...], Unseen]()
+
+    def error(effects: tuple[str, ...]) -> Unseen:
+        if effects not in seen:
+            seen[effects] = unseen(study, sets[effects])
+        return seen[effects]
+
+    near = {e: _each(e, left_out(study, w.fit).square) for e, w in sets.items()}
+    few = sorted((e for e in sets if near[e] < near[base.effects]), key=lambda e: near[e])[:FAR]
+    for effects in sorted(few, key=lambda e: _each(e, error(e).square)):
+        fewer = [e for e in combinations(effects, len(effects) - 1) if e in sets]
+        if _half(error(effects), error(base.effects)) and all(_quarter(error(effects), error(e)) for e in fewer):
+            return sets[effects]
+    return None
 
 
-def _each(weighed: Weighed, square: float) -> float:
-    """A squared error that every effect of the set must pay for by halving it."""
-    return square / HALF ** len(weighed.effects)
+def _each(effects: tuple[str, ...], square: float) -> float:
+    """A squared error that every effect of a set must pay for."""
+    return square / BESIDE ** len(effects)
 
 
 def beside(study: Study, core: Weighed, found: Search, bars: Thresholds) -> Weighed:
@@ -76,10 +86,15 @@ def _converged(study: Study, rough: Weighed) -> Weighed:
 
 def halved(study: Study, base: Weighed, best: Weighed) -> bool:
     """Whether effects halve the smooth error; or the squared error on what was not fitted, of all outputs and of the headline."""
-    if _smaller(base, best):
-        return True
-    after, before = unseen(study, best), unseen(study, base)
+    return _smaller(base, best) or _half(unseen(study, best), unseen(study, base))
+
+
+def _half(after: Unseen, before: Unseen) -> bool:
     return isfinite(after.square) and after.square <= HALF * before.square and after.headline <= HALF * before.headline
+
+
+def _quarter(after: Unseen, before: Unseen) -> bool:
+    return after.square <= BESIDE * before.square
 
 
 def _smaller(base: Weighed, best: Weighed) -> bool:

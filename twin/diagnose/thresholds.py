@@ -233,8 +233,8 @@ FAR = _row(
     "judgement: as TOP",
 )  # fmt: skip
 BESIDE = _row(
-    "BESIDE", 0.75, "of the squared error on trials left out", "what stands beside a set that was chosen for what it predicts must "
-    "take half of what each of that set must", "derivation: half of HALF",
+    "BESIDE", 0.75, "of the squared error on trials left out", "each effect of a set that is chosen for what it predicts must take "
+    "half of what the set must", "derivation: half of HALF",
 )  # fmt: skip
 BLOCKS = _row("BLOCKS", 4, "parts", "where one trial alone is fitted, it is left out by quarters", "judgement")
 
