@@ -97,7 +97,7 @@ def test_a_set_that_leaves_a_fitted_trial_without_equilibrium_is_passed_over(mon
 
 @pytest.mark.parametrize(("unseen", "taken"), [(2.5, True), (2.9, False), (2.6, False)])
 def test_two_effects_that_halve_it_together_must_take_a_quarter_each(unseen: float, taken: bool) -> None:
-    """Of 16 alone 9 and 12.25; together 6.25, less than half, and than three quarters of 9; 8.41 is neither, 6.76 no quarter less."""
+    """Of 16 alone 9 and 12.25; together 6.25, under half and three quarters of 9; 8.41 is neither, 6.76 no quarter less."""
     base = weighed(score=0.0, size=6.0, unseen=4.0)
     ropes, drives = weighed("ropes", score=5.0, size=5.0, unseen=3.0), weighed("drives", score=9.0, size=5.0, unseen=3.5)
     both = weighed("drives", "ropes", score=4.0, size=4.0, unseen=unseen)
