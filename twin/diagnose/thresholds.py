@@ -228,6 +228,11 @@ WORSE = _row(
 HALVED = _row(
     "HALVED", 4, "trials", "of fewer a half of the session is hardly more than a trial", "derivation: two and two"
 )  # fmt: skip
+COARSELY = _row(
+    "COARSELY", 1e-3, "of the cost", "as ROUGHLY, of fits to half of a session: what they leave of the other is known to a "
+    "tenth at best",
+    "derivation: the mean square of some ten trials is known to 1 / sqrt(10)",
+)  # fmt: skip
 FAR = _row(
     "FAR", 4, "sets", "that are fitted to halves of the session: those that err least on trials left out, to first order",
     "judgement: as TOP",
