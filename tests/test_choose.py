@@ -70,7 +70,7 @@ def test_halved_is_the_structure_or_both_errors_left_out(size: float, unseen: fl
 def test_what_halves_the_structure_is_gone_on_with_as_the_evidence_ranks_it() -> None:
     base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
     found = searched(base, best)
-    assert choose(STUDY, found, Thresholds()).best is best
+    assert choose(STUDY, found, Thresholds()) == found
 
 
 def test_where_nothing_predicts_the_evidence_has_the_word() -> None:
@@ -131,6 +131,7 @@ def test_what_is_gone_on_with_for_what_it_predicts_is_fitted_to_the_end(monkeypa
     assert found.base is base
     assert found.best is (both if time_left else done)
     assert found.all == ((both, base, rough) if time_left else (base, done))
+    assert found.predicted
 
 
 @pytest.mark.parametrize(

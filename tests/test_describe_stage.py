@@ -26,6 +26,7 @@ class World:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.size, self.unseen, self.verdict, self.rigs = SIZE, 0.1, "unexplained", None
         self.strained: tuple[str, ...] = ()
+        self.score, self.predicted = 0.0, True  # of the sets that are not in force; how the best was chosen
         self.runners: list[Any] = []
         self.doubts: list[Any] = []
         for name in ("structure", "where", "since", "beyond", "unlikely", "left_out", "nearest"):
@@ -42,7 +43,8 @@ class World:
     def model(self, *effects: str) -> Any:
         evaluation = SimpleNamespace(raw=[LEFT])
         fit = SimpleNamespace(effects=effects, z=np.arange(4.0), evaluation=evaluation)
-        return SimpleNamespace(effects=effects, fit=fit, discrepancy=SimpleNamespace(mean=MEAN, size=self.size))
+        left = SimpleNamespace(mean=MEAN, size=self.size)
+        return SimpleNamespace(effects=effects, fit=fit, discrepancy=left, score=self.score if effects else 0.0)
 
     def structure(self, bench: Any, trials: Any, z: np.ndarray, left: Any, strongest: str, line: Any, bars: Any) -> str:
         assert (z.shape, strongest, line, bars) == ((2, 2), "T1", (31.0, 0.5), BARS)
@@ -78,7 +80,9 @@ class World:
         objective = SimpleNamespace(whitener=SimpleNamespace(noise=SimpleNamespace(sigma=SIGMA)))
         evidence = SimpleNamespace(strongest=lambda left: [("T1", 0.5), ("T2", 0.1)])
         study: Any = SimpleNamespace(bench=bench, trials=[3], objective=objective, evidence=evidence)
-        found: Any = SimpleNamespace(base=final, all=[self.model("drift"), self.model("creep", "drift"), final])
+        found: Any = SimpleNamespace(
+            base=final, all=[self.model("drift"), self.model("creep", "drift"), final], predicted=self.predicted
+        )
         return describe(study, found, SimpleNamespace(doubts=self.doubts), judged, BARS)  # type: ignore[arg-type]
 
 
@@ -91,6 +95,19 @@ def test_what_is_explained_leaves_noise_and_its_doubts(verdict: str, monkeypatch
     assert found.notices == ("unlikely", "leaps of [3]", "far")
     assert (found.strongest, found.worst_channel) == ((("T1", 0.5), ("T2", 0.1)), "worst of (2, 2)")
     assert found.components == {"static": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("verdict", "score", "predicted", "said"),
+    [("partly_explained", 1.0, True, True), ("partly_explained", 0.0, True, False), ("partly_explained", 1.0, False, False),
+     ("unexplained", 1.0, True, False)],
+)  # fmt: skip
+def test_what_was_chosen_against_the_evidence_says_so(
+    verdict: str, score: float, predicted: bool, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = World(monkeypatch)
+    world.verdict, world.score, world.predicted = verdict, score, predicted
+    assert (stage.PREDICTED in world.said().notices) is said
 
 
 def test_what_is_left_is_said_with_its_place_and_since_when(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -122,9 +122,10 @@ def test_what_is_left_makes_claims_less_sure_by_its_share(staged: dict[str, Any]
     assert judged(weighed(FRICTION, 0.0)).claims[0].probability == pytest.approx(0.5)
 
 
-def test_sets_as_good_as_the_claimed_are_ambiguous_unless_they_only_add(staged: dict[str, Any]) -> None:
+def test_sets_as_good_as_the_claimed_are_ambiguous_unless_they_only_add_or_drop(staged: dict[str, Any]) -> None:
     near, far, more = weighed(CREEP, -9.0), weighed(DELAY, -13.0), weighed(BOTH, -1.0)
     assert judged(weighed(FRICTION, 0.0), near, far, more).ambiguous == (CREEP,)  # within ACCEPT = 12
+    assert judged(weighed(BOTH, 0.0), weighed(FRICTION, -1.0), weighed(DELAY, -2.0)).ambiguous == (DELAY,)
 
 
 def test_a_second_robot_is_seen_only_where_no_effects_explain_as_much(staged: dict[str, Any]) -> None:

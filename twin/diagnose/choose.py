@@ -35,7 +35,7 @@ def choose(study: Study, found: Search, bars: Thresholds) -> Search:
     if alone and study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
         core = beside(study, core, found, bars)
     known = {w.effects: w for w in (*found.all, core)}
-    return Search(found.base, core, tuple(sorted(known.values(), key=lambda w: -w.score)))
+    return Search(found.base, core, tuple(sorted(known.values(), key=lambda w: -w.score)), predicted=True)
 
 
 def predicting(study: Study, found: Search, accept: float) -> Weighed:

@@ -20,6 +20,11 @@ from twin.diagnose.study import Study
 from twin.diagnose.thresholds import MUCH
 from twin.diagnose.words import components, mixed, nearest, since, structure, undecided, unlike, worst_channel
 
+PREDICTED = (
+    "what is claimed was chosen for what it predicts of trials and halves of the session left out; by evidence, to which a large "
+    "smooth error costs no more than a small one, other sets come before it, which the probabilities show"
+)
+
 
 @dataclass(frozen=True)
 class Description:
@@ -45,7 +50,9 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     rebuilt = (mixed(study.bench, judged.rigs).strip(),) if judged.rigs else ()
     far = tuple(b.words() for b in beyond(study, final, gated, by_time=judged.verdict == "partly_explained"))
     late = leaps(study.bench, study.trials, final.fit)
-    notices = (*unlikely(final.fit), *judged.signs.strained, *late, *rebuilt, *far)
+    outweighed = any(w.score > final.score for w in found.all)
+    chosen = (PREDICTED,) if found.predicted and outweighed and judged.verdict == "partly_explained" else ()
+    notices = (*unlikely(final.fit), *judged.signs.strained, *late, *rebuilt, *chosen, *far)
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)
 
 

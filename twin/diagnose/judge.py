@@ -156,10 +156,10 @@ def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[
 
 
 def _as_good(found: Search, final: Weighed) -> tuple[tuple[str, ...], ...]:
-    """Other sets, not just the claimed one with something added, whose evidence comes within `ACCEPT` of it."""
-    return tuple(
-        w.effects for w in found.all if w.effects and not set(final.effects) <= set(w.effects) and w.score > final.score - ACCEPT
-    )
+    """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `ACCEPT` of it."""
+    claimed = set(final.effects)
+    others = [w for w in found.all if not claimed <= set(w.effects) and not set(w.effects) <= claimed]
+    return tuple(w.effects for w in others if w.score > final.score - ACCEPT)
 
 
 def _rivals(found: Search, gated: Gated, final: Weighed) -> tuple[Weighed, Weighed] | None:

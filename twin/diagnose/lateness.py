@@ -72,7 +72,7 @@ def lateness(study: Study, found: Search) -> Search:
         best = _in_place(study, best, weights[likely]) or best
     ranked = rescored([best, *(w for w in found.all if w.effects != best.effects)], weights)
     best = next(w for w in ranked if w.effects == best.effects)
-    return Search(found.base, best, tuple(sorted(ranked, key=lambda w: -w.score)))
+    return replace(found, best=best, all=tuple(sorted(ranked, key=lambda w: -w.score)))
 
 
 def tells_laws(study: Study) -> bool:

@@ -18,11 +18,13 @@ Known = dict[tuple[str, ...], Weighed]
 
 @dataclass(frozen=True)
 class Search:
-    """The base model, the best set found, and every set that was weighed (best start each), best first."""
+    """The base model, the best set found, and every set that was weighed (best start each), best first; whether the best is that
+    for what it predicts, and not by evidence."""
 
     base: Weighed
     best: Weighed
     all: tuple[Weighed, ...]
+    predicted: bool = False
 
 
 def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) -> Search:
