@@ -107,7 +107,7 @@ def test_the_three_cable_robots_drives_are_named_and_the_block_they_were_not_fou
 
 @pytest.mark.xfail(
     strict=False,
-    reason="missed: beside ropes and drives it takes 2 % of the squared error on sweeps left out, a quarter is asked for",
+    reason="missed: beside the ropes it takes 2 % of the squared error left out, a quarter is asked for",
 )
 def test_the_three_cable_robots_dead_band_is_named(half_a_block: Diagnosis) -> None:
     claims = {c.effect: c.parameters for c in half_a_block.claims}

@@ -133,9 +133,11 @@ def test_the_loop_of_joint_friction_is_its_torque_times_the_compliance_whatever_
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.4, 3.0])
-def test_the_loop_is_as_wide_as_the_bearing_rubs_at_the_rate(rate: float) -> None:
-    """Triangles of one rate: torque + breakaway exp(-(v / v_s)^2) + viscous v, of the joint, by the pair's compliance."""
-    torque, breakaway, stribeck, viscous = 0.006, 0.004, 0.3, 0.002
+@pytest.mark.parametrize(("torque", "breakaway"), [(0.006, 0.004), (0.0, 0.0)])
+def test_the_loop_is_as_wide_as_the_bearing_rubs_at_the_rate(rate: float, torque: float, breakaway: float) -> None:
+    """Triangles of one rate: torque + breakaway exp(-(v / v_s)^2) + viscous v, of the joint, by the pair's compliance; grease alone
+    too."""
+    stribeck, viscous = 0.3, 0.002
     leg = np.linspace(-0.5, 0.5, 100)
     q = np.concatenate([leg, leg[::-1], leg, leg[::-1]])
     trial = run(q, 0.01)

@@ -93,11 +93,6 @@ class Bearing:
     stribeck: float = 0.2
     viscous: float = 0.0
 
-    @property
-    def stiffness(self) -> float:
-        """N m/rad, before it slides at rest."""
-        return (self.torque + self.breakaway) / self.presliding
-
     def at(self, rate: np.ndarray | float) -> np.ndarray:
         """(n,) N m at rates (n,) rad/s, either way."""
         rate = np.abs(rate)

@@ -7,9 +7,9 @@ from twin.quantities import Parameter
 
 
 class JointFriction(Effect):
-    """The joint that antagonists turn is held back by a torque f = clip(f + k turn, -F(v), F(v)) after it turned,
+    """The joint that antagonists turn is held back by a torque f = clip(f + F(v) turn / presliding, -F(v), F(v)) after it turned,
 
-        F(v) = torque + breakaway exp(-(v / stribeck)^2) + viscous v,    k = F(0) / presliding,
+        F(v) = torque + breakaway exp(-(v / stribeck)^2) + viscous v,
 
     v the rate (rad/s) at which its drive would turn it. By the fuller law it rubs more where it hardly moves, until a film carries
     it, and more again where that is sheared fast: only runs at different rates show it. The joint's own rate is the drive's but

@@ -9,7 +9,8 @@ and the jaw stands where its hinge is in balance under the outer torque tau, fri
 the bearing up to F_b = torque / |pulley| of its own, which may change from sample to sample with the rate:
 
     G(y) = T_1(u_1 - y) exp(-mu w z) - T_2(u_2 + y) exp(mu w z) - f + tau / pulley = 0
-    z = clip(z_0 + (y - y_0) / presliding, -1, 1),    f = clip(f_0 + k (y - y_0), -F_b, F_b)
+    z = clip(z_0 + (y - y_0) / presliding, -1, 1)
+    f = clip(f_0 + F_b (y - y_0) / presliding, -F_b, F_b)
 
 A limit that grows as the jaw comes to rest does not push it: f follows by motion alone.
 
@@ -42,7 +43,7 @@ class Pair(NamedTuple):
     bedding_tension: float  # N, T_b
     loss: float  # mu w
     presliding: float  # m
-    bearing_stiffness: float  # N/m, k
+    bearing_presliding: float  # m
 
 
 @jit
@@ -104,13 +105,14 @@ def unbalance(y, at, pair):
     T1, k1 = pull(at.u1 - y, pair)
     T2, k2 = pull(at.u2 + y, pair)
     z = slip_state(at.z0, y - at.y0, pair.presliding)
-    f = min(max(at.f0 + pair.bearing_stiffness * (y - at.y0), -at.most), at.most)
+    stiffness = at.most / pair.bearing_presliding
+    f = min(max(at.f0 + stiffness * (y - at.y0), -at.most), at.most)
     down, up = math.exp(-pair.loss * z), math.exp(pair.loss * z)
     slope = -k1 * down - k2 * up
     if abs(z) < 1.0:
         slope -= pair.loss / pair.presliding * (T1 * down + T2 * up)
     if abs(f) < at.most:
-        slope -= pair.bearing_stiffness
+        slope -= stiffness
     return T1 * down - T2 * up - f + at.load, slope, T1, T2, z, f
 
 

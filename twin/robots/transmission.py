@@ -59,7 +59,7 @@ class Antagonists:
         arm = abs(body.pulley)
         pair = Pair(
             body.pretension, body.stretch + route.stretch, route.bedding, route.bedding_tension, route.mu * body.wrap,
-            route.presliding, route.bearing.stiffness / arm**2,
+            route.presliding, route.bearing.presliding * arm,
         )  # fmt: skip
         rubs = route.bearing.at(rate(u, problem.time) / arm) / arm
         y, tension, status = follow(u, torque / body.pulley, rubs, pair)
