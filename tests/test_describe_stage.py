@@ -28,6 +28,7 @@ class World:
         self.strained: tuple[str, ...] = ()
         self.score, self.predicted = 0.0, True  # of the sets that are not in force; how the best was chosen
         self.runners: list[Any] = []
+        self.doubtful: tuple[str, ...] = ()
         self.doubts: list[Any] = []
         for name in ("structure", "where", "since", "beyond", "unlikely", "left_out", "nearest"):
             monkeypatch.setattr(stage, name, getattr(self, name))
@@ -75,7 +76,9 @@ class World:
     def said(self) -> Description:
         final = self.model()
         signs = SimpleNamespace(line=(31.0, 0.5), strained=self.strained, unseen=self.unseen)
-        judged: Any = SimpleNamespace(verdict=self.verdict, final=final, rigs=self.rigs, signs=signs, runners_up=self.runners)
+        judged: Any = SimpleNamespace(
+            verdict=self.verdict, final=final, rigs=self.rigs, signs=signs, runners_up=self.runners, doubtful=self.doubtful
+        )
         bench = SimpleNamespace(measured={3: MEASURED})
         objective = SimpleNamespace(whitener=SimpleNamespace(noise=SimpleNamespace(sigma=SIGMA)))
         evidence = SimpleNamespace(strongest=lambda left: [("T1", 0.5), ("T2", 0.1)])
@@ -108,6 +111,15 @@ def test_what_was_chosen_against_the_evidence_says_so(
     world = World(monkeypatch)
     world.verdict, world.score, world.predicted = verdict, score, predicted
     assert (stage.PREDICTED in world.said().notices) is said
+
+
+def test_claims_less_likely_than_not_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch)
+    world.verdict, world.doubtful = "partly_explained", ("load_cell_gain", "tilt")
+    said = world.said().notices
+    assert any(n.startswith("load cell gain and tilt: less likely than not") for n in said)
+    world.doubtful = ()
+    assert not any("less likely" in n for n in world.said().notices)
 
 
 def test_what_is_left_is_said_with_its_place_and_since_when(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from twin.calibrate import Free
 from twin.diagnose import search as stage
 from twin.diagnose.budget import Budget
 from twin.diagnose.null import Thresholds
 from twin.diagnose.search import _material, search
+from twin.quantities import Parameter
 
 STUDY: Any = SimpleNamespace(
     objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1), budget=Budget()
@@ -27,7 +29,8 @@ class World:
         self.anew: list[set[str]] = []
         monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: self.anew.append(among))
         monkeypatch.setattr(stage, "rank", self.rank)
-        monkeypatch.setattr(stage, "extended", lambda study, member, effect, start, beat: self.of(*member.effects, effect))
+        monkeypatch.setattr(stage, "extended", lambda study, member, effect, start, beat=0.0: self.of(*member.effects, effect))
+        monkeypatch.setattr(stage, "catalogue", lambda: dict.fromkeys(worth, SimpleNamespace(akin=())))
         monkeypatch.setattr(stage, "fuller", lambda study, w, effects, accept: w)
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
 
@@ -36,7 +39,9 @@ class World:
         score = sum(self.worth[e] for e in effects) + self.together.get("+".join(effects), 0.0)
         score -= 400.0 * (len(effects) > 1 and any(e.startswith("decoy") for e in effects))
         self.refitted.append(effects)
-        fit = SimpleNamespace(effects=effects, z=np.zeros(1), model=SimpleNamespace(free=effects), cost=-score)
+        twin = SimpleNamespace(effects=[SimpleNamespace(id=e, values={}) for e in effects])
+        free = tuple(Free(e, Parameter("amount", 0.0, "1", 0.0, 1.0, "by hand")) for e in effects)
+        fit = SimpleNamespace(effects=effects, z=np.zeros(1), model=SimpleNamespace(free=free, twin=twin), cost=-score)
         return SimpleNamespace(effects=effects, score=score, fit=fit, discrepancy=None)
 
     def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
@@ -72,6 +77,28 @@ def test_patterns_are_taken_anew_of_what_promises_anything_alone(monkeypatch: py
     world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "tilt": 0.0})
     world.found()
     assert world.anew[0] == {"creep"}
+
+
+@pytest.mark.parametrize(("carried", "best"), [(90.0, ("camera", "curvature")), (70.0, ("bias", "camera"))])
+def test_an_effect_that_was_better_alone_is_tried_in_the_company_that_carried_another(
+    monkeypatch: pytest.MonkeyPatch, carried: float, best: tuple[str, ...]
+) -> None:
+    """A camera worth nothing much beside the true pre-curvature, so never sought there, helps a bias to imitate it. On bench day
+    90014 the two were taken for the pre-curvature, which with the camera beside is better by 50."""
+    same = {"bias+curvature": -480.0, "bias+camera+curvature": -400.0}
+    together = {"bias+camera": 100.0, "camera+curvature": carried, **same}
+    world = World(monkeypatch, {"bias": 480.0, "camera": 1.0, "curvature": 500.0}, together)
+    promised = world.rank
+
+    def rank(objective: Any, evidence: Any, fit: Any, *rest: Any, **named: Any) -> list[Any]:
+        return [
+            c
+            for c in promised(objective, evidence, fit, *rest, **named)
+            if set(fit.effects) != {"curvature"} or c.effect != "camera"
+        ]
+
+    monkeypatch.setattr(stage, "rank", rank)
+    assert world.found().best.effects == best
 
 
 def test_when_the_time_is_up_the_best_so_far_stands_and_the_rest_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from twin.diagnose.places import where
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import MUCH
-from twin.diagnose.words import components, mixed, nearest, since, structure, undecided, unlike, worst_channel
+from twin.diagnose.words import components, doubtful, mixed, nearest, since, structure, undecided, unlike, worst_channel
 
 PREDICTED = (
     "what is claimed was chosen for what it predicts of trials and halves of the session left out; by evidence, to which a large "
@@ -52,7 +52,8 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     late = leaps(study.bench, study.trials, final.fit)
     outweighed = any(w.score > final.score for w in found.all)
     chosen = (PREDICTED,) if found.predicted and outweighed and judged.verdict == "partly_explained" else ()
-    notices = (*unlikely(final.fit), *judged.signs.strained, *late, *rebuilt, *chosen, *far)
+    doubts = (doubtful(judged.doubtful),) if judged.doubtful else ()
+    notices = (*unlikely(final.fit), *judged.signs.strained, *doubts, *late, *rebuilt, *chosen, *far)
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)
 
 

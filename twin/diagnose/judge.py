@@ -11,6 +11,7 @@ from twin.diagnose.diagnosis import Claim
 from twin.diagnose.doubts import strained
 from twin.diagnose.evidence import Spectrum
 from twin.diagnose.gate import Gated
+from twin.diagnose.lateness import LATE
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.places import misbent
@@ -43,7 +44,8 @@ class Signs:
 @dataclass(frozen=True)
 class Judgement:
     """The verdict, the model it leaves in force, claims and runners-up (their errors on sealed trials yet unknown), sets of effects
-    that tell the same, and two models between which an experiment should decide."""
+    that tell the same, two models between which an experiment should decide; and the claims that alone keep the day from being
+    explained, being less likely than not."""
 
     verdict: str
     final: Weighed
@@ -53,6 +55,7 @@ class Judgement:
     between: tuple[Weighed, Weighed] | None
     signs: Signs
     rigs: Rigs | None
+    doubtful: tuple[str, ...] = ()
 
 
 def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgement:
@@ -75,10 +78,12 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
         signs = replace(signs, after=base.discrepancy.size, unseen=left_out(study, base.fit).structure, strained=())
         best, added = base, ()
     claims = _claims(study, found, gated, best, added, either or signs, bars)
+    doubtful = unsure(claims) if said == "explained" else ()
+    said = "partly_explained" if doubtful else said
     runners = _runners_up(found, gated, () if said == "unexplained" else added)
     doubts = tuple(w.effects for d in gated.doubts for w in (d.found, d.other))
-    ambiguous = tuple(dict.fromkeys((*doubts, *_as_good(found, best))))
-    return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart)
+    ambiguous = tuple(dict.fromkeys((*doubts, *_as_good(found, gated, best))))
+    return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart, doubtful)
 
 
 def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
@@ -115,6 +120,12 @@ def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
     if not much and not (s.after > bars.left and s.after > SHARE * s.before):
         return "partly_explained" if s.strange else "explained"
     return "partly_explained" if s.halved else "unexplained"
+
+
+def unsure(claims: tuple[Claim, ...]) -> tuple[str, ...]:
+    """Claims less likely than not: other sets explain the data better, and what they all imitate may be none of them. A lag or a
+    delay is one of few laws that `lateness` weighed, and the likeliest."""
+    return tuple(c.effect for c in claims if c.probability < EVEN and c.effect not in LATE)
 
 
 def probability(found: Search, effect: str, small: set[str]) -> float:
@@ -155,10 +166,13 @@ def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[
     return tuple(list(out.values())[:RUNNERS])
 
 
-def _as_good(found: Search, final: Weighed) -> tuple[tuple[str, ...], ...]:
-    """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `ACCEPT` of it."""
-    claimed = set(final.effects)
-    others = [w for w in found.all if not claimed <= set(w.effects) and not set(w.effects) <= claimed]
+def _as_good(found: Search, gated: Gated, final: Weighed) -> tuple[tuple[str, ...], ...]:
+    """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `ACCEPT` of it. What was
+    too small to claim was dropped from the claimed set, and lends no other its evidence."""
+    claimed, small = set(final.effects), {s.effect for s in gated.small}
+    others = [
+        w for w in found.all if not claimed <= set(w.effects) and not set(w.effects) <= claimed and not small & set(w.effects)
+    ]
     return tuple(w.effects for w in others if w.score > final.score - ACCEPT)
 
 

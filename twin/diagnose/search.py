@@ -12,6 +12,7 @@ from twin.diagnose.ranking import rank
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, HOPELESS, PROMISE, WIDTH
 from twin.diagnose.weigh import Weighed, better, extended, fuller, refit_without
+from twin.effects import Start, catalogue
 
 Known = dict[tuple[str, ...], Weighed]
 
@@ -51,6 +52,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
         if not beam or beam[0].score < best_before + bars.accept:
             break
     best = max(known.values(), key=lambda w: w.score - bars.accept * len(w.effects))
+    best = exchanged(study, best, known)
     best = _leaner(study, base, best, known, bars.accept)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
@@ -75,6 +77,45 @@ def _material(study: Study, base: Weighed, member: Weighed, bar: float) -> float
     explains least, where its laws' faults show least."""
     explained = max(0.0, float(study.fall(base.fit, member.fit).min()))
     return max(bar**2 * study.objective.n, FORM**2 * explained)
+
+
+def exchanged(study: Study, best: Weighed, known: Known) -> Weighed:
+    """The best set, or one with another effect in the place of one of its own, where that has more evidence.
+
+    Tried is what was better than an effect of the set where both were weighed in the same company, and was not seen in the set's:
+    what is too small to be sought beside the true effect may be worth more beside a false one, which it helps to imitate it.
+    """
+    for company, weaker in list(known.items()):
+        if not company or not set(company) < set(best.effects):
+            continue
+        for other, stronger in list(known.items()):
+            own, new = set(company) - set(other), set(other) - set(company)
+            if len(own) != 1 or len(new) != 1 or new <= set(best.effects) or stronger.score <= weaker.score:
+                continue
+            found = _in_company(study, stronger, best, set(best.effects) - set(company), known)
+            if found is not None and found.score > best.score:
+                return exchanged(study, found, known)
+    return best
+
+
+def _in_company(study: Study, member: Weighed, best: Weighed, effects: set[str], known: Known) -> Weighed | None:
+    """`member` and these effects of the best set beside, as they were fitted there; None where they are not to be had together or
+    were weighed already."""
+    together = {*member.effects, *effects}
+    if tuple(sorted(together)) in known or any(together & set(catalogue()[e].akin) for e in together):
+        return None
+    for effect in sorted(effects):
+        if not study.budget.allows(f"{effect} beside {' + '.join(member.effects)}"):
+            return None
+        study.progress(f"{effect} beside {' + '.join(member.effects)}")
+        law = next(e for e in best.fit.model.twin.effects if e.id == effect)
+        free = tuple(f.parameter.name for f in best.fit.model.free if f.effect == effect)
+        found = extended(study, member, effect, Start(law.values, free))
+        if found is None:
+            return None
+        member = found
+    known[member.effects] = member
+    return member
 
 
 def _leaner(study: Study, base: Weighed, best: Weighed, known: Known, accept: float) -> Weighed:

@@ -65,7 +65,7 @@ def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float
             values = {**law.values, **start}
             model = plain.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
             try:
-                fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit)))
+                fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit), tolerance=ROUGHLY))
             except SolveError:
                 continue
             if fuller.score > max(found.score, plain.score + accept):

@@ -141,6 +141,14 @@ def change(bench: Bench, trials: Sequence[int], z: np.ndarray) -> tuple[int, int
     return trials[after[best] - 1], trials[after[best]]
 
 
+def doubtful(effects: Sequence[str]) -> str:
+    """Of claims less likely than not."""
+    named = " and ".join(e.replace("_", " ") for e in effects)
+    return (
+        f"{named}: less likely than not, for other sets of effects have more evidence; what all of them imitate may be none of them"
+    )
+
+
 def undecided(effect: str, rival: str) -> str:
     """An effect that was found, and is not claimed because these data cannot tell it from another."""
     one, other = (e.replace("_", " ") for e in (effect, rival))
