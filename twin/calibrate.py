@@ -30,7 +30,6 @@ ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 BOUND = 1e-3  # of a parameter's range: closer to an end of it, it stands there
 STEPS = 12  # at most, of a fit
-FULL = 5000.0  # white readings, whose cost a tolerance is of where a fit has less: what a fall is worth does not shrink with n
 TRUSTED = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: what two codes of one law make of it. On the first 69 days of `tools.attribution --seed 70000` they were
 # off by 0.5 to 2 % where noise and the trials' disagreement gave errors of 0.2 to 0.7 %.
@@ -292,14 +291,14 @@ def prior_pull(model: Model) -> np.ndarray:
 
 def fit(
     objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, refresh: bool = False,
-    tolerance: float = 1e-5, beat: float = np.inf,
+    tolerance: float = 1e-5, worth: float = 0.0, beat: float = np.inf,
 ) -> Fit:  # fmt: skip
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
     Derivatives for the robot's own parameters, nearly linear, are taken once, or come as `J`, the whitened columns (n, m) of the
     first m free parameters from a neighbouring fit; those for effects are taken anew at every step. `refresh` takes them all again
-    at the solution, for standard errors and screening. A fit ends where a step falls by less than `tolerance` of its cost, or of
-    that of `FULL` white readings. One that would not `beat` a cost though all further steps fell by as much
+    at the solution, for standard errors and screening. A fit ends where a step falls by less than `tolerance` of its cost, or by
+    less than `worth`. One that would not `beat` a cost though all further steps fell by as much
     as its last ends there. Raises SolveError where the model cannot be solved at its start.
     """
     steps = np.array([f.parameter.step for f in model.free])
@@ -337,7 +336,7 @@ def fit(
         fall, at, now = now - cost(better), better, cost(better)
         if fall > TRUSTED * -(2.0 * g @ d + d @ H @ d):
             damping = max(0.1 * damping, 1e-6)
-        if fall < tolerance * max(now, FULL) or now - left * fall > beat:
+        if fall < max(tolerance * now, worth) or now - left * fall > beat:
             break
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))

@@ -216,6 +216,11 @@ ROUGHLY = _row(
     "judgement",
 )  # fmt: skip
 
+UNIT = _row(
+    "UNIT", 1.0, "2 ln odds", "or the last step's fall in cost, where readings are few: a twelfth of what an effect must bring",
+    "judgement: as ROUGHLY, which is less of a cost below 5,000",
+)  # fmt: skip
+
 # ---- choose and gate ---------------------------------------------------------------------------------------------------------
 
 HALF = _row(
