@@ -198,6 +198,11 @@ def test_no_derivatives_are_taken_of_trials_that_cannot_separate_more(monkeypatc
     found = proposed(monkeypatch, best=(d, nothing), alike=(d, nothing), less=(0.9 * d, nothing), least=(0.1 * d, nothing))
     assert found is not None
     assert (found.words, taken) == ("best", ["best"])
+    taken.clear()
+    imitated = np.column_stack([9.0 * d, d])  # all of it: no trial to propose, and the same with a load that is not felt
+    found = proposed(monkeypatch, loud=(9.0 * d, imitated), loaded=(9.0 * d, imitated), best=(d, nothing))
+    assert found is not None
+    assert (found.words, taken) == ("best", ["loud", "best"])
 
 
 def apart(d: np.ndarray, J: np.ndarray) -> float:

@@ -116,7 +116,12 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
             return None
 
     found: Any = Parallel(n_jobs=jobs, prefer="threads", require="sharedmem")(delayed(told)(*trial) for trial in menu(bench))
-    apart: list[_Apart] = [trial for trial in found if trial is not None]
+    # What a robot does not feel (a load where nothing weighs, a pace without a law of time) makes no other trial: the first stands.
+    alike: dict[bytes, _Apart] = {}
+    for trial in found:
+        if trial is not None:
+            alike.setdefault(trial[3].z.tobytes() + trial[4].tobytes(), trial)
+    apart = list(alike.values())
     best: Experiment | None = None
     for words, inputs, objective, at, d in sorted(apart, key=lambda trial: -float(trial[-1] @ trial[-1])):
         if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it

@@ -10,7 +10,7 @@ import numpy as np
 from twin.calibrate import fit
 from twin.diagnose.left_out import LeftOut, left_out
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import COARSELY, HALVED, UNIT
+from twin.diagnose.thresholds import COARSELY, HALVED, LITTLE
 from twin.diagnose.weigh import Weighed
 from twin.errors import SolveError
 
@@ -53,7 +53,7 @@ def halves(study: Study, weighed: Weighed) -> LeftOut:
     for fitted, rest in (parts, parts[::-1]):
         J = found.J[rows[fitted[0]] : rows[fitted[-1] + 1], own]
         try:
-            half = fit(objective.of(fitted), found.model, near=found.evaluation, J=J, tolerance=COARSELY, worth=UNIT)
+            half = fit(objective.of(fitted), found.model, near=found.evaluation, J=J, tolerance=COARSELY, worth=LITTLE)
             predicted = objective.of(rest).evaluate(half.model, half.evaluation.traces)
         except SolveError:
             continue

@@ -216,9 +216,9 @@ ROUGHLY = _row(
     "judgement",
 )  # fmt: skip
 
-UNIT = _row(
-    "UNIT", 1.0, "2 ln odds", "or the last step's fall in cost, where readings are few: a twelfth of what an effect must bring",
-    "judgement: as ROUGHLY, which is less of a cost below 5,000",
+LITTLE = _row(
+    "LITTLE", 3.0, "2 ln odds", "or the last step's fall in cost, where readings are few: a quarter of what an effect must bring; "
+    "ROUGHLY is more from 15,000 readings on", "judgement: as ROUGHLY",
 )  # fmt: skip
 
 # ---- choose and gate ---------------------------------------------------------------------------------------------------------

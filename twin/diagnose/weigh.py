@@ -9,7 +9,7 @@ import numpy as np
 from twin.calibrate import Fit, Model, fit
 from twin.diagnose.evidence import Discrepancy
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import ROUGHLY, UNIT
+from twin.diagnose.thresholds import ROUGHLY, LITTLE
 from twin.diagnose.zeros import of_robot
 from twin.effects import Start, catalogue
 from twin.errors import SolveError
@@ -39,7 +39,7 @@ def extended(study: Study, member: Weighed, effect: str, start: Start, beat: flo
     """`member` with one effect more, fitted as far as it may `beat` a cost; None without equilibrium."""
     model = member.fit.model.with_effect(effect, dict(start.values), start.free, study.bench.n_tendon)
     try:
-        found = fit(study.objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY, worth=UNIT, beat=beat)
+        found = fit(study.objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY, worth=LITTLE, beat=beat)
         return weigh(study, found)
     except SolveError:
         return None
@@ -65,7 +65,7 @@ def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float
             values = {**law.values, **start}
             model = plain.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
             try:
-                fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit), tolerance=ROUGHLY, worth=UNIT))
+                fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit), tolerance=ROUGHLY, worth=LITTLE))
             except SolveError:
                 continue
             if fuller.score > max(found.score, plain.score + accept):
@@ -85,7 +85,7 @@ def refit_without(study: Study, base: Weighed, best: Weighed, effect: str) -> We
     as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
     for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
         try:
-            return weigh(study, fit(study.objective, start, J=J))
+            return weigh(study, fit(study.objective, start, J=J, worth=LITTLE))
         except SolveError:
             continue
     return base
