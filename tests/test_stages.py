@@ -25,7 +25,7 @@ from twin.diagnose.rigs import Rigs
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import DOUBTFUL, FEW, SHOWN
 from twin.diagnose.words import components, mixed, since, structure, undecided, unlike, worst_channel
-from twin.effects import Drive
+from twin.effects import Drive, named
 from twin.errors import DataError, SolveError
 from twin.evaluate import TYPICAL
 from twin.quantities import Parameter
@@ -134,7 +134,7 @@ def test_two_robots_and_what_does_not_hold_elsewhere_are_told_in_words(plan: Ben
 def fitted(value: float, effect: str | None = None, ended: bool = False, low: float = -10.0, std: float | None = 0.5) -> Any:
     parameter = Parameter("stiffness", 2.0, "N/m", low, 10.0, "by hand", std=std)
     model = SimpleNamespace(free=[SimpleNamespace(effect=effect, parameter=parameter)], value=lambda free: value)
-    model.twin = SimpleNamespace(values={"stiffness": value})
+    model.twin = SimpleNamespace(values={"stiffness": value}, effects=())
     return SimpleNamespace(model=model, at_bound=lambda: np.array([ended]))
 
 
@@ -159,6 +159,15 @@ def test_a_law_that_may_go_either_way_and_ended_at_an_end_is_doubted() -> None:
         fitted(10.0, effect="base_tilt"), fitted(10.0, ended=True), fitted(10.0, effect="base_tilt", ended=True, low=0.0),
     ):  # fmt: skip
         assert strained(other) == []
+
+
+def test_an_obstacle_softer_than_foam_is_doubted() -> None:
+    """A magnet of 1 sigma beside the robot was "explained" by a wall of 0.15 N/m (bench day 90005)."""
+    found, touched = fitted(2.0), named("contact")
+    found.model.twin.effects = (touched({"stiffness": 0.15}), named("tendon_friction")({"mu": 0.1}))
+    assert strained(found) == ["contact: an obstacle of 0.15 N/m is softer than foam: a force that depends on the pose?"]
+    found.model.twin.effects = (touched({"stiffness": 20.0}), touched())
+    assert strained(found) == []
 
 
 # ---- what stages hand on ----------------------------------------------------------------------------------------------------

@@ -22,8 +22,10 @@ def unlikely(found: Fit) -> list[str]:
 
 
 def strained(found: Fit) -> list[str]:
-    """Effects whose parameter, one that may go either way, ended at an end of its range, in words: another law is behind them."""
-    said = []
+    """Effects whose parameter, one that may go either way, ended at an end of its range, or whose values nothing of that name has,
+    in words: another law is behind them."""
+    reasons = ((e.id, e.implausible()) for e in found.model.twin.effects)
+    said = [f"{effect.replace('_', ' ')}: {why}" for effect, why in reasons if why]
     for free, ended in zip(found.model.free, found.at_bound(), strict=True):
         p, value = free.parameter, found.model.value(free)
         if ended and free.effect is not None and p.low == -p.high:

@@ -9,7 +9,7 @@ import numpy as np
 from twin.calibrate import Fit, Model, fit
 from twin.diagnose.evidence import Discrepancy
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import ROUGHLY, LITTLE
+from twin.diagnose.thresholds import LITTLE, ROUGHLY
 from twin.diagnose.zeros import of_robot
 from twin.effects import Start, catalogue
 from twin.errors import SolveError

@@ -16,6 +16,7 @@ AZIMUTHS = 8
 TOUCHED = (0.95, 0.8)  # quantiles of how far the robot reaches, at which a wall may stand
 NEAREST = 5e-3  # m: an obstacle nearer than that is always touched
 HEIGHTS = 3  # along the robot, at which a post may cross
+SOFTEST = 5.0  # N/m: 1 cm^2 of a foam of 10 kPa, 20 mm thick, has 50; what gives way ten times more easily is a field, not a thing
 POST = 50.0  # 1/m: a post of 20 mm radius, from which fits of its curvature start
 
 
@@ -107,6 +108,10 @@ class Contact(Effect):
             if distance > NEAREST:
                 there = float(np.median(height[reached[:, j] >= distance, j]))
                 yield {"distance": distance, "curvature": POST, "height": there}
+
+    def implausible(self) -> str:
+        soft = 0.0 < self["stiffness"] < SOFTEST
+        return f"an obstacle of {self['stiffness']:.2g} N/m is softer than foam: a force that depends on the pose?" if soft else ""
 
     def surround(self, loads: Loads) -> Loads:
         c, s = np.cos(self["azimuth"]), np.sin(self["azimuth"])

@@ -247,6 +247,10 @@ class Effect(ABC):
         table = {p.name: p for p in self.declared(self.n_tendon)}
         yield {n: table[n].value + (0.0 if n in self.shape else table[n].step) for n in self.richer}
 
+    def implausible(self) -> str:
+        """Why nothing of this name has these values, in words; empty where it may."""
+        return ""
+
     def __getitem__(self, name: str) -> float:
         return self.values[name]
 
