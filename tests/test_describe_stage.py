@@ -37,6 +37,7 @@ class World:
         monkeypatch.setattr(stage, "mixed", lambda bench, rigs: f" two {rigs}.")
         monkeypatch.setattr(stage, "unlike", lambda unseen, size: f" unlike {unseen} {size}.")
         monkeypatch.setattr(stage, "undecided", lambda effect, rival: f" {effect} or {rival}.")
+        monkeypatch.setattr(stage, "repeatability", lambda study, fit: ("repeats",))
         monkeypatch.setattr(stage, "leaps", lambda bench, trials, fit: [f"leaps of {trials}"])
         monkeypatch.setattr(stage, "components", lambda discrepancy: {"static": 1.0})
         monkeypatch.setattr(stage, "worst_channel", lambda bench, z: f"worst of {z.shape}")
@@ -95,7 +96,7 @@ def test_what_is_explained_leaves_noise_and_its_doubts(verdict: str, monkeypatch
     world.verdict, world.doubts = verdict, [SimpleNamespace(effect="a", rival="b")]
     found = world.said()
     assert found.words == "What is left looks like noise (smooth part 0.70 sigma). a or b."
-    assert found.notices == ("unlikely", "leaps of [3]", "far")
+    assert found.notices == ("unlikely", "repeats", "leaps of [3]", "far")
     assert (found.strongest, found.worst_channel) == ((("T1", 0.5), ("T2", 0.1)), "worst of (2, 2)")
     assert found.components == {"static": 1.0}
 
@@ -142,7 +143,7 @@ def test_two_rigs_and_laws_at_their_limit_are_said_in_words_and_as_notices(monke
     world.rigs, world.strained = "rigs", ("creep bent", "drift bent")  # type: ignore[assignment]
     found = world.said()
     assert found.words == "Structure. where. since. two rigs. The creep bent. The drift bent."
-    assert found.notices == ("unlikely", "creep bent", "drift bent", "leaps of [3]", "two rigs.", "far")
+    assert found.notices == ("unlikely", "creep bent", "drift bent", "repeats", "leaps of [3]", "two rigs.", "far")
 
 
 def test_a_smooth_error_on_trials_left_out_is_said_above_both_bars(monkeypatch: pytest.MonkeyPatch) -> None:

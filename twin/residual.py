@@ -20,6 +20,7 @@ from scipy.optimize import minimize
 from twin.bench import Bench, Inputs
 from twin.effects import Drive
 
+DECLARED = "as declared"
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
 SAME = (
     0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
@@ -35,6 +36,10 @@ class Noise:
     drive: np.ndarray
     rho: np.ndarray
     source: str
+
+    @property
+    def declared(self) -> bool:
+        return self.source == DECLARED
 
     def floor(self, bench: Bench, sensitivity: Sequence[np.ndarray]) -> dict[str, float]:
         """RMS error a perfect twin would still show, by group (m; Euclidean per marker).
@@ -137,13 +142,15 @@ def estimate_noise(
     else:
         d = [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual]
         G, source = [g[1:-1] for g in sensitivity], "second differences along each trial; assumed white in time"
-        notes.append("no repeated trials: the noise floor is read off second differences and assumed white in time")
         if np.isfinite(declared).all():
-            source = "as declared"
+            source = DECLARED
+            notes.append("no repeated trials: the noise is taken as declared, and as white in time")
+        else:
+            notes.append("no repeated trials: the noise floor is read off second differences and assumed white in time")
     groups = list(dict.fromkeys(o.group for o in bench.outputs))
     member = np.array([groups.index(o.group) for o in bench.outputs])
     D, G_all = np.concatenate(d), np.concatenate(G)
-    if source == "as declared":
+    if source == DECLARED:
         sigma = declared
         if drive is None:
             drive = _likeliest(D, G_all, member, len(groups), bench.reading, sigma=declared)[1]

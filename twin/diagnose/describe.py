@@ -15,6 +15,7 @@ from twin.diagnose.leaps import leaps
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.places import where
+from twin.diagnose.repeatability import repeatability
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import MUCH
@@ -53,7 +54,16 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     outweighed = any(w.score > final.score for w in found.all)
     chosen = (PREDICTED,) if found.predicted and outweighed and judged.verdict == "partly_explained" else ()
     doubts = (doubtful(judged.doubtful),) if judged.doubtful else ()
-    notices = (*unlikely(final.fit), *judged.signs.strained, *doubts, *late, *rebuilt, *chosen, *far)
+    notices = (
+        *unlikely(final.fit),
+        *judged.signs.strained,
+        *doubts,
+        *repeatability(study, final.fit),
+        *late,
+        *rebuilt,
+        *chosen,
+        *far,
+    )
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)
 
 

@@ -326,6 +326,18 @@ DOUBTFUL = _row(
     "derivation: 0.3 % of healthy ones are",
 )
 
+# ---- how trials repeat ----------------------------------------------------------------------------------------------------------
+
+OVERSTATED = _row(
+    "OVERSTATED", 3.0, "ratio", "of declared noise to what rows scatter by: a camera's is declared to a factor of two",
+    "python -m pytest tests/test_repeatability.py",
+)  # fmt: skip
+LASTING = _row(
+    "LASTING", 1.0, "of the noise", "by which repeats differ throughout; load cells that read elsewhere next time make 0.6 on a "
+    "bench day without effect (90000)", "judgement",
+)  # fmt: skip
+BREAK = _row("BREAK", 3600.0, "s", "between two trials, after which a robot was left alone or set up anew", "judgement")
+
 # ---- words -------------------------------------------------------------------------------------------------------------------
 
 ALIKE = _row("ALIKE", 1.5, "ratio", "of the largest marker error to the smallest that counts as none", "judgement")

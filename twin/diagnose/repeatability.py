@@ -1,0 +1,93 @@
+"""How far trials repeat, beside how far rows scatter: what of the noise lasts through a trial, and is not white.
+
+A hold that is 3 mm elsewhere the next day, read by a camera good for 0.05 mm, has two noises. What a bench declares may be either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from twin.calibrate import Fit
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import BREAK, LASTING, OVERSTATED, SURE
+from twin.evaluate import KIND, UNIT
+from twin.residual import repeats
+
+
+def repeatability(study: Study, found: Fit) -> tuple[str, ...]:
+    """Of each group of outputs, in words, where it matters.
+
+    Declared noise (where no trial repeats another) that is `OVERSTATED` times what rows scatter by, s = RMS (r_(i-1) - 2 r_i +
+    r_(i+1)) / sqrt(6) of the residuals r under the twin in force: it says how trials repeat. What r moves by within trials is named
+    beside it, for there s is what a right twin would leave.
+
+    Pairs of repeats whose means differ, by RMS d / sqrt(2), more than `LASTING` of the noise and than chance: between sessions,
+    `BREAK` apart, and within one.
+    """
+    groups = dict.fromkeys(o.group for o in study.bench.outputs)
+    told = _declared if study.objective.whitener.noise.declared else _repeated
+    return tuple(words for g in groups for words in told(study, found.evaluation.raw, g))
+
+
+def _declared(study: Study, raw: list[np.ndarray], group: str) -> Iterator[str]:
+    own = [o.group == group for o in study.bench.outputs]
+    noise = _rms(study.objective.whitener.noise.sigma[own])
+    rows = [r[:, own] for r in raw]
+    scatter = _rms(np.concatenate([(r[:-2] - 2.0 * r[1:-1] + r[2:]).ravel() for r in rows])) / np.sqrt(6.0)
+    if not noise > OVERSTATED * scatter:
+        return
+    unit, factor = UNIT[group]
+    moves = _rms(np.concatenate([(r - _means(r)).ravel() for r in rows]))
+    d, s, w = (f"{factor * x:.2g} {unit}" for x in (noise, scatter, moves))
+    yield (
+        f"{KIND[group]}: {d} are declared as noise, but rows scatter by {s} within a trial: that is how trials repeat, the same "
+        f"throughout one of them. Smaller errors are called noise, whatever makes them; within trials what is left moves by {w}"
+    )
+
+
+def _repeated(study: Study, raw: list[np.ndarray], group: str) -> Iterator[str]:
+    bench, place = study.bench, {k: i for i, k in enumerate(study.trials)}
+    own = [o.group == group for o in bench.outputs]
+    noise = study.objective.whitener.noise
+    pairs = [(a, b) for a, b in repeats(bench) if a in place and b in place]
+    lasting = {p: _means(raw[place[p[0]]][:, own]) - _means(raw[place[p[1]]][:, own]) for p in pairs}
+    size = {p: _rms(d) / np.sqrt(2.0) for p, d in lasting.items()}
+    sigma, rho = _rms(noise.sigma[own]), float(np.mean(noise.rho[own]))
+    chance = sigma * np.sqrt((1.0 + rho) / (1.0 - rho) / min((len(raw[place[a]]) for a, _ in pairs), default=1))
+    whole = _rms(np.array(list(size.values())))
+    if not whole > max(LASTING * sigma, SURE * chance):
+        return
+    unit, factor = UNIT[group]
+
+    def shown(x: float) -> str:
+        return f"{factor * x:.2g} {unit}"
+
+    far = {p: _session(study, p[0]) != _session(study, p[1]) for p in pairs}
+    parts = ""
+    if any(far.values()) and not all(far.values()):
+        within, between = (_rms(np.array([size[p] for p in pairs if far[p] == apart])) for apart in (False, True))
+        parts = f", {shown(within)} within a session and {shown(between)} between sessions"
+    yield (
+        f"{KIND[group]}: repeated trials are off from one another by {shown(whole)} throughout{parts}, where rows scatter by "
+        f"{shown(sigma)}: no law in force explains what changed from one to the other"
+    )
+
+
+def _session(study: Study, trial: int) -> int:
+    """How many breaks there were before a trial."""
+    inputs = sorted(study.bench.inputs, key=lambda i: float(i.clock[0]))
+    begun = study.bench.inputs[trial].clock[0]
+    return sum(int(b.clock[0] - a.clock[-1] > BREAK and b.clock[0] <= begun) for a, b in pairwise(inputs))
+
+
+def _means(r: np.ndarray) -> np.ndarray:
+    known = np.isfinite(r)
+    return np.where(known, r, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+
+
+def _rms(x: np.ndarray) -> float:
+    known = x[np.isfinite(x)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
