@@ -80,14 +80,21 @@ def test_repeats_that_differ_throughout_are_named_with_what_is_between_sessions(
     assert millimetres(words) == pytest.approx([said[0], 0.2], rel=0.1)
 
 
-@pytest.mark.parametrize(("rows", "share", "said"), [(ROWS, 0.8, False), (ROWS, 1.25, True), (4, 1.1, False)])
+@pytest.mark.parametrize(
+    ("rows", "rho", "share", "said"),
+    [(ROWS, 0.0, 0.8, False), (ROWS, 0.0, 1.25, True), (4, 0.0, 1.1, False), (10, 0.0, 1.1, True), (16, 0.0, 1.25, True),
+     (16, 0.6, 1.25, False)],
+)  # fmt: skip
 def test_repeats_that_differ_by_less_than_counts_or_by_chance_are_not(
-    rows: int, share: float, said: bool, monkeypatch: pytest.MonkeyPatch
+    rows: int, rho: float, share: float, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Means of four rows scatter by half of the noise, of which three times are asked."""
+    """Means of four rows scatter by half of the noise, of which three times are asked; so do those of 16 rows that each take 0.6 of
+    the one before: (1 + rho) / (1 - rho) = 4."""
     monkeypatch.setattr(stage, "repeats", lambda bench: [(0, 1)])
     offset = np.sqrt(2.0) * share * LASTING * SCATTER * np.array([0.0, 1.0])[:, None] * np.ones(OUTPUTS)
-    assert bool(repeatability(study(2, SCATTER, "1 pair", rows=rows), fitted(offset, rows=rows))) is said
+    whole = study(2, SCATTER, "1 pair", rows=rows)
+    whole.objective.whitener.noise.rho[:] = rho
+    assert bool(repeatability(whole, fitted(offset, rows=rows))) is said
 
 
 def test_a_repeat_that_is_sealed_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -82,6 +82,7 @@ GROUPS = {
     "patterns": _stage("patterns"),
     "places": _stage("places", "tests/test_describe.py", "-k", PLACES),
     "beyond": _stage("beyond"),
+    "repeatability": _stage("repeatability"),
     "experiment": _stage("experiment"),
     "weigh": _stage("weigh", "tests/test_weigh.py", "tests/test_choose.py"),
     "describe": _stage("describe", "tests/test_describe_stage.py"),
