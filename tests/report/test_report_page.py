@@ -98,6 +98,24 @@ def test_every_verdict_has_its_sentence_sections_source_and_figures(verdict):
     assert all(sum(map(points, f["data"])) > 0 for f in drawn)
 
 
+def test_the_trial_in_time_is_one_in_which_its_marker_was_seen():
+    """Markers may be put on anew: of the outermost one that any sealed trial shows, the trial that shows it."""
+    d = diagnosis(sealed_trials=(1, 4))
+    assert "circle_4" in shown(d)  # pulled further, so further apart
+    columns = {m: [j for j, o in enumerate(d.bench.outputs) if o.channel.name.startswith(m)] for m in ("disk_7", "disk_8")}
+    for gone, trial, marker in (([(4, "disk_8")], "circle_1", "disk_8"), ([(1, "disk_8"), (4, "disk_8")], "circle", "disk_7")):
+        measured = [y.copy() for y in d.bench.measured]
+        for k, m in gone:
+            measured[k][:, columns[m]] = np.nan
+        said = shown(replace(d, bench=replace(d.bench, measured=tuple(measured))))
+        assert trial in said
+        assert marker in said
+
+
+def shown(d) -> str:
+    return render(d).partition('<section id="tip">')[2].partition("</section>")[0]
+
+
 def test_it_loads_nothing():
     html = render(diagnosis())
     rest = html.replace(get_plotlyjs(), "")

@@ -19,7 +19,8 @@ ROW, LONG = 170, 16  # pixels; letters
 def section(story: Story) -> Section:
     d = story.diagnosis
     whole = markers(d.bench)
-    name, columns = whole[-1] if whole else _first_group(d)
+    seen = [m for m in whole if any(np.isfinite(d.bench.measured[k][:, m[1]]).any() for k in d.sealed_trials)]
+    name, columns = (seen or whole)[-1] if whole else _first_group(d)
     k = _telling(d, columns)
     content = {"trial": labels(d, (k,))[0], "name": name, "plot": _plot(d, k, columns), "distance": bool(whole)}
     return Section("tip", "One trial in time", "tip.html", content)
@@ -31,9 +32,15 @@ def _first_group(d: Diagnosis) -> tuple[str, list[int]]:
 
 
 def _telling(d: Diagnosis, columns: list[int]) -> int:
-    """The sealed trial in which the two predictions differ most."""
+    """The sealed trial in which the two predictions differ most where these columns were measured; markers may be put on anew."""
     first, second = (d.predictions[s.key] for s in before_and_after(d))
-    return max(d.sealed_trials, key=lambda k: float(np.nan_to_num(np.mean((first[k][:, columns] - second[k][:, columns]) ** 2))))
+
+    def apart(k: int) -> float:
+        seen = np.isfinite(d.bench.measured[k][:, columns])
+        moved = np.nan_to_num((first[k] - second[k])[:, columns])[seen]
+        return float(np.mean(moved**2)) if moved.size else -1.0
+
+    return max(d.sealed_trials, key=apart)
 
 
 def _plot(d: Diagnosis, k: int, columns: list[int]) -> Plot:
