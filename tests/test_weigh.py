@@ -11,7 +11,7 @@ import pytest
 from twin.calibrate import Model
 from twin.diagnose import weigh as stage
 from twin.diagnose.budget import Budget
-from twin.diagnose.thresholds import ROUGHLY
+from twin.diagnose.thresholds import LITTLE, ROUGHLY
 from twin.diagnose.weigh import Weighed, extended, fuller, refit_without, weigh
 from twin.effects import Start, catalogue, named
 from twin.errors import SolveError
@@ -83,7 +83,7 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     ((model, how),) = fits.asked
     assert model.twin.effects[-1]["mu"] == 0.1
     assert [f.label for f in model.free[len(member.fit.model.free) :]] == ["tendon_friction.mu"]
-    assert how == {"near": HERE, "J": member.fit.J, "tolerance": ROUGHLY, "beat": 7.0}
+    assert how == {"near": HERE, "J": member.fit.J, "tolerance": ROUGHLY, "worth": LITTLE, "beat": 7.0}
     Fits(monkeypatch, fails=1)
     assert extended(study(), member, "tendon_friction", Start({"mu": 0.1}, ("mu",))) is None
 
