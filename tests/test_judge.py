@@ -111,6 +111,12 @@ def test_an_explanation_less_likely_than_not_is_a_part_of_one(staged: dict[str, 
     assert judged(late, weighed(("actuator_lag",), 5.0), weighed(("tilt",), 1.0)).verdict == "explained"
 
 
+def test_what_was_too_small_to_claim_lends_no_other_set_its_evidence(staged: dict[str, Any]) -> None:
+    best, other = weighed(BOTH, 0.0, cost=100.0), weighed(("camera", "friction"), 5.0)
+    assert judged(best, other).ambiguous == (("camera", "friction"),)
+    assert judged(best, other, small=("camera",)).ambiguous == ()
+
+
 def test_claims_come_largest_first_and_what_was_not_claimed_follows(staged: dict[str, Any]) -> None:
     best, other = weighed(BOTH, 0.0, cost=100.0), weighed(DELAY, -60.0)
     found = judged(best, other, weighed(("delay", "lag"), -80.0))

@@ -165,7 +165,7 @@ def test_an_obstacle_softer_than_foam_is_doubted() -> None:
     """A magnet of 1 sigma beside the robot was "explained" by a wall of 0.15 N/m (bench day 90005)."""
     found, touched = fitted(2.0), named("contact")
     found.model.twin.effects = (touched({"stiffness": 0.15}), named("tendon_friction")({"mu": 0.1}))
-    assert strained(found) == ["contact: an obstacle of 0.15 N/m is softer than foam: a force that depends on the pose?"]
+    assert strained(found) == ["contact: an obstacle of 0.15 N/m is softer than foam, rather a force that depends on the pose"]
     found.model.twin.effects = (touched({"stiffness": 20.0}), touched())
     assert strained(found) == []
 

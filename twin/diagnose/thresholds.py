@@ -330,7 +330,7 @@ DOUBTFUL = _row(
 
 OVERSTATED = _row(
     "OVERSTATED", 3.0, "ratio", "of declared noise to what rows scatter by: a camera's is declared to a factor of two",
-    "python -m pytest tests/test_repeatability.py",
+    "judgement",
 )  # fmt: skip
 LASTING = _row(
     "LASTING", 1.0, "of the noise", "by which repeats differ throughout; load cells that read elsewhere next time make 0.6 on a "

@@ -111,7 +111,11 @@ class Contact(Effect):
 
     def implausible(self) -> str:
         soft = 0.0 < self["stiffness"] < SOFTEST
-        return f"an obstacle of {self['stiffness']:.2g} N/m is softer than foam: a force that depends on the pose?" if soft else ""
+        return (
+            f"an obstacle of {self['stiffness']:.2g} N/m is softer than foam, rather a force that depends on the pose"
+            if soft
+            else ""
+        )
 
     def surround(self, loads: Loads) -> Loads:
         c, s = np.cos(self["azimuth"]), np.sin(self["azimuth"])
