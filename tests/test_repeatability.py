@@ -25,7 +25,7 @@ def study(trials: int, sigma: float, source: str, gaps: dict[int, float] | None 
         inputs.append(SimpleNamespace(clock=start + np.arange(float(rows))))
         start += rows
     noise = Noise(np.full(OUTPUTS, sigma), np.zeros(3), np.zeros(OUTPUTS), source)
-    bench = SimpleNamespace(outputs=[SimpleNamespace(group="marker")] * OUTPUTS, inputs=inputs)
+    bench = SimpleNamespace(outputs=[SimpleNamespace(group="marker")] * OUTPUTS, inputs=inputs, reading=np.ones(3))
     return SimpleNamespace(
         bench=bench, trials=list(range(trials)), objective=SimpleNamespace(whitener=SimpleNamespace(noise=noise))
     )
@@ -39,6 +39,13 @@ def fitted(offsets: np.ndarray, rows: int = ROWS, slope: float = 0.0) -> Any:
     return SimpleNamespace(evaluation=SimpleNamespace(raw=raw))
 
 
+@pytest.fixture(autouse=True)
+def undriven(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inputs that move nothing; what is judged within trials has tests of its own."""
+    monkeypatch.setattr(stage, "sensitivity_at", lambda objective, e: [np.zeros((*r.shape, 3)) for r in e.raw])
+    monkeypatch.setattr(stage, "within", lambda study, found, rows, G, asked: SimpleNamespace(words=lambda: "judged"))
+
+
 def millimetres(words: str) -> list[float]:
     return [float(x) for x in re.findall(r"([\d.]+) mm", words)]
 
@@ -49,6 +56,7 @@ def test_noise_declared_far_above_what_rows_scatter_by_is_how_trials_repeat(fact
     notices = repeatability(study(5, sigma, DECLARED), fitted(np.zeros((5, OUTPUTS)), slope=3e-4))
     assert bool(notices) is said
     if said:
+        assert notices[0].endswith("mm, judged")
         declared, scatter, moves = millimetres(notices[0])
         assert declared == pytest.approx(1e3 * sigma, rel=0.05)  # two digits are written
         assert scatter == pytest.approx(0.2, rel=0.05)

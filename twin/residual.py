@@ -140,15 +140,14 @@ def estimate_noise(
         d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]], sensitivity[a]) for a, b in pairs]
         G, source = [sensitivity[a] for a, _ in pairs], f"{len(pairs)} pairs of repeated trials"
     else:
-        d = [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual]
-        G, source = [g[1:-1] for g in sensitivity], "second differences along each trial; assumed white in time"
+        d, G = _along_rows(residual, sensitivity)
+        source = "second differences along each trial; assumed white in time"
         if np.isfinite(declared).all():
             source = DECLARED
             notes.append("no repeated trials: the noise is taken as declared, and as white in time")
         else:
             notes.append("no repeated trials: the noise floor is read off second differences and assumed white in time")
-    groups = list(dict.fromkeys(o.group for o in bench.outputs))
-    member = np.array([groups.index(o.group) for o in bench.outputs])
+    groups, member = _members(bench)
     D, G_all = np.concatenate(d), np.concatenate(G)
     if source == DECLARED:
         sigma = declared
@@ -165,6 +164,25 @@ def estimate_noise(
         said = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
         notes.append(f"no noise declared for the inputs: estimated as {said} from the data")
     return noise, notes
+
+
+def row_noise(bench: Bench, residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], drive: np.ndarray) -> Noise:
+    """What rows scatter by within trials, beside the inputs' noise `drive` (n_tendon,): from second differences, whatever repeats
+    or a bench say."""
+    groups, member = _members(bench)
+    d, G = (np.concatenate(x) for x in _along_rows(residual, sensitivity))
+    sigma = _likeliest(d, G, member, len(groups), bench.reading, drive=drive)[0]
+    return Noise(sigma, drive, np.zeros(len(sigma)), "rows of a trial")
+
+
+def _along_rows(residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    return [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual], [g[1:-1] for g in sensitivity]
+
+
+def _members(bench: Bench) -> tuple[list[str], np.ndarray]:
+    """Groups of outputs in the order in which they come, and each output's (n_output,)."""
+    groups = list(dict.fromkeys(o.group for o in bench.outputs))
+    return groups, np.array([groups.index(o.group) for o in bench.outputs])
 
 
 def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray) -> np.ndarray:

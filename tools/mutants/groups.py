@@ -83,6 +83,7 @@ GROUPS = {
     "places": _stage("places", "tests/test_describe.py", "-k", PLACES),
     "beyond": _stage("beyond"),
     "repeatability": _stage("repeatability"),
+    "within": _stage("within", "tests/test_within.py", "-k", "not named_under"),
     "experiment": _stage("experiment"),
     "weigh": _stage("weigh", "tests/test_weigh.py", "tests/test_choose.py"),
     "describe": _stage("describe", "tests/test_describe_stage.py"),

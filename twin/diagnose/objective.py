@@ -37,10 +37,14 @@ def noise_under(objective: Objective, found: Evaluation) -> Noise:
 
     The first calibration knows no effect: what ages, or remembers, between two repeats of a trial is noise to it.
     """
+    return estimate_noise(objective.bench, objective.trials, found.raw, sensitivity_at(objective, found))[0]
+
+
+def sensitivity_at(objective: Objective, found: Evaluation) -> list[np.ndarray]:
+    """`sensitivity` of a model that was evaluated."""
     bench, trials, twin = objective.bench, objective.trials, found.model.twin
     predicted = [readings(bench, report(twin.effects, found.traces[k].true)) for k in trials]
-    G = sensitivity(bench, trials, twin, predicted, found.traces)
-    return estimate_noise(bench, trials, found.raw, G)[0]
+    return sensitivity(bench, trials, twin, predicted, found.traces)
 
 
 def sensitivity(

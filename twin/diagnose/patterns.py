@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,11 @@ class Pattern:
     start: Start
     amplitudes: tuple[str, ...]
     where: tuple[int, ...]
+
+    def allows(self, amplitudes: Mapping[str, float], n_tendon: int) -> bool:
+        """Whether amplitudes may have these signs: a one-sided one is not negative."""
+        table = {p.name: p for p in catalogue()[self.effect].declared(n_tendon)}
+        return not any(a < 0.0 and table[n].low >= table[n].value for n, a in amplitudes.items())
 
 
 @dataclass(frozen=True)

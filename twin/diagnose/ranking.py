@@ -10,7 +10,7 @@ from twin.calibrate import Fit, Objective, prior_weight
 from twin.diagnose.evidence import Discrepancy, Evidence
 from twin.diagnose.patterns import Dictionary
 from twin.diagnose.thresholds import STARTS, TOP
-from twin.effects import Start, catalogue
+from twin.effects import Start
 from twin.information import solve
 
 
@@ -81,10 +81,8 @@ def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective:
         A, u = A[np.ix_(keep, keep)], u[keep]
         # z falls by column * amplitude, columns being changes of the residual: amplitude = -A^-1 u
         amplitude = -solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), u)
-        table = {p.name: p for p in catalogue()[pattern.effect].declared(objective.bench.n_tendon)}
         used = [n for n, kept in zip(pattern.amplitudes, keep, strict=True) if kept]
-        one_sided = [table[n].low >= table[n].value for n in used]
-        if any(o and a < 0 for o, a in zip(one_sided, amplitude, strict=True)):
+        if not pattern.allows(dict(zip(used, amplitude, strict=True)), objective.bench.n_tendon):
             out.append(-np.inf)
             continue
         out.append(float(-u @ amplitude - len(used) * np.log(objective.n)))

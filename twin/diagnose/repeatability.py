@@ -5,47 +5,54 @@ A hold that is 3 mm elsewhere the next day, read by a camera good for 0.05 mm, h
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import numpy as np
 
 from twin.calibrate import Fit
+from twin.diagnose.objective import sensitivity_at
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BREAK, LASTING, OVERSTATED, SURE
+from twin.diagnose.within import within
 from twin.evaluate import KIND, UNIT
-from twin.residual import repeats
+from twin.residual import repeats, row_noise
 
 
 def repeatability(study: Study, found: Fit) -> tuple[str, ...]:
     """Of each group of outputs, in words, where it matters.
 
     Declared noise (where no trial repeats another) that is `OVERSTATED` times what rows scatter by, s = RMS (r_(i-1) - 2 r_i +
-    r_(i+1)) / sqrt(6) of the residuals r under the twin in force: it says how trials repeat. What r moves by within trials is named
-    beside it, for there s is what a right twin would leave.
+    r_(i+1)) / sqrt(6) of the residuals r under the twin in force, less what the inputs' noise makes: it says how trials repeat.
+    What r moves by within trials is named beside it, for there s is what a right twin would leave, and the effect that goes that
+    way (`within`).
 
     Pairs of repeats whose means differ, by RMS d / sqrt(2), more than `LASTING` of the noise and than chance: between sessions,
     `BREAK` apart, and within one.
     """
     groups = dict.fromkeys(o.group for o in study.bench.outputs)
-    told = _declared if study.objective.whitener.noise.declared else _repeated
-    return tuple(words for g in groups for words in told(study, found.evaluation.raw, g))
+    if study.objective.whitener.noise.declared:
+        return tuple(_declared(study, found, groups))
+    return tuple(words for g in groups for words in _repeated(study, found.evaluation.raw, g))
 
 
-def _declared(study: Study, raw: list[np.ndarray], group: str) -> Iterator[str]:
-    own = [o.group == group for o in study.bench.outputs]
-    noise = _rms(study.objective.whitener.noise.sigma[own])
-    rows = [r[:, own] for r in raw]
-    scatter = _rms(np.concatenate([(r[:-2] - 2.0 * r[1:-1] + r[2:]).ravel() for r in rows])) / np.sqrt(6.0)
-    if not noise > OVERSTATED * scatter:
-        return
-    unit, factor = UNIT[group]
-    moves = _rms(np.concatenate([(r - _means(r)).ravel() for r in rows]))
-    d, s, w = (f"{factor * x:.2g} {unit}" for x in (noise, scatter, moves))
-    yield (
-        f"{KIND[group]}: {d} are declared as noise, but rows scatter by {s} within a trial: that is how trials repeat, the same "
-        f"throughout one of them. Smaller errors are called noise, whatever makes them; within trials what is left moves by {w}"
-    )
+def _declared(study: Study, found: Fit, groups: Iterable[str]) -> Iterator[str]:
+    bench, raw, noise = study.bench, found.evaluation.raw, study.objective.whitener.noise
+    G = sensitivity_at(study.objective, found.evaluation)
+    rows, of = row_noise(bench, raw, G, noise.drive), [o.group for o in bench.outputs]
+    for group in groups:
+        own = np.array([g == group for g in of])
+        declared, scatter = _rms(noise.sigma[own]), _rms(rows.sigma[own])
+        if not declared > OVERSTATED * scatter:
+            continue
+        unit, factor = UNIT[group]
+        moves = _rms(np.concatenate([(r - _means(r))[:, own].ravel() for r in raw]))
+        d, s, w = (f"{factor * x:.2g} {unit}" for x in (declared, scatter, moves))
+        yield (
+            f"{KIND[group]}: {d} are declared as noise, but rows scatter by {s} within a trial: that is how trials repeat, the "
+            f"same throughout one of them. Smaller errors are called noise, whatever makes them; within trials what is left moves "
+            f"by {w}, {within(study, found, rows, G, own).words()}"
+        )
 
 
 def _repeated(study: Study, raw: list[np.ndarray], group: str) -> Iterator[str]:

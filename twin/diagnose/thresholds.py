@@ -336,6 +336,7 @@ LASTING = _row(
     "LASTING", 1.0, "of the noise", "by which repeats differ throughout; load cells that read elsewhere next time make 0.6 on a "
     "bench day without effect (90000)", "judgement",
 )  # fmt: skip
+RIVAL = _row("RIVAL", 0.8, "of the largest share", "within trials; laws that take as much are not told apart", "judgement")
 BREAK = _row("BREAK", 3600.0, "s", "between two trials, after which a robot was left alone or set up anew", "judgement")
 
 # ---- words -------------------------------------------------------------------------------------------------------------------
