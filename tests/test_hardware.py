@@ -167,12 +167,24 @@ def test_the_remainder_learns_what_is_smooth_and_leaves_noise_alone() -> None:
     rng = np.random.default_rng(1)
     pull = rng.uniform(0, 8, (40, 2))
     smooth = np.stack([np.sin(pull[:, 0] / 3), pull[:, 0] * pull[:, 1] / 40], axis=1)
-    learned = Remainder.fit(pull[:30], smooth[:30])
+    learned = Remainder.fit(pull[:30], smooth[:30], np.ones(2))
     left = smooth[30:] - learned.predict(pull[30:])
     # the smallest noise share, a tenth, shrinks what is learned by as much, and by more at the rim: a quarter is left
     assert np.sqrt((left**2).mean()) < 0.25 * smooth.std()
     noise = rng.normal(size=(40, 2))
-    guessed = Remainder.fit(pull[:30], noise[:30]).predict(pull[30:])
+    guessed = Remainder.fit(pull[:30], noise[:30], np.ones(2)).predict(pull[30:])
     assert np.sqrt((guessed**2).mean()) < 0.5  # sigma: nothing to learn, little is claimed
-    far = Remainder.fit(pull[:30], smooth[:30]).predict(np.array([[500.0, 500.0]]))
+    far = learned.predict(np.array([[500.0, 500.0]]))
     np.testing.assert_allclose(far, 0.0, atol=1e-12)  # far from all data the twin stands alone
+
+
+def test_a_channels_unit_does_not_decide_what_the_remainder_learns() -> None:
+    """The same two channels, the second in thousandths: the same numbers, and its own a thousandfold."""
+    rng = np.random.default_rng(2)
+    pull = rng.uniform(0, 8, (30, 2))
+    residual = np.stack([np.sin(pull[:, 0]), 0.3 * rng.normal(size=30)], axis=1)
+    noise, thousand = np.array([0.1, 0.3]), np.array([1.0, 1000.0])
+    one = Remainder.fit(pull, residual, noise)
+    other = Remainder.fit(pull, residual * thousand, noise * thousand)
+    assert (other.length, other.error) == pytest.approx((one.length, one.error))
+    np.testing.assert_allclose(other.predict(pull), one.predict(pull) * thousand, rtol=1e-9)

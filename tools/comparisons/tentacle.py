@@ -34,11 +34,12 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
     n, both = len(pulls), np.flatnonzero((pulls > 0).all(axis=1))
     alone = np.setdiff1d(np.arange(n), both)
     left, learned = np.empty((n, 12)), np.empty((n, 12))
+    noise = np.array([o.channel.noise for o in bench.outputs[:12]])  # the four markers', as put on first
     for k in range(n):
         others = np.delete(np.arange(n), k)
         twin = calibrated(bench, others, diagnosis.twin.effects)
         left[k] = residual(bench, twin, [k])[0]
-        learned[k] = left[k] - Remainder.fit(pulls[others], residual(bench, twin, others)).predict(pulls[[k]])[0]
+        learned[k] = left[k] - Remainder.fit(pulls[others], residual(bench, twin, others), noise).predict(pulls[[k]])[0]
     hooke, soft = (residual(bench, calibrated(bench, alone, (), values), both) for values in (HOOKE, {}))
     whole, with_remainder = mean_error(left), mean_error(learned)
     gain = 1.0 - mean_error(soft) / mean_error(hooke)

@@ -2,9 +2,10 @@
 
     r(u) ~ N(0, s^2 exp(-|u - u'|^2 / (2 l^2)) + s^2 g [u = u']),   u the pulls over their largest
 
-Length l and noise share g are chosen by leave-one-out over the observations, in closed form: with K the kernel matrix, the residual
-of observation i predicted from the others is [K^-1 r]_i / [K^-1]_ii (Rasmussen and Williams 2006, eq 5.10-5.12). The prior mean is
-zero: far from all data the twin stands alone.
+Length l and noise share g, common to all channels, are chosen by leave-one-out over the observations, in closed form: with K the
+kernel matrix, the residual of observation i predicted from the others is [K^-1 r]_i / [K^-1]_ii (Rasmussen and Williams 2006, eq
+5.10-5.12). Channels are in their noises there, so that neither their units nor the worst of them decides. The prior mean is zero:
+far from all data the twin stands alone.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ NOISE = (0.1, 0.3, 1.0, 3.0, 10.0)  # variance over that of the smooth part; our
 
 @dataclass(frozen=True)
 class Remainder:
-    """A fitted remainder. `pull` (k, n_tendon) in units of `span`, `weights` (k, n_output), `error` its leave-one-out RMS."""
+    """A fitted remainder. `pull` (k, n_tendon) in units of `span`, `weights` (k, n_output), `error` its leave-one-out RMS, in
+    noises."""
 
     pull: np.ndarray
     span: np.ndarray
@@ -28,14 +30,14 @@ class Remainder:
     error: float
 
     @staticmethod
-    def fit(pull: np.ndarray, residual: np.ndarray) -> Remainder:
-        """From residuals (k, n_output) at pulls (k, n_tendon), any units."""
+    def fit(pull: np.ndarray, residual: np.ndarray, noise: np.ndarray) -> Remainder:
+        """From residuals (k, n_output) at pulls (k, n_tendon), any units, and each channel's noise (n_output,) in its own."""
         span = np.maximum(np.abs(pull).max(axis=0), 1e-12)
         u, best = pull / span, None
         for length in LENGTHS:
-            for noise in NOISE:
-                inverse = np.linalg.inv(kernel(u, u, length) + noise * np.eye(len(u)))
-                left = inverse @ residual / np.diag(inverse)[:, None]
+            for share in NOISE:
+                inverse = np.linalg.inv(kernel(u, u, length) + share * np.eye(len(u)))
+                left = inverse @ (residual / noise) / np.diag(inverse)[:, None]
                 error = float(np.sqrt(np.mean(left**2)))
                 if best is None or error < best.error:
                     best = Remainder(u, span, inverse @ residual, length, error)
