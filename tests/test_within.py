@@ -72,15 +72,15 @@ def test_what_happens_within_trials_is_named_under_what_lasts_through_them(bench
 def test_what_lasts_through_a_trial_changes_nothing() -> None:
     """Other offsets, the same z: it is of what outputs move by."""
     rng = np.random.default_rng(0)
-    y = rng.normal(size=(20, 4))
-    y[3, 1] = y[7:, 2] = np.nan
-    G = rng.normal(size=(20, 4, 2))
-    rows = Noise(np.array([0.5, 1.0, 2.0, 1.0]), np.array([0.3, 0.2]), np.zeros(4), "rows of a trial")
+    y = rng.normal(size=(20, 5))
+    y[3, 1] = y[7:, 2] = y[:, 4] = np.nan
+    G = rng.normal(size=(20, 5, 2))
+    rows = Noise(np.array([0.5, 1.0, 2.0, 1.0, 1.0]), np.array([0.3, 0.2]), np.zeros(5), "rows of a trial")
     moving = Moving(rows, [y], [G], [np.zeros((20, 2))])
-    once, again = (moving.trial(0, y + offset) for offset in (np.zeros(4), np.array([5.0, -3.0, 2.0, 40.0])))
+    once, again = (moving.trial(0, y + offset) for offset in (np.zeros(5), np.array([5.0, -3.0, 2.0, 40.0, 1.0])))
     assert again == pytest.approx(once, abs=1e-12)
     assert np.all(once[~np.isfinite(y)] == 0.0)
-    assert moving.free == 19 + 18 + 6 + 19
+    assert moving.free == 19 + 18 + 6 + 19  # and nothing of what was never seen
 
 
 def test_squares_on_trials_left_out_are_those_of_fits_to_the_others() -> None:
@@ -101,13 +101,14 @@ def test_squares_on_trials_left_out_are_those_of_fits_to_the_others() -> None:
 
 
 def drawn(sign: float, n_trial: int = 6) -> Any:
-    """Trials in which one law's column explains z but for white noise, with this sign; a second law's is chance."""
+    """Trials in which one law's column explains z but for white noise, with this sign; a second law's is chance, and a third's a
+    mixture of the two, which takes a fifth."""
     rng = np.random.default_rng(4)
     parts = []
     for _ in range(n_trial):
         x = rng.normal(size=(400, 4))
         x[:, 3] += -sign * 0.5 * x[:, 1]
-        parts.append(x)
+        parts.append(np.insert(x, 3, x[:, 1] + 2.0 * x[:, 2], axis=1))
     return np.stack([x.T @ x for x in parts])
 
 
@@ -116,12 +117,15 @@ def test_a_law_that_may_go_one_way_only_does_not_go_the_other(sign: float, named
     patterns = (
         SimpleNamespace(effect="tendon_friction", amplitudes=("mu",), where=(0,), allows=lambda a, n: a["mu"] >= 0.0),
         SimpleNamespace(effect="base_tilt", amplitudes=("about_x",), where=(1,), allows=lambda a, n: True),
+        SimpleNamespace(effect="contact", amplitudes=("stiffness",), where=(2,), allows=lambda a, n: True),
     )
     found = _judged(drawn(sign), np.array([[1.0]]), SimpleNamespace(patterns=patterns), 3, 2400.0)  # type: ignore[arg-type]
     assert found.size == pytest.approx(np.hypot(1.0, 0.5), rel=0.05)  # 2400 numbers scatter by 1.4 %
     shares = dict(found.shares)
     assert ("tendon_friction" in shares) is named
     assert shares.get("base_tilt", 0.0) < 0.02
+    assert shares["contact"] == pytest.approx(0.2, abs=0.1)
+    assert [s for _, s in found.shares] == sorted(shares.values(), reverse=True)
     if named:
         assert shares["tendon_friction"] == pytest.approx(1.0, abs=0.15)  # (0.25 +- chance 2/sqrt(2400) * sqrt(2)) of 0.25
 
