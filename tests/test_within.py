@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,33 +9,21 @@ import numpy as np
 import pytest
 from conftest import Day
 
+from tools.within_trials import elsewhere
 from twin.bench import prepare
 from twin.calibrate import Fit, fit
 from twin.diagnose.diagnosis import Settings
 from twin.diagnose.evidence import Evidence
-from twin.diagnose.objective import objective_of, sensitivity_at
+from twin.diagnose.objective import objective_of
 from twin.diagnose.repeatability import repeatability
 from twin.diagnose.study import Study
-from twin.diagnose.within import Moving, Within, _judged, _unseen, within
+from twin.diagnose.within import Moving, Within, _judged, _unseen
 from twin.measurements import Recording
-from twin.residual import DECLARED, Noise, row_noise
+from twin.residual import DECLARED, Noise
 from twin.robots import load
 from twin.twin import Twin
 
-LASTING = 1.5e-3  # m, an output's offset in a trial; the bench's markers scatter by 0.25 mm
 STRENGTH = {"base_tilt": 4.0, "contact": 1.6, "magnet": 1.0}
-
-
-def elsewhere(recording: Recording, seed: int) -> Recording:
-    """Every output of every trial off by a number of its own, and declared to be as noisy."""
-    rng = np.random.default_rng(seed)
-    outputs = {c.name for c in recording.channels if c.role == "output"}
-    channels = tuple(replace(c, noise=LASTING) if c.name in outputs else c for c in recording.channels)
-    trials = tuple(
-        replace(t, values={k: v + LASTING * rng.normal() if k in outputs else v for k, v in t.values.items()})
-        for t in recording.trials
-    )
-    return replace(recording, channels=channels, trials=trials)
 
 
 def calibrated(recording: Recording) -> tuple[Study, Fit]:
@@ -45,13 +32,6 @@ def calibrated(recording: Recording) -> tuple[Study, Fit]:
     trials = list(range(len(bench.inputs)))
     start, objective, _ = objective_of(bench, Twin.of(robot), trials, Settings())
     return Study(objective, Evidence(bench, trials)), fit(objective, start, refresh=True)
-
-
-def judged(study: Study, found: Fit) -> Within:
-    objective = study.objective
-    G = sensitivity_at(objective, found.evaluation)
-    rows = row_noise(study.bench, found.evaluation.raw, G, objective.whitener.noise.drive)
-    return within(study, found, rows, G, np.ones(len(study.bench.outputs), bool))
 
 
 @pytest.mark.parametrize("effect", [None, "backbone_creep", "base_tilt", "contact", "magnet"])
