@@ -12,6 +12,7 @@ import pytest
 from twin.diagnose import repeatability as stage
 from twin.diagnose.repeatability import repeatability
 from twin.diagnose.thresholds import BREAK, LASTING, OVERSTATED
+from twin.errors import SolveError
 from twin.residual import DECLARED, Noise
 
 ROWS, OUTPUTS, SCATTER = 400, 6, 2e-4  # m
@@ -61,6 +62,25 @@ def test_noise_declared_far_above_what_rows_scatter_by_is_how_trials_repeat(fact
         assert declared == pytest.approx(1e3 * sigma, rel=0.05)  # two digits are written
         assert scatter == pytest.approx(0.2, rel=0.05)
         assert moves == pytest.approx(1e3 * np.hypot(SCATTER, 3e-4 / np.sqrt(3.0)), rel=0.05)  # a line's RMS beside the noise
+
+
+def test_where_a_neighbour_has_no_equilibrium_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The diagnosis is done by then, and stands."""
+
+    def unsolved(*given: Any) -> None:
+        raise SolveError("no static equilibrium")
+
+    whole, found = study(5, 1e-3, DECLARED), fitted(np.zeros((5, OUTPUTS)))
+    assert len(repeatability(whole, found)) == 1
+    monkeypatch.setattr(stage, "within", unsolved)
+    assert repeatability(whole, found) == ()
+
+
+def test_outputs_that_were_never_measured_say_nothing() -> None:
+    found = fitted(np.zeros((5, OUTPUTS)))
+    for r in found.evaluation.raw:
+        r[:] = np.nan
+    assert repeatability(study(5, 1e-3, DECLARED), found) == ()
 
 
 def test_a_row_that_is_missing_says_nothing() -> None:

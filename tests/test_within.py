@@ -36,7 +36,7 @@ def calibrated(recording: Recording) -> tuple[Study, Fit]:
 
 @pytest.mark.parametrize("effect", [None, "backbone_creep", "base_tilt", "contact", "magnet"])
 def test_what_happens_within_trials_is_named_under_what_lasts_through_them(bench: Day, effect: str | None) -> None:
-    """Half a day of each kind, seen through offsets of six times the noise: named, said to be unknown, or to be nothing."""
+    """A day of each kind, seen through offsets of six times the noise: named, said to be unknown, or to be nothing."""
     recording, _ = bench(effect, STRENGTH.get(effect or "", 3.0), seed=6, design="no_repeats")
     study, found = calibrated(elsewhere(recording, seed=1))
     assert study.objective.whitener.noise.source == DECLARED

@@ -168,10 +168,13 @@ def estimate_noise(
 
 def row_noise(bench: Bench, residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], drive: np.ndarray) -> Noise:
     """What rows scatter by within trials, beside the inputs' noise `drive` (n_tendon,): from second differences, whatever repeats
-    or a bench say."""
-    groups, member = _members(bench)
+    or a bench say. What was never measured has an infinite one, and tells nothing."""
     d, G = (np.concatenate(x) for x in _along_rows(residual, sensitivity))
-    sigma = _likeliest(d, G, member, len(groups), bench.reading, drive=drive)[0]
+    seen = np.isfinite(d).any(axis=0)
+    sigma = np.full(len(seen), np.inf)
+    if seen.any():
+        groups, member = np.unique(_members(bench)[1][seen], return_inverse=True)
+        sigma[seen] = _likeliest(d[:, seen], G[:, seen], member, len(groups), bench.reading, drive=drive)[0]
     return Noise(sigma, drive, np.zeros(len(sigma)), "rows of a trial")
 
 

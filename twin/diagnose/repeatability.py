@@ -15,6 +15,7 @@ from twin.diagnose.objective import sensitivity_at
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BREAK, LASTING, OVERSTATED, SURE
 from twin.diagnose.within import within
+from twin.errors import SolveError
 from twin.evaluate import KIND, UNIT
 from twin.residual import repeats, row_noise
 
@@ -32,7 +33,10 @@ def repeatability(study: Study, found: Fit) -> tuple[str, ...]:
     """
     groups = dict.fromkeys(o.group for o in study.bench.outputs)
     if study.objective.whitener.noise.declared:
-        return tuple(_declared(study, found, groups))
+        try:
+            return tuple(_declared(study, found, groups))
+        except SolveError:  # a neighbour of the model in force has no equilibrium: nothing is said
+            return ()
     return tuple(words for g in groups for words in _repeated(study, found.evaluation.raw, g))
 
 
@@ -43,7 +47,7 @@ def _declared(study: Study, found: Fit, groups: Iterable[str]) -> Iterator[str]:
     for group in groups:
         own = np.array([g == group for g in of])
         declared, scatter = _rms(noise.sigma[own]), _rms(rows.sigma[own])
-        if not declared > OVERSTATED * scatter:
+        if not declared > OVERSTATED * scatter > 0.0:
             continue
         unit, factor = UNIT[group]
         moves = _rms(np.concatenate([(r - _means(r))[:, own].ravel() for r in raw]))
