@@ -171,8 +171,8 @@ def row_noise(bench: Bench, residual: Sequence[np.ndarray], sensitivity: Sequenc
     or a bench say. What was never measured has an infinite one, and tells nothing."""
     d, G = (np.concatenate(x) for x in _along_rows(residual, sensitivity))
     seen = np.isfinite(d).any(axis=0)
-    sigma = np.full(len(seen), np.inf)
-    if seen.any():
+    sigma = np.full(d.shape[1], np.inf)
+    if np.any(seen):
         groups, member = np.unique(_members(bench)[1][seen], return_inverse=True)
         sigma[seen] = _likeliest(d[:, seen], G[:, seen], member, len(groups), bench.reading, drive=drive)[0]
     return Noise(sigma, drive, np.zeros(len(sigma)), "rows of a trial")
