@@ -348,6 +348,33 @@ def test_a_wall_stands_where_it_is_said() -> None:
     assert wall[4] == 100.0
 
 
+def test_a_wall_leans_about_its_line() -> None:
+    """Away from the robot further up, by the plane's points: its line at a height and the one a metre up its slope."""
+    e, beside = np.array([np.cos(0.5), np.sin(0.5), 0.0]), np.array([-np.sin(0.5), np.cos(0.5), 0.0])
+    there = 0.03 * e + [0.0, 0.0, 0.08]
+    for lean in (0.0, 0.4, -0.7):
+        wall = law("contact", azimuth=0.5, distance=0.03, stiffness=100.0, height=0.08, lean=lean).surround(Loads(np.zeros(3))).wall
+        slope = np.sin(lean) * e + [0.0, 0.0, np.cos(lean)]
+        for a, b in ((0.0, 0.0), (0.1, 0.0), (-0.2, 0.3)):
+            gap, normal, _, bend = _touched(wall, there + a * beside + b * slope)
+            assert gap == pytest.approx(0.0, abs=1e-15)
+            assert bend == 0.0
+        np.testing.assert_allclose(np.cross(slope, beside), normal, atol=1e-15)  # towards the robot
+        assert _touched(wall, there + 1e-3 * e)[0] == pytest.approx(-1e-3 * np.cos(lean))
+
+
+@pytest.mark.parametrize("slant", [0.6, -1.2, np.pi / 2])
+def test_a_post_may_be_slanted(slant: float) -> None:
+    """By the distance of points from the line through its nearest point, a radius behind the surface, turned about the way there."""
+    values = {"azimuth": 0.5, "distance": 0.03, "stiffness": 100.0, "curvature": 50.0, "height": 0.07, "slant": slant}
+    post = law("contact", **values).surround(Loads(np.zeros(3))).wall
+    e = np.array([np.cos(0.5), np.sin(0.5), 0.0])
+    along = Rotation.from_rotvec(slant * e).apply([-np.sin(0.5), np.cos(0.5), 0.0])
+    for x in 0.05 * e + [0.0, 0.0, 0.07] + np.random.default_rng(1).normal(0.0, 0.02, (20, 3)):
+        d = x - 0.05 * e - [0.0, 0.0, 0.07]
+        assert _touched(post, x)[0] == pytest.approx(np.linalg.norm(d - d @ along * along) - 0.02, abs=1e-15)
+
+
 def test_a_post_stands_where_it_is_said() -> None:
     """Round, of 20 mm, across the direction in which it stands: by the distance of a point from its axis, in any frame."""
     post = (
@@ -477,9 +504,17 @@ def test_springs_and_drives_are_sought_where_they_are() -> None:
         towards = np.array([np.cos(start.values["azimuth"]), np.sin(start.values["azimuth"])])
         beyond = ((reached @ towards).max(axis=1) > start.values["distance"]).mean()
         assert 0.0 < beyond < 0.5  # touched in some samples, not in most
-        assert not {"curvature", "height"} & set(start.free)
+        assert not {"curvature", "height", "slant", "lean"} & set(start.free)
         wall = law("contact", **start.values)
-        for post in wall.fuller_starts([still]):
+        fuller = list(wall.fuller_starts([still]))
+        posts = [s.values for s in fuller if "curvature" in s.free]
+        leaning = [s for s in fuller if "lean" in s.free]
+        assert sorted(s.values["lean"] for s in leaning) == [-0.3, 0.3]
+        furthest = (reached @ towards).argmax(axis=1)
+        heights = still.markers[np.arange(len(furthest)), furthest, 2]
+        assert all(heights.min() <= s.values["height"] <= heights.max() for s in leaning)
+        assert [post["slant"] for post in posts if "slant" in post] == [pytest.approx(np.pi / 2)]  # a pole in the wall's place
+        for post in (post for post in posts if "slant" not in post):
             assert {"distance", "curvature", "height"} == set(post)
             nearest = np.abs(still.markers[..., 2] - post["height"]).min(axis=0).argmin()
             touched = (reached[:, nearest] @ towards > post["distance"]).mean()

@@ -109,7 +109,7 @@ def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.Monke
 
 def test_a_fuller_law_is_fitted_from_each_start_and_the_best_fit_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     member, fits = weighed(calibrated(CREEP), score=10.0), Fits(monkeypatch, 30.0)
-    starts = [{"amplitude_2": x, "time_2": 40.0} for x in (0.01, 0.02, 0.03)]
+    starts = [Start({"amplitude_2": x, "time_2": 40.0}, ("amplitude_2", "time_2")) for x in (0.01, 0.02, 0.03)]
     monkeypatch.setattr(catalogue()[CREEP], "fuller_starts", lambda law, predicted: iter(starts))
     scores = iter((30.0, 50.0, 40.0))
     monkeypatch.setattr(stage, "weigh", lambda study, model: weighed(model, next(scores)))

@@ -54,7 +54,7 @@ def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float
     for effect in effects:
         richer = catalogue()[effect].richer
         free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
-        if not richer or set(richer) <= set(free) or not catalogue()[effect].richer_needs <= parts:
+        if not richer or set(richer) & set(free) or not catalogue()[effect].richer_needs <= parts:
             continue
         if not study.budget.allows(f"the fuller law of {effect}"):
             continue
@@ -62,8 +62,8 @@ def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float
         plain = found
         law = next(e for e in plain.fit.model.twin.effects if e.id == effect)
         for start in law.fuller_starts([t.true for t in plain.fit.evaluation.traces.values()]):
-            values = {**law.values, **start}
-            model = plain.fit.model.without_effect(effect).with_effect(effect, values, (*free, *richer), n_tendon)
+            values = {**law.values, **start.values}
+            model = plain.fit.model.without_effect(effect).with_effect(effect, values, (*free, *start.free), n_tendon)
             try:
                 fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit), tolerance=ROUGHLY, worth=LITTLE))
             except SolveError:

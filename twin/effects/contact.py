@@ -1,4 +1,4 @@
-"""Contact: the body touches an undeclared obstacle, a flat wall or a round post."""
+"""Contact: the body touches an undeclared obstacle, a flat wall that may lean or a round post at any slant."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ NEAREST = 5e-3  # m: an obstacle nearer than that is always touched
 HEIGHTS = 3  # along the robot, at which a post may cross
 SOFTEST = 5.0  # N/m: 1 cm^2 of a foam of 10 kPa, 20 mm thick, has 50; what gives way ten times more easily is a field, not a thing
 POST = 50.0  # 1/m: a post of 20 mm radius, from which fits of its curvature start
+POLE = 0.5 * np.pi  # rad: the slant of a post that stands beside the robot
+LEANS = (-0.3, 0.3)  # rad, from which fits of a leaning wall start
 
 
 @inner
@@ -64,15 +66,17 @@ def seen_from(wall: np.ndarray, turn: np.ndarray, place: np.ndarray) -> np.ndarr
 
 
 class Contact(Effect):
-    """A flat wall, parallel to the straight robot, at `distance` from it in direction `azimuth`; or, where `curvature` is not zero,
-    a round post of radius 1 / curvature that crosses at a right angle, nearest to the robot at `height`. A disk whose centre is p
-    beyond the surface is pushed back with F = stiffness * max(0, p), along the surface's normal and without friction.
+    """A flat wall at `distance` from the straight robot in direction `azimuth`, parallel to it, or leaning away from it by `lean`
+    about its line at `height`; or, where `curvature` is not zero, a round post of radius 1 / curvature that is nearest to the
+    straight robot's axis at `height`, and crosses it at a right angle, turned from there by `slant`. A disk whose centre is p beyond
+    the surface is pushed back with F = stiffness * max(0, p), along the surface's normal and without friction.
 
-    Source: linear penalty contact. An edge of the frame, a hand, the table, a bar.
+    Every plane but one across the robot's axis is such a wall, every round post such a post: the shortest way from an axis to a
+    line is square to both. Source: linear penalty contact. An edge of the frame, a hand, the table, a bar.
 
     >>> wall = Contact(azimuth=0.0, distance=0.05, stiffness=200.0).surround(Loads(np.zeros(3))).wall
     >>> [float(v) for v in wall[:5]]
-    [-1.0, -0.0, 0.0, -0.05, 200.0]
+    [-1.0, 0.0, 0.0, -0.05, 200.0]
     """
 
     id = "contact"
@@ -81,10 +85,12 @@ class Contact(Effect):
         Parameter("azimuth", 0.0, "rad", -10.0, 10.0, "direction of the obstacle from the robot", scale=0.1),
         Parameter("distance", 0.05, "m", 2e-3, 0.2, "from the straight robot's axis", scale=1e-3),
         Parameter("curvature", 0.0, "1/m", 0.0, 1e3, "of a post across the robot; 0: a flat wall", scale=POST),
-        Parameter("height", 0.05, "m", -1.0, 1.0, "of a post above the base", scale=1e-3),
+        Parameter("height", 0.05, "m", -1.0, 1.0, "above the base, of a post, or where a leaning wall has its distance", scale=1e-3),
+        Parameter("slant", 0.0, "rad", -10.0, 10.0, "of a post; 0: across the robot, pi/2: along it", scale=0.1),
+        Parameter("lean", 0.0, "rad", -1.4, 1.4, "of a flat wall, away from the robot further up", scale=0.1),
     )
-    shape = ("azimuth", "distance", "curvature", "height")
-    richer = ("curvature", "height")
+    shape = ("azimuth", "distance", "curvature", "height", "slant", "lean")
+    richer = ("curvature", "height", "slant", "lean")
     needs = frozenset({"surface"})
     moves_with = "position: only where the robot reaches beyond a line"
 
@@ -99,15 +105,21 @@ class Contact(Effect):
                 if distance > NEAREST:
                     yield Start({"stiffness": 10.0, "azimuth": azimuth, "distance": distance}, names)
 
-    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Values]:
-        """Posts that cross at the height of one of `HEIGHTS` markers, and are touched there as often as the wall is anywhere."""
+    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
+        """Posts that cross at the height of one of `HEIGHTS` markers, and are touched there as often as the wall is anywhere; a pole
+        in the wall's place; and walls that lean there."""
         reached, height = _reach(predicted, self["azimuth"]), np.concatenate([s.markers[..., 2] for s in predicted])
-        free = float(np.mean(reached.max(axis=1) <= self["distance"]))
+        beyond = reached.max(axis=1) > self["distance"]
         for j in np.unique(np.linspace(0, reached.shape[1] - 1, 2 * HEIGHTS + 1).round().astype(int)[1::2]):
-            distance = float(np.quantile(reached[:, j], free))
+            distance = float(np.quantile(reached[:, j], 1.0 - np.mean(beyond)))
             if distance > NEAREST:
                 there = float(np.median(height[reached[:, j] >= distance, j]))
-                yield {"distance": distance, "curvature": POST, "height": there}
+                yield Start({"distance": distance, "curvature": POST, "height": there}, ("curvature", "height", "slant"))
+        yield Start({"curvature": POST, "slant": POLE}, ("curvature", "height", "slant"))
+        furthest = height[np.arange(len(height)), reached.argmax(axis=1)]
+        there = float(np.median(furthest[beyond])) if beyond.any() else self["height"]
+        for lean in LEANS:
+            yield Start({"height": there, "lean": lean}, ("lean",))
 
     def implausible(self) -> str:
         soft = 0.0 < self["stiffness"] < SOFTEST
@@ -118,9 +130,16 @@ class Contact(Effect):
         )
 
     def surround(self, loads: Loads) -> Loads:
+        if self["stiffness"] <= 0.0:
+            return loads
         c, s = np.cos(self["azimuth"]), np.sin(self["azimuth"])
-        wall = obstacle((-c, -s, 0.0), -self["distance"], self["stiffness"], place=self["height"], curvature=self["curvature"])
-        return replace(loads, wall=wall) if self["stiffness"] > 0.0 else loads
+        out, beside, up = np.array([c, s, 0.0]), np.array([-s, c, 0.0]), np.array([0.0, 0.0, 1.0])
+        normal = np.sin(self["lean"]) * up - np.cos(self["lean"]) * out
+        rising = np.cos(self["lean"]) * up + np.sin(self["lean"]) * out
+        across = np.cos(self["slant"]) * rising - np.sin(self["slant"]) * beside
+        nearest = self["distance"] * out + self["height"] * up
+        wall = obstacle(normal, normal @ nearest, self["stiffness"], across, across @ nearest, self["curvature"])
+        return replace(loads, wall=wall)
 
 
 def _reach(predicted: list[Signals], azimuth: float) -> np.ndarray:

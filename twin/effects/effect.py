@@ -242,10 +242,11 @@ class Effect(ABC):
             for values in (*single, {k: v for s in single for k, v in s.items()}):
                 yield Start(values, tuple(values))
 
-    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Values]:
-        """Values of the fuller law from which a fit of it may begin, where this is the plain one; `predicted` is with it."""
+    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
+        """Where fits of a fuller law may begin, where this is the plain one: its values besides, and what it frees of `richer`;
+        `predicted` is with the plain one."""
         table = {p.name: p for p in self.declared(self.n_tendon)}
-        yield {n: table[n].value + (0.0 if n in self.shape else table[n].step) for n in self.richer}
+        yield Start({n: table[n].value + (0.0 if n in self.shape else table[n].step) for n in self.richer}, self.richer)
 
     def implausible(self) -> str:
         """Why nothing of this name has these values, in words; empty where it may."""
