@@ -18,7 +18,7 @@ NEAREST = 5e-3  # m: an obstacle nearer than that is always touched
 HEIGHTS = 3  # along the robot, at which a post may cross
 SOFTEST = 5.0  # N/m: 1 cm^2 of a foam of 10 kPa, 20 mm thick, has 50; what gives way ten times more easily is a field, not a thing
 POST = 50.0  # 1/m: a post of 20 mm radius, from which fits of its curvature start
-POLE = 0.5 * np.pi  # rad: the slant of a post that stands beside the robot
+SLANTS = (-0.8, 0.0, 0.8, 0.5 * np.pi)  # rad, of posts from which fits start: across the robot, slanted, a pole beside it
 LEANS = (-0.3, 0.3)  # rad, from which fits of a leaning wall start
 
 
@@ -106,16 +106,18 @@ class Contact(Effect):
                     yield Start({"stiffness": 10.0, "azimuth": azimuth, "distance": distance}, names)
 
     def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
-        """Posts that cross at the height of one of `HEIGHTS` markers, and are touched there as often as the wall is anywhere; a pole
-        in the wall's place; and walls that lean there."""
+        """Posts at the height of one of `HEIGHTS` markers, and touched there as often as the wall is anywhere, the middle one at every
+        slant; and walls that lean in its place."""
         reached, height = _reach(predicted, self["azimuth"]), np.concatenate([s.markers[..., 2] for s in predicted])
         beyond = reached.max(axis=1) > self["distance"]
-        for j in np.unique(np.linspace(0, reached.shape[1] - 1, 2 * HEIGHTS + 1).round().astype(int)[1::2]):
+        at = np.unique(np.linspace(0, reached.shape[1] - 1, 2 * HEIGHTS + 1).round().astype(int)[1::2])
+        for j in at:
             distance = float(np.quantile(reached[:, j], 1.0 - np.mean(beyond)))
             if distance > NEAREST:
                 there = float(np.median(height[reached[:, j] >= distance, j]))
-                yield Start({"distance": distance, "curvature": POST, "height": there}, ("curvature", "height", "slant"))
-        yield Start({"curvature": POST, "slant": POLE}, ("curvature", "height", "slant"))
+                for slant in SLANTS if j == at[len(at) // 2] else (0.0,):
+                    post = {"distance": distance, "curvature": POST, "height": there, "slant": slant}
+                    yield Start(post, ("curvature", "height", "slant"))
         furthest = height[np.arange(len(height)), reached.argmax(axis=1)]
         there = float(np.median(furthest[beyond])) if beyond.any() else self["height"]
         for lean in LEANS:
