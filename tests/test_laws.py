@@ -365,7 +365,7 @@ def test_a_wall_leans_about_its_line() -> None:
 
 @pytest.mark.parametrize("slant", [0.6, -1.2, np.pi / 2])
 def test_a_post_may_be_slanted(slant: float) -> None:
-    """By the distance of points from the line through its nearest point, a radius behind the surface, turned about the way there."""
+    """By points' distance from the line through its nearest point, a radius behind the surface, turned about the way there."""
     values = {"azimuth": 0.5, "distance": 0.03, "stiffness": 100.0, "curvature": 50.0, "height": 0.07, "slant": slant}
     post = law("contact", **values).surround(Loads(np.zeros(3))).wall
     e = np.array([np.cos(0.5), np.sin(0.5), 0.0])

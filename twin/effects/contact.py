@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from twin.compiled import dot, inner
 from twin.effects.effect import Effect, Loads, Signals, Start
-from twin.quantities import Parameter, Values
+from twin.quantities import Parameter
 
 AZIMUTHS = 8
 TOUCHED = (0.95, 0.8)  # quantiles of how far the robot reaches, at which a wall may stand
@@ -68,8 +68,8 @@ def seen_from(wall: np.ndarray, turn: np.ndarray, place: np.ndarray) -> np.ndarr
 class Contact(Effect):
     """A flat wall at `distance` from the straight robot in direction `azimuth`, parallel to it, or leaning away from it by `lean`
     about its line at `height`; or, where `curvature` is not zero, a round post of radius 1 / curvature that is nearest to the
-    straight robot's axis at `height`, and crosses it at a right angle, turned from there by `slant`. A disk whose centre is p beyond
-    the surface is pushed back with F = stiffness * max(0, p), along the surface's normal and without friction.
+    straight robot's axis at `height`, and crosses it at a right angle, turned from there by `slant`. A disk whose centre is p
+    beyond the surface is pushed back with F = stiffness * max(0, p), along the surface's normal and without friction.
 
     Every plane but one across the robot's axis is such a wall, every round post such a post: the shortest way from an axis to a
     line is square to both. Source: linear penalty contact. An edge of the frame, a hand, the table, a bar.
@@ -85,7 +85,7 @@ class Contact(Effect):
         Parameter("azimuth", 0.0, "rad", -10.0, 10.0, "direction of the obstacle from the robot", scale=0.1),
         Parameter("distance", 0.05, "m", 2e-3, 0.2, "from the straight robot's axis", scale=1e-3),
         Parameter("curvature", 0.0, "1/m", 0.0, 1e3, "of a post across the robot; 0: a flat wall", scale=POST),
-        Parameter("height", 0.05, "m", -1.0, 1.0, "above the base, of a post, or where a leaning wall has its distance", scale=1e-3),
+        Parameter("height", 0.05, "m", -1.0, 1.0, "of a post above the base; of a wall that leans, of its line", scale=1e-3),
         Parameter("slant", 0.0, "rad", -10.0, 10.0, "of a post; 0: across the robot, pi/2: along it", scale=0.1),
         Parameter("lean", 0.0, "rad", -1.4, 1.4, "of a flat wall, away from the robot further up", scale=0.1),
     )
@@ -106,8 +106,8 @@ class Contact(Effect):
                     yield Start({"stiffness": 10.0, "azimuth": azimuth, "distance": distance}, names)
 
     def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
-        """Posts at the height of one of `HEIGHTS` markers, and touched there as often as the wall is anywhere, the middle one at every
-        slant; and walls that lean in its place."""
+        """Posts at the height of one of `HEIGHTS` markers, and touched there as often as the wall is anywhere, the middle one at
+        every slant; and walls that lean in its place."""
         reached, height = _reach(predicted, self["azimuth"]), np.concatenate([s.markers[..., 2] for s in predicted])
         beyond = reached.max(axis=1) > self["distance"]
         at = np.unique(np.linspace(0, reached.shape[1] - 1, 2 * HEIGHTS + 1).round().astype(int)[1::2])
