@@ -36,6 +36,7 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
     stage("lateness", "told")
     stage("gate", "gated")
     stage("judge", "judged")
+    stage("with_systematic", "as unsure as it is")
     settings = Settings(seed=7)
     made = conclude("bench", "twin", [2], "nominal", settings, "progress")  # type: ignore[arg-type]
     assert got == {
@@ -46,8 +47,9 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         "lateness": (study, "chosen"),
         "gate": (study, "told", screening),
         "judge": (study, "told", "gated", "bars"),
+        "with_systematic": (study, "judged", "patterns"),
     }
-    assert (made.study, made.found, made.gated, made.judged) == (study, "told", "gated", "judged")
+    assert (made.study, made.found, made.gated, made.judged) == (study, "told", "gated", "as unsure as it is")
     assert made.notices[0] == "a note"
     assert "not tried: friction" in made.notices[1]
 

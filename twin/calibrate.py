@@ -198,11 +198,13 @@ def _same_simulation(a: Twin, b: Twin) -> bool:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model. `J` (n, n_free) whitened derivatives at the solution, x in steps; `cost` = |z|^2 + prior terms."""
+    """A fitted model. `J` (n, n_free) whitened derivatives at the solution, x in steps; `cost` = |z|^2 + prior terms; `systematic`
+    (n_free,) SI what effects that the model lacks may have put into its parameters, where that was asked."""
 
     evaluation: Evaluation
     J: np.ndarray
     cost: float
+    systematic: np.ndarray | None = None
 
     @property
     def model(self) -> Model:
@@ -250,9 +252,10 @@ class Fit:
         """Values and standard errors of the robot's (None) or an effect's free parameters; no error where nothing tells. Amplitudes
         of effects are no better known than the form of a law, `LAW`, which no data of one robot tell."""
         blind = untold(self.information())
+        spread = self.std() if self.systematic is None else np.hypot(self.std(), self.systematic)
         return {
             f.parameter.name: Fitted(self.model.value(f), None if b else float(np.hypot(s, self._form(f))), f.parameter.unit)
-            for f, s, b in zip(self.model.free, self.std(), blind, strict=True)
+            for f, s, b in zip(self.model.free, spread, blind, strict=True)
             if f.effect == effect
         }
 

@@ -1,7 +1,7 @@
 """The main job: from a recording to what the twin lacks, how sure that is, and the error before and after on sealed trials.
 
-look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> describe, all on the fitted trials; then the seal is
-opened.
+look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> systematic -> describe, all on the fitted trials;
+then the seal is opened.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from twin.diagnose.search import search
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind, split
 from twin.diagnose.study import Progress, silent
+from twin.diagnose.systematic import with_systematic
 from twin.diagnose.thresholds import FEW, FIRST
 from twin.diagnose.zeros import jumps_of, lasting
 from twin.diagnose.zeros import words as jumped
@@ -102,7 +103,8 @@ def conclude(
     found = choose(study, search(study, base, screening.patterns, screening.bars), screening.bars)
     found = lateness(study, found)
     gated = gate(study, found, screening)
-    return Conclusion(study, screening, found, gated, judge(study, found, gated, screening.bars), (*notes, *study.budget.words()))
+    judged = with_systematic(study, judge(study, found, gated, screening.bars), screening.patterns)
+    return Conclusion(study, screening, found, gated, judged, (*notes, *study.budget.words()))
 
 
 def _reported(
