@@ -25,9 +25,11 @@ class World:
         self.sigmas = sigmas
         self.sensed: set[str] = set()
         self.history = 0.0  # what of an effect depends on more than the pose, sigma
+        self.plainly: dict[str, float] = {}  # by how many sigmas an effect moves the outputs as they are; negative: away from them
+        self.plain_history = 0.0  # what of that depends on more than the pose
         self.study: Any = SimpleNamespace(
             objective=SimpleNamespace(n=N), progress=lambda words: None, fall=lambda a, b: a.z**2 - b.z**2,
-            evidence=SimpleNamespace(beyond_pose=self.beyond_pose),
+            evidence=SimpleNamespace(beyond_pose=self.beyond_pose), plain=lambda fit: fit.plain,
         )  # fmt: skip
         self.harmful: set[str] = set()
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
@@ -36,6 +38,8 @@ class World:
         monkeypatch.setattr(stage, "extended", lambda study, rest, rival, start: self.of(*rest.effects, rival))
 
     def beyond_pose(self, z: np.ndarray) -> float:
+        if z.size == 1:
+            return self.plain_history
         self.asked = z
         return self.history
 
@@ -43,7 +47,8 @@ class World:
         missing = {e: a**2 for e, a in self.sigmas.items() if e not in effects}
         square = N * (1.0 + sum(missing.values()))
         felt = N * sum(a for e, a in missing.items() if e in self.sensed)
-        fit = SimpleNamespace(z=np.sqrt([square - felt, felt]), effects=tuple(sorted(effects)), fitted=lambda e: {})
+        plain = np.sqrt([N * (100.0 + sum(a * abs(a) for e, a in self.plainly.items() if e not in effects))])
+        fit = SimpleNamespace(z=np.sqrt([square - felt, felt]), effects=tuple(sorted(effects)), fitted=lambda e: {}, plain=plain)
         size = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
         return SimpleNamespace(effects=tuple(sorted(effects)), fit=fit, score=-square, discrepancy=SimpleNamespace(size=size))
 
@@ -87,6 +92,20 @@ def test_what_depends_on_how_a_pose_was_reached_is_no_inaccuracy_of_the_descript
     world.history = history
     assert world.gated("friction", accuracy=0.6).best.effects == (("friction",) if kept else ())
     np.testing.assert_array_equal(world.asked, world.of().fit.z - world.of("friction").fit.z)  # of what the effect changed
+
+
+@pytest.mark.parametrize(
+    ("plainly", "history", "kept"), [(0.14, 0.14, True), (0.12, 0.14, False), (0.14, 0.12, False), (-1.0, 1.0, False)]
+)
+def test_an_error_that_inputs_may_make_in_a_row_counts_where_outputs_show_it_in_all(
+    monkeypatch: pytest.MonkeyPatch, plainly: float, history: float, kept: bool
+) -> None:
+    """A delay beside noisy inputs: small in white residuals, and all that is wrong with the outputs."""
+    world = World(monkeypatch, delay=0.1)
+    world.plainly, world.plain_history, world.rest = {"delay": plainly}, history, {("delay",): (0.0, 0.0), (): (0.1, 0.1)}
+    assert world.gated("delay").best.effects == (("delay",) if kept else ())
+    world.plainly, world.plain_history = {"delay": 0.5}, 0.5
+    assert world.gated("delay", accuracy=0.6).best.effects == ()  # the description may be as far off
 
 
 @pytest.mark.parametrize(("sensed", "kept"), [({"large"}, True), (set(), False), ({"large", "small"}, False)])

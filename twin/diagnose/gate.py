@@ -80,10 +80,16 @@ def contribution(study: Study, best: Weighed, without: Weighed) -> float:
 
 
 def _immaterial(study: Study, bars: Thresholds, best: Weighed, without: Weighed) -> bool:
-    """Whether an effect moves too little, and too little of that depends on more than the pose."""
+    """Whether an effect moves too little, and too little of that depends on more than the pose; nor shows in the outputs as they
+    are. White residuals allow each row what its inputs' readings may err by. An error of that size which comes back at every
+    row, a delay's, is small there: but not in the outputs, and they can be told it."""
     if contribution(study, best, without) >= bars.visible:
         return False
-    return study.evidence.beyond_pose(without.fit.z - best.fit.z) < bars.material
+    if study.evidence.beyond_pose(without.fit.z - best.fit.z) >= bars.material:
+        return False
+    after, before = study.plain(best.fit), study.plain(without.fit)
+    shows = float(before @ before - after @ after) >= bars.visible**2 * study.objective.n
+    return not (shows and study.evidence.beyond_pose(before - after) >= bars.material)
 
 
 def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[str, Weighed], least: str) -> bool:

@@ -31,6 +31,10 @@ class Study:
     progress: Progress = silent
     budget: Budget = field(default_factory=Budget)
 
+    def plain(self, fit: Fit) -> np.ndarray:
+        """The residual in sigmas of its sensors, not made white (n,); zero where nothing was measured."""
+        return np.concatenate([np.nan_to_num(r / self.objective.whitener.noise.sigma).ravel() for r in fit.evaluation.raw])
+
     def fall(self, before: Fit, after: Fit) -> np.ndarray:
         """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""
         of = [o.group for o in self.bench.outputs]
