@@ -22,6 +22,7 @@ from twin.effects import Drive
 
 DECLARED = "as declared"
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
+LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
 SAME = (
     0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
 )
@@ -136,8 +137,13 @@ def estimate_noise(
     cells = np.array([c.noise or np.nan for c in bench.drivers]) * np.abs(bench.pull)
     drive = cells if np.isfinite(cells).all() else None
     notes = []
+    groups, member = _members(bench)
     if pairs:
-        d = [_detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]], sensitivity[a]) for a, b in pairs]
+        reading = bench.reading if drive is None else drive
+        d = [
+            _detrended((residual[a] - residual[b]) / np.sqrt(2.0), bench.inputs[trials[a]], sensitivity[a], member, reading)
+            for a, b in pairs
+        ]
         G, source = [sensitivity[a] for a, _ in pairs], f"{len(pairs)} pairs of repeated trials"
     else:
         d, G = _along_rows(residual, sensitivity)
@@ -147,7 +153,6 @@ def estimate_noise(
             notes.append("no repeated trials: the noise is taken as declared, and as white in time")
         else:
             notes.append("no repeated trials: the noise floor is read off second differences and assumed white in time")
-    groups, member = _members(bench)
     D, G_all = np.concatenate(d), np.concatenate(G)
     if source == DECLARED:
         sigma = declared
@@ -188,24 +193,36 @@ def _members(bench: Bench) -> tuple[list[str], np.ndarray]:
     return groups, np.array([groups.index(o.group) for o in bench.outputs])
 
 
-def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray) -> np.ndarray:
+def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray, reading: np.ndarray) -> np.ndarray:
     """Differences of repeats d (n, m) less what may have changed between the two: a line in time in each channel, and an offset
     and a gain of each input, felt through its sensitivities G (n, m, n_tendon).
 
-    All gains together are a stiffness: a robot that was warmer, or older, the second time is not noise.
+    All gains together are a stiffness: a robot that was warmer, or older, the second time is not noise. Each counts by what it may
+    scatter by, its group's spread and the inputs' `reading` (n_tendon,); NaN where the inputs' share is `LOCKED` times the spread.
+    There tendons hold each other, a tenth of a millimetre is newtons to the twin, and what gives way in the robot is not known.
     """
     t = (inputs.time - inputs.time[0]) / max(inputs.time[-1] - inputs.time[0], 1e-9) - 0.5
     basis = np.stack([np.ones_like(t), t], axis=1)
     felt = np.concatenate([G, G * inputs.command[:, None, :]], axis=2)
+    scale, noise = _scales(d, member)[member], np.sqrt(((G * reading) ** 2).sum(axis=2))  # (m,), (n, m)
+    weight = 1.0 / np.hypot(scale, noise)
+    d = np.where(noise < LOCKED * scale, d, np.nan)
     out, moved = np.full_like(d, np.nan), np.zeros_like(felt)
     for j in range(d.shape[1]):
         ok = np.isfinite(d[:, j])
         if ok.sum() > 4:
-            both = np.column_stack([d[ok, j], felt[ok, j]])
-            both -= basis[ok] @ np.linalg.lstsq(basis[ok], both, rcond=None)[0]
+            both, w = np.column_stack([d[ok, j], felt[ok, j]]), weight[ok, j, None]
+            both -= basis[ok] @ np.linalg.lstsq(w * basis[ok], w * both, rcond=None)[0]
             out[ok, j], moved[ok, j] = both[:, 0] * np.sqrt(ok.sum() / (ok.sum() - 2)), both[:, 1:]
     known = np.isfinite(out)
-    return out - moved @ np.linalg.lstsq(moved[known], out[known], rcond=None)[0]
+    w = weight[known]
+    return out - moved @ np.linalg.lstsq(w[:, None] * moved[known], w * out[known], rcond=None)[0]
+
+
+def _scales(d: np.ndarray, member: np.ndarray) -> np.ndarray:
+    """Robust spread (n_group,) of differences d (n, m), by group."""
+    median = [np.nanmedian(np.abs(d[:, member == g])) for g in range(member.max() + 1)]
+    return np.maximum(1.4826 * np.array(median), 1e-9)
 
 
 def _likeliest(
@@ -216,7 +233,7 @@ def _likeliest(
     d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G')."""
     present = np.isfinite(d)
     count = present.sum(axis=0)
-    scale = np.array([max(1.4826 * np.nanmedian(np.abs(d[:, member == g])), 1e-9) for g in range(n_group)])
+    scale = _scales(d, member)
     d, G = np.where(present, d, 0.0), G * present[:, :, None]  # what is missing says nothing, of no channel and no input
 
     def unpack(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
