@@ -24,7 +24,7 @@ class World:
     """Every sentence is one word; what it was made of is checked as it is asked."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.size, self.unseen, self.verdict, self.rigs = SIZE, 0.1, "unexplained", None
+        self.size, self.unseen, self.quick, self.verdict, self.rigs = SIZE, 0.1, 0.1, "unexplained", None
         self.strained: tuple[str, ...] = ()
         self.score, self.predicted = 0.0, True  # of the sets that are not in force; how the best was chosen
         self.runners: list[Any] = []
@@ -35,6 +35,7 @@ class World:
         self.pulled: Any = None
         monkeypatch.setattr(stage, "field", lambda study, final: self.pulled)
         monkeypatch.setattr(stage, "mixed", lambda bench, rigs: f" two {rigs}.")
+        monkeypatch.setattr(stage, "chatter", lambda size: f" chatter {size}.")
         monkeypatch.setattr(stage, "unlike", lambda unseen, size: f" unlike {unseen} {size}.")
         monkeypatch.setattr(stage, "undecided", lambda effect, rival: f" {effect} or {rival}.")
         monkeypatch.setattr(stage, "repeatability", lambda study, fit: ("repeats",))
@@ -76,7 +77,7 @@ class World:
 
     def said(self) -> Description:
         final = self.model()
-        signs = SimpleNamespace(line=(31.0, 0.5), strained=self.strained, unseen=self.unseen)
+        signs = SimpleNamespace(line=(31.0, 0.5), strained=self.strained, unseen=self.unseen, quick=self.quick)
         judged: Any = SimpleNamespace(
             verdict=self.verdict, final=final, rigs=self.rigs, signs=signs, runners_up=self.runners, doubtful=self.doubtful
         )
@@ -152,6 +153,13 @@ def test_a_smooth_error_on_trials_left_out_is_said_above_both_bars(monkeypatch: 
     for unseen, said in ((0.5, ""), (0.51, " unlike 0.51 0.7.")):
         world.unseen = unseen
         assert world.said().words == f"Structure. where. since.{said}"
+
+
+def test_what_is_neither_smooth_nor_noise_is_said_above_both_bars(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch)
+    for quick, said in ((0.5, ""), (0.51, " chatter 0.51.")):
+        world.quick = quick
+        assert world.said().words == f"Structure. where.{said} since."
 
 
 def test_the_runner_up_is_said_with_the_share_it_takes_off_the_error_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from twin.diagnose.judge import Signs, judge, look, probability, unsure, verdict
 from twin.diagnose.null import Thresholds
 
 BARS = Thresholds()
-CLEAN = Signs(before=2.0, after=0.02, unseen=0.03, line=(2.0, 0.1), halved=True, strange=False, strained=())
+CLEAN = Signs(before=2.0, after=0.02, unseen=0.03, line=(2.0, 0.1), quick=0.0, halved=True, strange=False, strained=())
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,11 @@ CLEAN = Signs(before=2.0, after=0.02, unseen=0.03, line=(2.0, 0.1), halved=True,
         (True, {"unseen": 0.5}, "partly_explained"),  # much on trials left out
         (True, {"unseen": 0.5, "halved": False}, "unexplained"),
         (True, {"line": (31.0, 0.1)}, "partly_explained"),
+        (True, {"quick": 0.44}, "explained"),
+        (True, {"quick": 0.46}, "partly_explained"),
+        (True, {"quick": 0.46, "halved": False}, "unexplained"),
         (False, {}, "noise"),
+        (False, {"quick": 0.46}, "unexplained"),
         (False, {"after": 0.29, "before": 0.29}, "noise"),
         (False, {"after": 0.31, "before": 0.31}, "unexplained"),
         (False, {"line": (11.0, 0.1)}, "unexplained"),  # no law was fitted that could leave a line of 10
@@ -75,7 +79,7 @@ def weighed(effects: tuple[str, ...], score: float, cost: float = 0.0, size: flo
 @pytest.fixture
 def staged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """What `judge` asks of other stages, to be set: signs, a second robot, sets that are worse on trials left out."""
-    said: dict[str, Any] = {"signs": CLEAN, "rigs": None, "worse": ()}
+    said: dict[str, Any] = {"signs": CLEAN, "rigs": None, "worse": (), "quick": 0.2}
 
     def left_out(study: Any, fit: Any) -> Any:
         return SimpleNamespace(worse=lambda other: fit.effects in said["worse"], structure=0.07)
@@ -83,6 +87,7 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setattr(stage, "look", lambda *_: said["signs"])
     monkeypatch.setattr(stage, "rigs", lambda *_: said["rigs"])
     monkeypatch.setattr(stage, "left_out", left_out)
+    monkeypatch.setattr(stage, "quick", lambda study, found: said["quick"] if found.effects == BASE else 9.0)
     return said
 
 
@@ -154,7 +159,7 @@ def test_a_second_robot_is_seen_only_where_no_effects_explain_as_much(staged: di
     staged["rigs"] = SimpleNamespace(fall=1000.0)
     found = judged(best)
     assert (found.verdict, found.claims, found.final.effects, found.rigs) == ("unexplained", (), BASE, staged["rigs"])
-    assert (found.signs.after, found.signs.unseen) == (2.0, 0.07)  # those of the robot as it stays
+    assert (found.signs.after, found.signs.unseen, found.signs.quick) == (2.0, 0.07, 0.2)  # those of the robot as it stays
 
 
 def test_no_second_robot_is_seen_where_one_of_two_effects_explains_as_much(staged: dict[str, Any]) -> None:
@@ -209,11 +214,12 @@ def test_what_no_known_effect_does_is_strange(sign: str, size: float, strange: b
     monkeypatch.setattr(stage, "change", lambda *_: "here" if sign == "change" else None)
     monkeypatch.setattr(stage, "strained", lambda fit: ["mu at its bound"] if sign == "strained" else [])
     monkeypatch.setattr(stage, "halved", lambda *_: True)
+    monkeypatch.setattr(stage, "quick", lambda study, found: 0.7 if found.effects == FRICTION else 9.0)
     monkeypatch.setattr(stage, "left_out", lambda *_: SimpleNamespace(structure=0.3))
     monkeypatch.setattr(stage, "Spectrum", SimpleNamespace(of=lambda *_: SimpleNamespace(peak=lambda z: (3.0, 0.2))))
     bench = SimpleNamespace(measured=[np.zeros((4, 1))])
     noise = SimpleNamespace(whitener=SimpleNamespace(noise=SimpleNamespace(sigma=1.0)))
     study: Any = SimpleNamespace(bench=bench, trials=[0], objective=noise)
     signs = look(study, weighed(BASE, 0.0, size=size), weighed(FRICTION, 0.0, size=size), BARS)
-    assert (signs.before, signs.after, signs.unseen, signs.line) == (size, size, 0.3, (3.0, 0.2))
+    assert (signs.before, signs.after, signs.unseen, signs.line, signs.quick) == (size, size, 0.3, (3.0, 0.2), 0.7)
     assert (signs.halved, signs.strange, bool(signs.strained)) == (True, strange, sign == "strained")

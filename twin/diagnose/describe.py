@@ -15,6 +15,7 @@ from twin.diagnose.leaps import leaps
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.places import where
+from twin.diagnose.quick import words as chatter
 from twin.diagnose.repeatability import repeatability
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
@@ -77,6 +78,7 @@ def _left(study: Study, found: Search, judged: Judgement, bars: Thresholds, stro
         words += where(bench, trials, off, predicted)
         pulled = field(study, final)
         words += pulled.words() if pulled else ""
+    words += chatter(signs.quick) if signs.quick > max(MUCH, bars.left) else ""
     words += since(bench, trials, found.base.fit.z.reshape(shape))
     words += mixed(bench, judged.rigs) if judged.rigs else ""
     words += "".join(f" The {limit}." for limit in signs.strained)

@@ -15,6 +15,7 @@ from twin.diagnose.lateness import LATE
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.places import misbent
+from twin.diagnose.quick import quick
 from twin.diagnose.rigs import Rigs, rigs
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
@@ -26,7 +27,7 @@ from twin.diagnose.words import change
 @dataclass(frozen=True)
 class Signs:
     """What a verdict is read from: the smooth error (sigma) of the calibrated robot and with the effects, and of these on trials
-    left out; the strongest line left (z-score, Hz).
+    left out; the strongest line left (z-score, Hz); what is left beside it all that is no noise either (`quick`, sigma).
 
     `halved`: the effects take half of the error. `strange`: what is left sits at one place of the body, the calibrated error began
     at once, as that of no known effect does, or a law is at its limit (`strained`, in words).
@@ -36,6 +37,7 @@ class Signs:
     after: float
     unseen: float
     line: tuple[float, float]
+    quick: float
     halved: bool
     strange: bool
     strained: tuple[str, ...]
@@ -75,7 +77,8 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     either = _with_either(study, base, gated, added, bars) if said == "unexplained" and not apart else None
     said = "partly_explained" if either else said
     if said in ("noise", "unexplained") and best is not base:
-        signs = replace(signs, after=base.discrepancy.size, unseen=left_out(study, base.fit).structure, strained=())
+        after, unseen = base.discrepancy.size, left_out(study, base.fit).structure
+        signs = replace(signs, after=after, unseen=unseen, quick=quick(study, base), strained=())
         best, added = base, ()
     claims = _claims(study, found, gated, best, added, either or signs, bars)
     doubtful = unsure(claims) if said == "explained" else ()
@@ -97,7 +100,8 @@ def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
     at_once = base.discrepancy.size > bars.left and change(bench, trials, base.fit.z.reshape(rest.shape)) is not None
     line = Spectrum.of(bench, trials).peak(best.fit.z.reshape(rest.shape) - best.discrepancy.mean)
     unseen = left_out(study, best.fit).structure
-    return Signs(base.discrepancy.size, after, unseen, line, halved(study, base, best), bent or at_once or bool(limits), limits)
+    strange = bent or at_once or bool(limits)
+    return Signs(base.discrepancy.size, after, unseen, line, quick(study, best), halved(study, base, best), strange, limits)
 
 
 def _with_either(study: Study, base: Weighed, gated: Gated, added: tuple[str, ...], bars: Thresholds) -> Signs | None:
@@ -114,7 +118,7 @@ def _with_either(study: Study, base: Weighed, gated: Gated, added: tuple[str, ..
 def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
     """In the words of the report's contract; `added`: effects passed the gates."""
     s = signs
-    much = max(s.after, s.unseen) > max(MUCH, bars.left) or s.line[0] > bars.line
+    much = max(s.after, s.unseen, s.quick) > max(MUCH, bars.left) or s.line[0] > bars.line
     if not added:
         return "unexplained" if much or s.line[0] > bars.faint or s.after > max(ALONE, bars.left) else "noise"
     if not much and not (s.after > bars.left and s.after > SHARE * s.before):
