@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from twin.diagnose import ranking as stage
 from twin.diagnose.patterns import Dictionary, Pattern
@@ -80,6 +81,24 @@ def test_an_effect_that_only_goes_one_way_gains_nothing_the_other_way() -> None:
     against = gain("tendon_friction", ("mu",), -4.0 * column, fitted())  # of some quarter of a unit
     assert against == pytest.approx(fall(column, [0, 1]) - np.log(N), rel=1e-6)
     assert gain("base_tilt", ("about_x",), column, fitted()) == pytest.approx(against, rel=1e-9)
+
+
+def test_of_a_law_for_every_tendon_the_worn_one_counts_whatever_the_others_would_do() -> None:
+    """Stops in three drives, of which the data want the third, and a little of the second the wrong way: by another library's
+    non-negative least squares on what the robot's own parameters leave, and the price of what is used."""
+    names = ("loss_1", "loss_2", "loss_3")
+    columns = RNG.normal(size=(N, 3))
+    columns[:, 2] -= 0.8 * Z
+    columns[:, 1] += 0.3 * Z
+    rows = np.vstack([J, [STEP / STD, 0.0]])
+    left = [np.append(x, 0.0) - rows @ np.linalg.lstsq(rows, np.append(x, 0.0), rcond=None)[0] for x in (*columns.T, Z)]
+    amplitude, norm = nnls(np.column_stack(left[:3]), -left[3])
+    assert amplitude[2] > 0.0
+    assert amplitude[1] == 0.0
+    expected = float(left[3] @ left[3]) - norm**2 - np.count_nonzero(amplitude) * np.log(N)
+    assert gain("actuator_saturation", names, columns, fitted()) == pytest.approx(expected, rel=1e-6)
+    free = fall(columns, [0, 1]) - 3 * np.log(N)
+    assert gain("base_tilt", ("about_x", "about_y", "about_z"), columns, fitted()) == pytest.approx(free, rel=1e-6)
 
 
 def test_what_the_robot_imitates_is_not_paid_for_and_gains_nothing_alone() -> None:

@@ -95,9 +95,9 @@ def drawn(sign: float, n_trial: int = 6) -> Any:
 @pytest.mark.parametrize(("sign", "named"), [(1.0, True), (-1.0, False)])
 def test_a_law_that_may_go_one_way_only_does_not_go_the_other(sign: float, named: bool) -> None:
     patterns = (
-        SimpleNamespace(effect="tendon_friction", amplitudes=("mu",), where=(0,), allows=lambda a, n: a["mu"] >= 0.0),
-        SimpleNamespace(effect="base_tilt", amplitudes=("about_x",), where=(1,), allows=lambda a, n: True),
-        SimpleNamespace(effect="contact", amplitudes=("stiffness",), where=(2,), allows=lambda a, n: True),
+        SimpleNamespace(effect="tendon_friction", amplitudes=("mu",), where=(0,), least=lambda n: np.zeros(1)),
+        SimpleNamespace(effect="base_tilt", amplitudes=("about_x",), where=(1,), least=lambda n: np.array([-np.inf])),
+        SimpleNamespace(effect="contact", amplitudes=("stiffness",), where=(2,), least=lambda n: np.array([-np.inf])),
     )
     found = _judged(drawn(sign), np.array([[1.0]]), SimpleNamespace(patterns=patterns), 3, 2400.0)  # type: ignore[arg-type]
     assert found.size == pytest.approx(np.hypot(1.0, 0.5), rel=0.05)  # 2400 numbers scatter by 1.4 %
@@ -108,6 +108,26 @@ def test_a_law_that_may_go_one_way_only_does_not_go_the_other(sign: float, named
     assert [s for _, s in found.shares] == sorted(shares.values(), reverse=True)
     if named:
         assert shares["tendon_friction"] == pytest.approx(1.0, abs=0.15)  # (0.25 +- chance 2/sqrt(2400) * sqrt(2)) of 0.25
+
+
+def test_of_a_law_for_every_tendon_those_that_would_go_the_other_way_stay_off() -> None:
+    """Of three amplitudes the second alone explains, the third would have to be negative, and the first nothing."""
+    rng, parts = np.random.default_rng(8), []
+    for _ in range(6):
+        x = rng.normal(size=(400, 5))
+        x[:, 4] += -0.5 * x[:, 2] + 0.4 * x[:, 3]
+        parts.append(x.T @ x)
+
+    def share(least: list[float], where: tuple[int, ...] = (0, 1, 2)) -> float:
+        law = SimpleNamespace(
+            effect="actuator_saturation", amplitudes=("a", "b", "c"), where=where, least=lambda n: np.array(least)
+        )
+        return dict(_judged(np.stack(parts), np.eye(1), SimpleNamespace(patterns=(law,)), 3, 2400.0).shares)["actuator_saturation"]  # type: ignore[arg-type]
+
+    one_way, alone = share([0.0, 0.0, 0.0]), share([-np.inf], where=(1,))
+    assert one_way == pytest.approx(alone, abs=0.02)  # the first, free, takes what chance gives it
+    assert one_way == pytest.approx(0.25 / 0.41, abs=0.1)
+    assert share([-np.inf, -np.inf, -np.inf]) > 0.9
 
 
 @pytest.mark.parametrize(

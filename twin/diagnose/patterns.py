@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,10 +23,10 @@ class Pattern:
     amplitudes: tuple[str, ...]
     where: tuple[int, ...]
 
-    def allows(self, amplitudes: Mapping[str, float], n_tendon: int) -> bool:
-        """Whether amplitudes may have these signs: a one-sided one is not negative."""
+    def least(self, n_tendon: int) -> np.ndarray:
+        """The least each amplitude may be, counted from OFF (n,): a one-sided one is not negative."""
         table = {p.name: p for p in catalogue()[self.effect].declared(n_tendon)}
-        return not any(a < 0.0 and table[n].low >= table[n].value for n, a in amplitudes.items())
+        return np.array([0.0 if table[n].low >= table[n].value else -np.inf for n in self.amplitudes])
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from twin.calibrate import Fit, Objective, prior_weight
 from twin.diagnose.evidence import Discrepancy, Evidence
@@ -35,7 +36,8 @@ def rank(
 
     With c the effect's white pattern (per free parameter), J the model's derivatives with their priors P and V the residual's
     covariance (I, or I + Phi D Phi'): A = c' V^-1 c - c' V^-1 J (J' V^-1 J + P)^-1 J' V^-1 c, u = c' V^-1 z less the same
-    projection, gain = u' A^-1 u - p log n. A one-sided effect whose best amplitude is negative gains nothing.
+    projection, gain = u' A^-1 u - p log n. One-sided amplitudes that would be negative stay OFF and cost nothing; an effect of
+    which none is left gains nothing.
     """
     both = np.concatenate([fit.J, known.columns, fit.z[:, None]], axis=1)
     white, beside = (gains(both, X, fit, known, objective) for X in (both, evidence.whiten(discrepancy, both)))
@@ -79,11 +81,19 @@ def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective:
             out.append(-np.inf)
             continue
         A, u = A[np.ix_(keep, keep)], u[keep]
-        # z falls by column * amplitude, columns being changes of the residual: amplitude = -A^-1 u
-        amplitude = -solve(A + 1e-9 * np.trace(A) * np.eye(len(A)), u)
-        used = [n for n, kept in zip(pattern.amplitudes, keep, strict=True) if kept]
-        if not pattern.allows(dict(zip(used, amplitude, strict=True)), objective.bench.n_tendon):
-            out.append(-np.inf)
-            continue
-        out.append(float(-u @ amplitude - len(used) * np.log(objective.n)))
+        amplitude = _amplitudes(A, u, pattern.least(objective.bench.n_tendon)[keep])
+        used = np.count_nonzero(amplitude)
+        fall = float(-2.0 * u @ amplitude - amplitude @ A @ amplitude)
+        out.append(fall - used * float(np.log(objective.n)) if used else -np.inf)
     return out
+
+
+def _amplitudes(A: np.ndarray, u: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """What takes most off |z|^2, none below its `least`: z falls by column * amplitude, columns being changes of the residual, so
+    that without bounds it is -A^-1 u. Of a law for every tendon some stay at 0 where one is worn."""
+    held = A + 1e-9 * np.trace(A) * np.eye(len(A))
+    amplitude = -solve(held, u)
+    if np.all(amplitude >= least):
+        return amplitude
+    L = np.linalg.cholesky(held)
+    return lsq_linear(L.T, -np.linalg.solve(L, u), bounds=(least, np.inf), method="bvls").x

@@ -80,10 +80,15 @@ def _judged(S: np.ndarray, believed: np.ndarray, known: Dictionary, n_tendon: in
     best: dict[str, float] = {}
     for pattern in known.patterns:
         where = len(own) + np.array(pattern.where)
-        moves = S[:, where, where].sum(axis=0) > 0.0
-        left, amplitudes = _unseen(S, np.append(own, where[moves]), believed)
-        used = [n for n, m in zip(pattern.amplitudes, moves, strict=True) if m]
-        if used and alone > count and pattern.allows(dict(zip(used, amplitudes[len(own) :], strict=True)), n_tendon):
+        used = S[:, where, where].sum(axis=0) > 0.0
+        least, left = pattern.least(n_tendon), alone
+        while used.any():  # without those that would have to be below their least
+            left, amplitudes = _unseen(S, np.append(own, where[used]), believed)
+            low = amplitudes[len(own) :] < least[used]
+            if not low.any():
+                break
+            used[np.flatnonzero(used)[low]] = False
+        if used.any() and alone > count:
             best[pattern.effect] = max((alone - left) / (alone - count), best.get(pattern.effect, 0.0))
     shares = sorted(((e, min(s, 1.0)) for e, s in best.items() if s > 0.0), key=lambda x: -x[1])
     return Within(float(np.sqrt(alone / count)), tuple(shares))
