@@ -84,6 +84,8 @@ GROUPS = {
     "beyond": _stage("beyond"),
     "repeatability": _stage("repeatability"),
     "within": _stage("within", "tests/test_within.py", "-k", "not named_under"),
+    "quick": _stage("quick"),
+    "systematic": _stage("systematic", "tests/test_systematic.py", "-k", "not claimed"),
     "experiment": _stage("experiment"),
     "weigh": _stage("weigh", "tests/test_weigh.py", "tests/test_choose.py"),
     "describe": _stage("describe", "tests/test_describe_stage.py"),
