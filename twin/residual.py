@@ -206,7 +206,8 @@ def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray,
     felt = np.concatenate([G, G * inputs.command[:, None, :]], axis=2)
     scale, noise = _scales(d, member)[member], np.sqrt(((G * reading) ** 2).sum(axis=2))  # (m,), (n, m)
     weight = 1.0 / np.hypot(scale, noise)
-    d = np.where(noise < LOCKED * scale, d, np.nan)
+    locked = noise >= LOCKED * scale
+    d = np.where(locked & ~locked.all(axis=0), np.nan, d)  # a channel that would be left out altogether is what there is
     out, moved = np.full_like(d, np.nan), np.zeros_like(felt)
     for j in range(d.shape[1]):
         ok = np.isfinite(d[:, j])

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tools.second_bench.day import Day, Drive, Trial, Want
 from tools.second_bench.robot import Robot
@@ -127,10 +128,5 @@ def sign(random: np.random.Generator) -> float:
 
 
 def rotation(vector: Array) -> Array:
-    """(3, 3) Rodrigues' rotation by |vector| rad about it."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    hat = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * hat + (1 - np.cos(angle)) * hat @ hat
+    """(3, 3) by |vector| rad about it."""
+    return Rotation.from_rotvec(vector).as_matrix()
