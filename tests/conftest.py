@@ -28,16 +28,17 @@ Day = Callable[..., tuple[Recording, Effect | None]]
 
 @pytest.fixture(scope="session")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Day:
-    """bench(effect, strength=2, seed=5, design="hanging", displacement=False) -> (the day as logged, the effect or None)."""
+    """bench(effect, strength=2, seed=5, design="hanging", displacement=False) -> (the day as logged, the effect or None); an effect
+    by its name, at `strength` times its drawn size, or a law as it is."""
 
     @cache
     def day(
-        effect: str | None, strength: float = 2.0, seed: int = 5, design: str = "hanging", displacement: bool = False
+        effect: str | Effect | None, strength: float = 2.0, seed: int = 5, design: str = "hanging", displacement: bool = False
     ) -> tuple[Recording, Effect | None]:
         robot, motions, instruments, laws = (np.random.default_rng([seed, n]) for n in range(4))
         plan = bench_day(design, motions)
         noise = Noise.draw(instruments, coloured=False)
-        truth = None if effect is None else replace(all_effects()[effect].draw(laws), strength=strength)
+        truth = replace(all_effects()[effect].draw(laws), strength=strength) if isinstance(effect, str) else effect
         logs = run(built(robot), [] if truth is None else [truth], plan, lambda done: None)
         folder: Path = tmp_path_factory.mktemp("days") / "day"
         write_set(

@@ -194,6 +194,17 @@ def test_stiffnesses_multiply_stretches_add_and_strains_follow_each_other() -> N
     assert creep.time == (5.0, 50.0, 10.0)
 
 
+def test_ageing_that_levels_off_is_a_rate_that_fades() -> None:
+    """dK/dt = -rate K_0 exp(-levelling t), integrated; towards rate / levelling in all, and a line where nothing levels."""
+    rate, levelling, clock = 2e-4, 1e-3, np.array([0.0, 60.0, 900.0, 7200.0])
+    gone = solve_ivp(lambda t, k: [-rate * np.exp(-levelling * t)], (0.0, 7200.0), [1.0], t_eval=clock, rtol=1e-10, atol=1e-12)
+    old = law("backbone_ageing", rate=rate, levelling=levelling)
+    np.testing.assert_allclose(old.soften(clock, clock), gone.y[0], atol=1e-9)
+    assert float(np.asarray(old.soften(clock, np.array([1e6])))[0]) == pytest.approx(1.0 - rate / levelling)
+    nearly, line = (law("backbone_ageing", rate=1e-5, levelling=x).soften(clock, clock) for x in (1e-12, 0.0))
+    np.testing.assert_allclose(nearly, line, atol=1e-9)
+
+
 def test_loads_add_up_and_turn() -> None:
     laws = Laws((law("tip_payload", mass=0.005), law("base_tilt", about_x=np.pi / 6)))
     loads = laws.surround(Loads(np.array([0.0, 0.0, 9.0]), payload=0.01))

@@ -6,7 +6,7 @@ curvature that varies along the body, another pre-sliding, a gap instead of a wa
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ import pytest
 from tests.conftest import Day
 from tools.attribution_table import held
 from tools.bench.effects import all_effects
+from tools.bench.effects.backbone_ageing import BackboneAgeing as Tiring
 from tools.bench.effects.effect import Effect as Truth
 from tools.bench.effects.tendon_backlash import TendonBacklash as Play
 from tools.compared import COMPARED, KNOWN, OTHER, distance
@@ -126,6 +127,34 @@ def test_the_worn_drive_is_told_from_its_neighbours(bench: Day, seed: int, worn:
     law = next(e for e in fitted.model.twin.effects if e.id == "tendon_backlash")
     gaps = law["gap"] + law.each("gap")
     assert [bool(g > 0.5 * gaps.max()) for g in gaps] == [bool(w) for w in worn]
+
+
+@dataclass(frozen=True)
+class Shakedown(Tiring):
+    """Tires in its first minutes and then no more: compliance times 1 + 0.1 strength (1 - exp(-clock / 10 min))."""
+
+    def soften(self, clock: np.ndarray, ambient: np.ndarray) -> np.ndarray:
+        return 1.0 - 0.1 * self.strength * np.expm1(-clock / 600.0)
+
+
+def test_ageing_that_levels_off_is_found_with_the_rate_at_which_it_does(bench: Day) -> None:
+    """In all 1 - 1 / 1.2 of the stiffness, at first 0.2 / 600 s: a stiffness that falls as the compliance here grows levels off
+    some 10 % sooner, and rates of one share are that much apart."""
+    robot = load("continuum")
+    prepared = prepare(bench(Shakedown(strength=2.0))[0], robot)
+    trials = list(range(len(prepared.inputs)))
+    start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
+    base = fit(objective, start, refresh=True)
+    study = Study(objective, Evidence(prepared, trials))
+    first, *others = rank(objective, study.evidence, base, weigh(study, base).discrepancy, dictionary(objective, base))
+    assert (first.effect, first.start.free) == ("backbone_ageing", ("rate", "levelling"))
+    assert all(o.gain < first.gain for o in others)
+    aged = extended(study, weigh(study, base), first.effect, first.start)
+    assert aged is not None
+    law = next(e for e in aged.fit.model.twin.effects if e.id == "backbone_ageing")
+    assert law["levelling"] == pytest.approx(1.0 / 600.0, rel=0.15)
+    assert law["rate"] / law["levelling"] == pytest.approx(1.0 - 1.0 / 1.2, rel=0.1)
+    assert float(np.mean(aged.fit.z[aged.fit.z != 0] ** 2)) < 1.15
 
 
 def test_every_effect_of_the_catalogue_is_compared() -> None:

@@ -203,6 +203,15 @@ def test_the_fall_is_told_by_group_in_the_order_of_the_outputs() -> None:
     np.testing.assert_allclose(study.fall(before, after), [18.0, 15.0])  # type: ignore[arg-type]
 
 
+def test_a_law_that_lets_tendons_fall_slack_lacks_what_they_would_hear() -> None:
+    """Of trials 2 and 0, in the objective's order; a tendon at zero is slack."""
+    heard = [np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[10.0, 20.0]])]
+    study = Study(SimpleNamespace(whitener=SimpleNamespace(heard=heard), trials=[2, 0]), None)  # type: ignore[arg-type]
+    tension = {0: np.array([[0.0, 0.1]]), 1: np.zeros((5, 2)), 2: np.array([[0.3, 0.0], [0.1, 0.1]])}
+    traces = {k: SimpleNamespace(true=SimpleNamespace(tension=t)) for k, t in tension.items()}
+    assert study.unheard(SimpleNamespace(evaluation=SimpleNamespace(traces=traces))) == 2.0 + 10.0  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("drive", [Drive.TENSION, Drive.CURRENT])
 def test_the_sensitivity_of_a_linear_robot_is_its_matrix(drive: Drive, plan: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """y = A u. A spring feels sqrt(dt / (2 tau)) of what its current errs by from row to row, and never more than all of it."""
@@ -250,19 +259,33 @@ def test_the_noise_is_read_from_a_first_rough_fit(plan: Bench, monkeypatch: pyte
     start = SimpleNamespace(model=SimpleNamespace(twin="rough"), evaluation=SimpleNamespace(traces="those", raw="left"))
     monkeypatch.setattr(objective, "Objective", objective_by_hand)
     monkeypatch.setattr(objective, "Model", SimpleNamespace(base=lambda robot, twin: "base"))
-    monkeypatch.setattr(objective, "Whitener", lambda noise, measured, G, command: (noise, G, len(measured), len(command)))
-    monkeypatch.setattr(objective, "fit", lambda of, model, tolerance: start)
     monkeypatch.setattr(
-        objective, "sensitivity", lambda bench, trials, twin, predicted, near: (list(trials), twin, predicted, near)
+        objective, "Whitener", lambda noise, measured, G, command, taut=None: (noise, G, len(measured), len(command), taut)
     )
+    monkeypatch.setattr(objective, "fit", lambda of, model, tolerance: start)
+    asked: list[Any] = []
+
+    def sensitivity_by_hand(bench: Bench, trials: Any, twin: Any, predicted: Any, near: Any) -> list[np.ndarray]:
+        asked.append((list(trials), twin, predicted, near, min(float(i.command.min()) for i in bench.inputs)))
+        return [np.ones((len(bench.inputs[k].time), 24, 3)) for k in trials]
+
+    monkeypatch.setattr(objective, "sensitivity", sensitivity_by_hand)
     monkeypatch.setattr(objective, "estimate_noise", lambda bench, trials, raw, G: ((raw, G), ["a note"]))
+    below = np.zeros_like(bench.inputs[2].command)
+    below[:3, 1] = bench.reading[1] * np.array([-0.5, -2.0, -9.0])
+    bench = replace(bench, inputs=(*bench.inputs[:2], replace(bench.inputs[2], command=below)))
     model, _, notes = objective.objective_of(bench, SimpleNamespace(robot=None), [0, 2], Settings(jobs=1))  # type: ignore[arg-type]
     assert (model, notes) == (start.model, ["a note"])
-    (trials, (rough, none, n, _), jobs), (_, (noise, G, *_), _) = made
+    (trials, (rough, none, n, _, unasked), jobs), (_, (noise, G, _, _, taut), _) = made
+    assert unasked is None
     assert (trials, n, jobs) == ([0, 2], 2, 1)
     np.testing.assert_array_equal(rough.sigma, [1e-3, *[TYPICAL["marker"]] * 23])
     assert not any(g.any() for g in none)
-    assert G == ([0, 2], "rough", "predicted by rough near those", "those")
+    assert asked == [([0, 2], "rough", "predicted by rough near those", "those", 0.0)], "no tendon slack"
+    assert all(np.all(g == 1.0) for g in taut)
+    np.testing.assert_allclose(G[1][:4, 5, 1], [0.75, 0.0, 0.0, 1.0], atol=1e-12)  # of a step of two readings what pulls
+    G[1][:3, :, 1] = 1.0
+    assert all(np.all(g == 1.0) for g in G)
     assert noise == ("left", G)
 
 

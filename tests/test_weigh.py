@@ -29,8 +29,9 @@ def study(budget: Budget | None = None) -> Any:
     bench = SimpleNamespace(n_tendon=3, robot=ROBOT)
     evidence = SimpleNamespace(log_likelihood_gain=lambda z: (100.0 - float(z @ z), "smooth"))
     return SimpleNamespace(
-        objective=SimpleNamespace(n=N), evidence=evidence, bench=bench, progress=lambda words: None, budget=budget or Budget()
-    )
+        objective=SimpleNamespace(n=N), evidence=evidence, bench=bench, progress=lambda words: None, budget=budget or Budget(),
+        unheard=lambda fit: 7.0,
+    )  # fmt: skip
 
 
 def calibrated(*effects: str) -> Model:
@@ -68,10 +69,10 @@ class Fits:
 
 
 def test_a_score_is_twice_the_log_evidence_less_priors_and_the_price_of_what_the_data_fix() -> None:
-    """|z|^2 = 14, the priors' terms 3: 100 - 14 - 3 - 2.5 log n."""
+    """|z|^2 = 14, the priors' terms 3, 7 not heard by slack tendons: 100 - 14 - 7 - 3 - 2.5 log n."""
     fitted: Any = SimpleNamespace(z=np.array([1.0, 2.0, 3.0]), cost=17.0, effective_parameters=lambda: 2.5)
     found = weigh(study(), fitted)
-    assert found.score == pytest.approx(100.0 - 17.0 - 2.5 * np.log(N))
+    assert found.score == pytest.approx(100.0 - 17.0 - 7.0 - 2.5 * np.log(N))
     assert (found.fit, found.discrepancy) == (fitted, "smooth")
 
 

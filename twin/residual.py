@@ -6,6 +6,10 @@ quite the same moment, by a small share of the input's change from row to row. W
 covariance
 I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Successive
 samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples.
+
+A tendon that a law makes slack does not feel its reading's noise, and |z|^2 falls by it though the law need not be true: the robot
+has never felt it. `Whitener.heard` is what that noise adds where the tendon is taut, so that laws can be compared without it
+(the corrected score of errors in variables, Nakamura, Biometrika 77, 1990).
 """
 
 from __future__ import annotations
@@ -56,15 +60,21 @@ class Noise:
 
 
 class Whitener:
-    """Makes residuals and their derivatives white, given a Noise and sensitivities G (n_k, n_output, n_tendon) to the commands."""
+    """Makes residuals and their derivatives white, given a Noise and sensitivities G (n_k, n_output, n_tendon) to the commands;
+    `taut` are those of tendons held taut, where some are slack.
+
+    `heard` (n_k, n_tendon): the expected |z|^2 of a row that a reading's noise is in, of a tendon that is taut.
+    """
 
     def __init__(
-        self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], command: Sequence[np.ndarray]
-    ) -> None:
+        self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], command: Sequence[np.ndarray],
+        taut: Sequence[np.ndarray] | None = None,
+    ) -> None:  # fmt: skip
         self.noise = noise
         self.present = [np.isfinite(y) for y in measured]
         self._mix = [self._across(p, g, u) for p, g, u in zip(self.present, sensitivity, command, strict=True)]
         self._memory = [self._along(p) for p in self.present]
+        self.heard = [self._heard(k, G) for k, G in enumerate(taut or sensitivity)]
 
     def _across(self, present: np.ndarray, G: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         change = np.abs(np.diff(command, axis=0, prepend=command[:1], append=command[-1:]))  # (n + 1, t)
@@ -75,10 +85,18 @@ class Whitener:
         core = np.einsum("nij,nj,nkj->nik", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
         return A, core
 
+    def _heard(self, k: int, G: np.ndarray) -> np.ndarray:
+        a = self.noise.drive * G / self.noise.sigma[:, None] * self.present[k][:, :, None]
+        A, core = self._mix[k]
+        white = a + np.einsum("nmt,nts,nls,nlr->nmr", A, core, A, a, optimize=True)
+        _, decay, scale = self._memory[k]
+        return np.einsum("nm,nmt,nmt->nt", (1.0 + decay**2) * scale**2, white, white)
+
     def of(self, which: Sequence[int]) -> Whitener:
         """The same of some of its trials alone, by their positions."""
         part = copy(self)
-        part.present, part._mix, part._memory = ([x[k] for k in which] for x in (self.present, self._mix, self._memory))
+        for name in ("present", "heard", "_mix", "_memory"):
+            setattr(part, name, [getattr(self, name)[k] for k in which])
         return part
 
     def trial(self, k: int, r: np.ndarray) -> np.ndarray:

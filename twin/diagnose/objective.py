@@ -10,6 +10,7 @@ import numpy as np
 from twin.bench import Bench
 from twin.calibrate import Evaluation, Model, Objective, fit
 from twin.diagnose.diagnosis import Settings
+from twin.diagnose.thresholds import PUSHED
 from twin.effects import Drive
 from twin.evaluate import TYPICAL
 from twin.residual import Noise, Whitener, estimate_noise
@@ -27,9 +28,24 @@ def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings
     rough_fit = Objective(bench, fitted, Whitener(first, measured, none, command), settings.jobs)
     start = fit(rough_fit, Model.base(twin.robot, twin), tolerance=1e-3)
     unmeasured = rough_fit.predict(start.model.twin, start.evaluation.traces)[1]
-    G = sensitivity(bench, fitted, start.model.twin, unmeasured, start.evaluation.traces)
+    taut = sensitivity(_unslackened(bench), fitted, start.model.twin, unmeasured, start.evaluation.traces)
+    G = [g * _felt(bench, k)[:, None, :] for g, k in zip(taut, fitted, strict=True)]
     noise, notes = estimate_noise(bench, fitted, start.evaluation.raw, G)
-    return start.model, Objective(bench, fitted, Whitener(noise, measured, G, command), settings.jobs), notes
+    return start.model, Objective(bench, fitted, Whitener(noise, measured, G, command, taut), settings.jobs), notes
+
+
+def _unslackened(bench: Bench) -> Bench:
+    """With no reading of a tension below zero: every tendon answers to more of it."""
+    pulled = bench.driven_by(Drive.TENSION)
+    return replace(
+        bench, inputs=tuple(replace(i, command=np.where(pulled, np.maximum(i.command, 0.0), i.command)) for i in bench.inputs)
+    )
+
+
+def _felt(bench: Bench, k: int) -> np.ndarray:
+    """(n_k, n_tendon) of a step in a reading, that of `sensitivity`, the share that makes a tendon pull: none far below zero."""
+    below = np.clip(1.0 + bench.inputs[k].command / (PUSHED * bench.reading), 0.0, 1.0)
+    return np.where(bench.driven_by(Drive.TENSION), below, 1.0)
 
 
 def noise_under(objective: Objective, found: Evaluation) -> Noise:
@@ -62,7 +78,7 @@ def sensitivity(
         averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * memory(bench.robot.springs(bench.n_tendon)))))
         felt = np.where(bench.driven_by(Drive.CURRENT), averaged, felt)
     for t in range(bench.n_tendon):
-        step = 2.0 * bench.reading[t]
+        step = PUSHED * bench.reading[t]
         push = step * np.eye(bench.n_tendon)[t]
         moved = replace(bench, inputs=tuple(replace(i, command=i.command + push) for i in bench.inputs))
         traces = simulate(twin, moved, trials=trials, way=Way(near or {}))

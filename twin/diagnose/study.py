@@ -35,6 +35,12 @@ class Study:
         """The residual in sigmas of its sensors, not made white (n,); zero where nothing was measured."""
         return np.concatenate([np.nan_to_num(r / self.objective.whitener.noise.sigma).ravel() for r in fit.evaluation.raw])
 
+    def unheard(self, fit: Fit) -> float:
+        """What the fitted trials' |z|^2 lacks of the readings' noise because the law lets tendons fall slack (`Whitener.heard`)."""
+        traces = fit.evaluation.traces
+        slack = (traces[k].true.tension <= 0.0 for k in self.trials)
+        return float(sum(h[s].sum() for h, s in zip(self.objective.whitener.heard, slack, strict=True)))
+
     def fall(self, before: Fit, after: Fit) -> np.ndarray:
         """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""
         of = [o.group for o in self.bench.outputs]

@@ -178,6 +178,10 @@ FAINT = _row(
 
 # ---- evidence ----------------------------------------------------------------------------------------------------------------
 
+PUSHED = _row(
+    "PUSHED", 2.0, "readings' noise", "how far a reading is moved to see what it does: larger than rounding, smaller than a bend",
+    "judgement",
+)  # fmt: skip
 SHORT, MIDDLE, LONG = (
     _row(f"MEMORY_{n}", tau, "s", "the recent past that a relaxation may leave, a factor of four apart", "judgement")
     for n, tau in enumerate((2.0, 8.0, 30.0))

@@ -17,7 +17,8 @@ from twin.errors import SolveError
 
 @dataclass(frozen=True)
 class Weighed:
-    """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, up to a constant."""
+    """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, less the noise of
+    readings that slack tendons do not hear (`Study.unheard`), up to a constant."""
 
     fit: Fit
     score: float
@@ -32,7 +33,8 @@ class Weighed:
 def weigh(study: Study, fitted: Fit) -> Weighed:
     gain, discrepancy = study.evidence.log_likelihood_gain(fitted.z)
     prior = fitted.cost - float(fitted.z @ fitted.z)
-    return Weighed(fitted, gain - prior - fitted.effective_parameters() * float(np.log(study.objective.n)), discrepancy)
+    size = fitted.effective_parameters() * float(np.log(study.objective.n))
+    return Weighed(fitted, gain - study.unheard(fitted) - prior - size, discrepancy)
 
 
 def extended(study: Study, member: Weighed, effect: str, start: Start, beat: float = np.inf) -> Weighed | None:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from twin.effects.effect import Effect
+from twin.effects.effect import Effect, Signals, Start
 from twin.quantities import Parameter
 
 SOFTEST = 0.05  # of the stiffness at first: what is left of a body that is all but broken
+LEVELLED = 3.0  # times over which a session's change may have levelled off by its end
 
 
 class BackboneAgeing(Effect):
-    """Stiffness K(t) = K_0 (1 - rate t), t the time since the first trial; a negative rate stiffens (curing, hardening by work).
+    """Stiffness K(t) = K_0 (1 - rate (1 - exp(-levelling t)) / levelling), t the time since the first trial: at first by `rate`,
+    and ever less, to K_0 (1 - rate / levelling); without levelling K_0 (1 - rate t). A negative rate stiffens (curing, hardening
+    by work).
 
-    Source: first-order Taylor expansion. Superelastic NiTi loses plateau stress over its first hundred cycles (functional fatigue),
-    filled silicone softens while it is worked (Mullins effect).
+    Source: superelastic NiTi loses plateau stress over its first hundred cycles, by ever less (functional fatigue); filled silicone
+    softens while it is worked, towards what it then keeps (Mullins effect). That both go with cycles, evenly made, is assumed.
 
     >>> BackboneAgeing(rate=1e-5).soften(np.zeros(2), np.array([0.0, 3600.0])).round(3).tolist()
     [1.0, 0.964]
+    >>> BackboneAgeing(rate=1e-4, levelling=1e-3).soften(np.zeros(2), np.array([1.0, 36000.0])).round(4).tolist()
+    [0.9999, 0.9]
     """
 
     id = "backbone_ageing"
@@ -26,15 +33,27 @@ class BackboneAgeing(Effect):
             "rate",
             0.0,
             "1/s",
-            -2e-4,
-            2e-4,
-            "functional fatigue, Mullins effect: some 10 % an hour; half of it is past any use",
+            -2e-3,
+            2e-3,
+            "functional fatigue, Mullins effect: some 10 % an hour; as much in minutes where it levels off",
             scale=3e-6,
         ),
+        Parameter("levelling", 0.0, "1/s", 0.0, 2e-2, "the first cycles: from a minute's to an hour's", scale=1e-4),
     )
-    guesses = ({"rate": 1e-5},)
+    shape = ("levelling",)
     needs = frozenset({"elasticity"})
     moves_with = "the time of day"
 
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """All through the session alike, and levelled off by its end."""
+        yield Start({"rate": 1e-5}, ("rate",))
+        session = max(float(s.clock.max(initial=0.0)) for s in predicted)
+        if session > 0.0:
+            levelling = min(LEVELLED / session, cls.parameters[1].high)
+            yield Start({"rate": 1e-5 * LEVELLED, "levelling": levelling}, ("rate", "levelling"))
+
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
-        return np.maximum(SOFTEST, 1.0 - self["rate"] * clock)
+        levelling = self["levelling"]
+        gone_on = -np.expm1(-levelling * clock) / levelling if levelling > 0.0 else clock
+        return np.maximum(SOFTEST, 1.0 - self["rate"] * gone_on)
