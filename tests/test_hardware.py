@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tools.comparisons import cable_runs
 from tools.comparisons import cable_tool as comparison
@@ -71,6 +72,25 @@ def test_sweeps_of_the_three_cable_robot_rise_with_one_cable_and_stay_in_their_b
         assert 0.0 <= pulls.min() <= pulls.max() <= 0.0101  # m: 10 mm of cable
         assert (pulls[0] == 0).all() == trial.name.startswith("block1")
     prepare(recording, load("three_cable"))
+
+
+def test_a_camera_that_moved_is_registered_by_four_sweeps_and_judged_by_the_others() -> None:
+    """Turned and shifted tips leave nothing; one sweep 3 mm off leaves that over the root of the sweeps judged, and where it is one
+    of the four it leaves less on more of them."""
+    rng = np.random.default_rng(11)
+    tips = [rng.normal(size=(30, 3)) for _ in range(7)]
+    turn = Rotation.from_rotvec([0.4, -1.0, 2.0])
+    seen = [turn.apply(t) + np.array([0.1, 0.2, -0.3]) for t in tips]
+    assert sweeps._off(tips, seen, (0, 2, 3, 6)) == pytest.approx(0.0, abs=1e-9)
+    seen[5] = seen[5] + np.array([0.0, 0.0, 3e-3])
+    assert sweeps._off(tips, seen, (0, 2, 3, 6)) == pytest.approx(3.0 / np.sqrt(3.0))
+    assert 0.3 < sweeps._off(tips, seen, (0, 2, 3, 5)) < 1.5
+    every = sweeps.ways(7)
+    assert every[0] == (0, 1, 2, 3)
+    assert len(set(every)) == len(every) == 35
+    drawn = sweeps.ways(20)
+    assert (drawn[0], len(drawn), drawn) == ((0, 1, 2, 3), sweeps.WAYS + 1, sweeps.ways(20))
+    assert all(len(set(way)) == sweeps.REGISTERED for way in drawn)
 
 
 def test_a_sweep_ends_before_the_camera_flickers() -> None:
