@@ -6,7 +6,7 @@ curvature that varies along the body, another pre-sliding, a gap instead of a wa
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
@@ -155,6 +155,21 @@ def test_ageing_that_levels_off_is_found_with_the_rate_at_which_it_does(bench: D
     assert law["levelling"] == pytest.approx(1.0 / 600.0, rel=0.15)
     assert law["rate"] / law["levelling"] == pytest.approx(1.0 - 1.0 / 1.2, rel=0.1)
     assert float(np.mean(aged.fit.z[aged.fit.z != 0] ** 2)) < 1.15
+
+
+def test_an_effect_that_a_robot_is_known_to_have_is_calibrated(bench: Day) -> None:
+    """Cells described as off by 0.2 N either way, found with the robot's own numbers: as near as they are found as an effect."""
+    recording, truth = bench("load_cell_bias", STRENGTH["load_cell_bias"])
+    plain, law = load("continuum"), catalogue()["load_cell_bias"]
+    believed = tuple(("load_cell_bias", replace(p, std=0.2)) for p in law.declared(3))
+    robot = replace(plain, effects=(("load_cell_bias", law({}, 3).values),), uncertain=believed)
+    prepared = prepare(recording, robot)
+    start, objective, _ = objective_of(prepared, Twin.of(robot), list(range(len(prepared.inputs))), Settings())
+    found = fit(objective, start, refresh=True)
+    true, got, tolerance = COMPARED["load_cell_bias"](truth, found.model.twin.effects[0].values)
+    assert distance(true, got) < tolerance
+    assert float(np.mean(found.z[found.z != 0] ** 2)) < 1.15
+    assert set(found.fitted("load_cell_bias")) == {"bias_1", "bias_2", "bias_3"}
 
 
 def test_every_effect_of_the_catalogue_is_compared() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from twin.body import Problem
+from twin.calibrate import Model
 from twin.effects import Loads, Route, catalogue
 from twin.equilibrium import Equilibrium
 from twin.errors import DataError, UnknownNameError
@@ -199,6 +200,11 @@ LEAKY = {
     "gravity in a plane": ("value = [0.0, 0.0, 9.81]", "value = [0.0, 9.81]", "gravity"),
     "an accuracy in words": ("value = 0.01\n", 'value = "good"\n', "accuracy"),
     "an effect nobody wrote": ("[gravity]", '[[effect]]\nid = "tendon_frictoin"\n[gravity]', "tendon_frictoin"),
+    "an effect's spread of nothing": (
+        "[gravity]",
+        '[[effect]]\nid = "tip_payload"\nparameters = { mass = { value = 2, unit = "g", std = 0 } }\n[gravity]',
+        "std is 0",
+    ),
 }
 
 
@@ -207,6 +213,25 @@ def test_any_other_broken_file_is_named_too(case: str, tmp_path: Path) -> None:
     old, new, said = LEAKY[case]
     with pytest.raises(DataError, match=rf"(?s)mine.robot\.toml.*{said}"):
         Twin.of(load("mine", relative_to=broken(tmp_path, old, new).parent)).robot.build().spec.compile()
+
+
+def test_of_an_effect_the_robot_has_what_is_uncertain_is_free_with_the_robots_own(tmp_path: Path) -> None:
+    """A gap of 0.2 mm, give or take 0.1; over which travel it swaps is stated. What a robot has for certain is not fitted."""
+    laws = """[[effect]]
+id = "tendon_backlash"
+parameters = { gap = { value = 0.2, unit = "mm", std = 0.1 }, swap = { value = 0.1, unit = "mm" } }
+[[effect]]
+id = "tip_payload"
+parameters = { mass = 0.002 }
+[gravity]"""
+    robot = load("mine", relative_to=broken(tmp_path, "[gravity]", laws).parent)
+    ((identifier, gap),) = robot.uncertain
+    assert (identifier, gap.name) == ("tendon_backlash", "gap")
+    assert (gap.value, gap.std) == pytest.approx((2e-4, 1e-4))
+    base = Model.base(robot)
+    assert [f.label for f in base.free] == [*(p.name for p in robot.nuisance), "tendon_backlash.gap"]
+    assert base.value(base.free[-1]) == pytest.approx(2e-4)
+    assert [f.effect for f in Model.base(robot, Twin(robot)).free] == [None] * len(robot.nuisance), "a twin without it"
 
 
 def test_an_unknown_robot_lists_those_there_are() -> None:

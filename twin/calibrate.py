@@ -60,8 +60,11 @@ class Model:
 
     @staticmethod
     def base(robot: Robot, twin: Twin | None = None) -> Model:
-        """The robot as described with its nuisance parameters free."""
-        return Model(twin or Twin.of(robot), tuple(Free(None, p) for p in robot.nuisance))
+        """The robot as described with its nuisance parameters free, and what is uncertain of the effects it is known to have."""
+        twin = twin or Twin.of(robot)
+        known = {e.id for e in twin.effects}
+        free = (*(Free(None, p) for p in robot.nuisance), *(Free(e, p) for e, p in robot.uncertain if e in known))
+        return Model(twin, free)
 
     def value(self, free: Free) -> float:
         if free.effect is None:

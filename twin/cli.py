@@ -241,7 +241,7 @@ def _fitted_table(fitted: Fit) -> Table:
     table = Table("parameter", "value", "standard error", "described", "unit", "")
     rows = []
     free = zip(fitted.model.free, fitted.std(), fitted.at_bound(), strict=True)
-    for p, f, error, bound in ((f.parameter, fitted.model.value(f), s, b) for f, s, b in free if f.effect is None):
+    for label, p, f, error, bound in ((f.label, f.parameter, fitted.model.value(f), s, b) for f, s, b in free):
         away = abs(f - p.value) / p.std if p.std else 0.0
         doubt = "at a bound" if bound else f"{away:.1f} std away" if away > FAR else ""
         cells = (as_written(p, f), spread_as_written(p, error), as_written(p, p.value))
@@ -249,9 +249,9 @@ def _fitted_table(fitted: Fit) -> Table:
             (
                 not bound,
                 -away if doubt else 0.0,
-                p.name,
+                label,
                 *(f"{x:.{n}g}" for x, n in zip(cells, (6, 2, 6), strict=True)),
-                p.written,
+                p.written or p.unit,
                 doubt,
             )
         )

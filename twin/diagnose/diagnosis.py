@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -105,4 +106,5 @@ class Diagnosis:
     settings: Settings
     scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
     untried: tuple[str, ...] = ()  # sets of effects for which the budget left no time
+    described: Mapping[str, dict[str, Fitted]] = field(default_factory=dict)  # effects the robot is known to have, as fitted
     under_hand: UnderHand | None = None  # None where no trial shows the shape of a robot that a hand bends

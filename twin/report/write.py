@@ -28,7 +28,8 @@ def write(diagnosis: Diagnosis, folder: Path | str, provenance: Mapping[str, Any
         "report.json": json.dumps(contents(diagnosis, provenance), indent=2, allow_nan=False) + "\n",
         "report.html": page(diagnosis, provenance),
     }
-    table = twin_table(diagnosis.twin, folder, diagnosis.parameters, {c.effect: c.parameters for c in diagnosis.claims})
+    effects = {**diagnosis.described, **{c.effect: c.parameters for c in diagnosis.claims}}
+    table = twin_table(diagnosis.twin, folder, diagnosis.parameters, effects)
     parts = {name: folder / f".{name}.part" for name in (*texts, "twin.toml")}
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pydantic import Field
@@ -49,6 +50,20 @@ def read_effects(entries: Sequence[object], n_tendon: int, problems: list[str]) 
         if len(problems) == before:
             found.append(law(values, n_tendon))
     return found
+
+
+def read_uncertain(entries: Sequence[object], effects: Sequence[Effect]) -> tuple[tuple[str, Parameter], ...]:
+    """Of the effects as they were read from these entries, the parameters whose std is given: what is believed of each, SI, beside
+    its effect's identifier."""
+    found = []
+    for entry, law in zip(entries, effects, strict=True):
+        table = EffectTable.model_validate(entry).parameters
+        for parameter in law.declared(law.n_tendon):
+            written = table.get(parameter.name)
+            if isinstance(written, Mapping) and written.get("std") is not None:
+                std = difference_scale(str(written["unit"]), parameter.unit).to_si(number(written["std"]))
+                found.append((law.id, replace(parameter, value=law[parameter.name], std=float(std))))
+    return tuple(found)
 
 
 def read_values(table: Mapping[str, object], declared: Sequence[Parameter], where: str, problems: list[str]) -> dict[str, float]:

@@ -17,7 +17,7 @@ from twin.forms import Form, Line, fill
 from twin.hinges import HingeChain
 from twin.measurements.files import is_file, read_text
 from twin.quantities import Parameter, Values, overrides
-from twin.robots.effect_tables import read_effects
+from twin.robots.effect_tables import read_effects, read_uncertain
 from twin.robots.family import family
 from twin.robots.schema import GRAVITY, Fact, Quantity, Row, Schema, Structure, absent, parameters, unknown
 from twin.robots.toml_file import LARGEST, checked
@@ -34,7 +34,8 @@ class Robot:
     """A described robot; nothing in it is hidden in code. One read anew is another one.
 
     `parameters` hold SI values; those with a `std` are uncertain in a built robot (the nuisance parameters). `effects` are
-    the laws the robot is known to have: (identifier, parameter values). `accuracy` is the description's own error,
+    the laws the robot is known to have: (identifier, parameter values); `uncertain` those of their parameters that have a `std`,
+    which are fitted with the robot's own. `accuracy` is the description's own error,
     m of its markers or rad of its jaw.
     """
 
@@ -47,6 +48,7 @@ class Robot:
     gravity: np.ndarray  # (3,) m/s^2
     accuracy: float
     effects: tuple[tuple[str, Values], ...] = ()
+    uncertain: tuple[tuple[str, Parameter], ...] = ()
 
     @property
     def n_tendon(self) -> int:
@@ -145,7 +147,7 @@ class RobotFile(Form):
         description="value = [x, y, z] in the base frame, unit, source; a measurement set may say otherwise"
     )
     accuracy: dict[str, Any] = Field(description="value, unit, source: the description's own error; no smaller effect is claimed")
-    effect: list[Any] = Field([], description="laws the robot is known to have, as in twin.toml")
+    effect: list[Any] = Field([], description="laws the robot is known to have, as in twin.toml; a std makes a parameter uncertain")
 
 
 def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
@@ -179,6 +181,7 @@ def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
         gravity=pull,
         accuracy=accuracy[0].value,
         effects=tuple((e.id, e.values) for e in effects),
+        uncertain=read_uncertain(file.effect, effects),
     )
 
 
