@@ -172,6 +172,9 @@ def test_any_runs_of_the_cable_tool_are_told_by_what_was_measured_and_loads_not_
         _, other, _, loop = cable_runs.judged(replace(every[cable_tool.TOOL], trials=steady), chosen)
         assert other.aimed
         assert loop.met
+        assert "not told" not in loop.measured
+    *_, loop = cable_runs.judged(every[cable_tool.TOOL], {30, 40})
+    assert "not told, 20 %" in loop.measured, "of what is soft near no load loops from 30 % on say little"
 
 
 def test_a_loop_is_as_wide_as_it_was_made() -> None:
