@@ -105,7 +105,8 @@ def _set() -> str:
 
 def _twin() -> str:
     text = """
-A parameter is a number in SI, or `{ value = ..., unit = "...", std = ... }`; `std` is its standard error, for people. An effect is
+A parameter is a number in SI, or `{ value = ..., unit = "...", std = ... }`; `std` is its standard error, for people; in a
+robot's file what is believed of it, and it is fitted with the robot's own. An effect is
 `id` and `parameters`; `twin effects` lists them.
 """
     return "\n## twin.toml\n\n" + _keys(TwinFile) + text
