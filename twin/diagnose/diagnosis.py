@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -78,7 +77,7 @@ class Diagnosis:
     claims: tuple[Claim, ...]
     runners_up: tuple[Claim, ...]
     below_materiality: tuple[Claim, ...]
-    parameters: dict[str, Fitted]
+    parameters: dict[str, Fitted]  # the robot's own, and as "effect.parameter" what was uncertain of effects it is known to have
     unfixed: tuple[str, ...]
     correlation: tuple[tuple[str, ...], np.ndarray]  # of the errors of what was fitted, by its labels
     errors: Errors
@@ -106,5 +105,4 @@ class Diagnosis:
     settings: Settings
     scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
     untried: tuple[str, ...] = ()  # sets of effects for which the budget left no time
-    described: Mapping[str, dict[str, Fitted]] = field(default_factory=dict)  # effects the robot is known to have, as fitted
     under_hand: UnderHand | None = None  # None where no trial shows the shape of a robot that a hand bends

@@ -131,8 +131,7 @@ def _reported(
         below_materiality=tuple(
             Claim(s.effect, s.fitted.fit.fitted(s.effect), float("nan"), 0.0, s.contribution) for s in found.gated.small
         ),
-        parameters=final.fit.fitted(None),
-        described={e: final.fit.fitted(e) for e, _ in bench.robot.uncertain},
+        parameters={**final.fit.fitted(None), **{f"{e}.{p.name}": final.fit.fitted(e)[p.name] for e, p in bench.robot.uncertain}},
         unfixed=tuple(final.fit.unfixed()),
         correlation=final.fit.correlation(),
         errors=opened.errors(settings.seed),

@@ -54,7 +54,7 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
             {"id": c.effect, "parameters": _parameters(c.parameters), "contribution": finite(c.contribution)}
             for c in d.below_materiality
         ],
-        "parameters": _parameters({**d.parameters, **{f"{e}.{n}": f for e, of in d.described.items() for n, f in of.items()}}),
+        "parameters": _parameters(d.parameters),
         "unfixed": list(d.unfixed),
         "correlation": _correlation(*d.correlation),
         "noise": _noise(d),

@@ -28,7 +28,9 @@ def write(diagnosis: Diagnosis, folder: Path | str, provenance: Mapping[str, Any
         "report.json": json.dumps(contents(diagnosis, provenance), indent=2, allow_nan=False) + "\n",
         "report.html": page(diagnosis, provenance),
     }
-    effects = {**diagnosis.described, **{c.effect: c.parameters for c in diagnosis.claims}}
+    effects = {c.effect: c.parameters for c in diagnosis.claims}
+    for effect, p in diagnosis.bench.robot.uncertain:
+        effects.setdefault(effect, {})[p.name] = diagnosis.parameters[f"{effect}.{p.name}"]
     table = twin_table(diagnosis.twin, folder, diagnosis.parameters, effects)
     parts = {name: folder / f".{name}.part" for name in (*texts, "twin.toml")}
     try:

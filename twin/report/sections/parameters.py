@@ -1,4 +1,5 @@
-"""The robot's own parameters after calibration, beside its description; and those the data do not fix."""
+"""The robot's own parameters, and those of effects it is known to have, after calibration, beside their description; and those the
+data do not fix."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ from twin.report.sections.section import Section, Story
 
 def section(story: Story) -> Section:
     d = story.diagnosis
-    declared = {p.name: p for p in d.bench.robot.parameters}
+    robot = d.bench.robot
+    declared = {p.name: p for p in robot.parameters} | {f"{e}.{p.name}": p for e, p in robot.uncertain}
     shown = {name: friendly(fitted) for name, fitted in d.parameters.items()}
     decimals: dict[str, int] = {}
     for name, f in shown.items():
