@@ -289,6 +289,13 @@ def test_the_noise_is_read_from_a_first_rough_fit(plan: Bench, monkeypatch: pyte
     assert noise == ("left", G)
 
 
+def test_a_length_below_zero_is_paid_out_and_felt_as_any(plan: Bench) -> None:
+    paid_out = tuple(replace(i, drives=(Drive.DISPLACEMENT,) * 3, command=i.command - 5.0) for i in plan.inputs[:2])
+    bench = replace(plan, inputs=paid_out, measured=plan.measured[:2])
+    assert np.all(objective._felt(bench, 0) == 1.0)
+    np.testing.assert_array_equal(objective._unslackened(bench).inputs[1].command, paid_out[1].command)
+
+
 # ---- look -------------------------------------------------------------------------------------------------------------------
 
 
