@@ -150,9 +150,12 @@ def test_two_rigs_and_laws_at_their_limit_are_said_in_words_and_as_notices(monke
 def test_a_smooth_error_on_trials_left_out_is_said_above_both_bars(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch)
     assert BARS.left > MUCH
+    world.verdict = "partly_explained"
     for unseen, said in ((0.5, ""), (0.51, " unlike 0.51 0.7.")):
         world.unseen = unseen
         assert world.said().words == f"Structure. where. since.{said}"
+    world.verdict = "unexplained"
+    assert world.said().words == "Structure. where. since.", "nothing was found that could hold there or not"
 
 
 def test_what_is_neither_smooth_nor_noise_is_said_above_both_bars(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,3 +170,5 @@ def test_the_runner_up_is_said_with_the_share_it_takes_off_the_error_left_out(mo
     world = World(monkeypatch)
     world.runners = [SimpleNamespace(effect="drift", beside=("creep",)), SimpleNamespace(effect="tilt", beside=())]
     assert world.said().words == "Structure. where. since. nearest drift+creep 0.50."
+    world.doubts = [SimpleNamespace(effect="drift", rival="bias")]
+    assert "nearest" not in world.said().words, "one of two that explain it is no near miss"

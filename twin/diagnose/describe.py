@@ -47,6 +47,7 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
         words = f"What is left looks like noise (smooth part {final.discrepancy.size:.2f} sigma)."
     else:
         words = _left(study, found, judged, bars, strongest[0][0])
+        words += "" if gated.doubts else _hint(study, found, judged)  # what is in doubt explains more, and is said below
     words += "".join(undecided(d.effect, d.rival) for d in gated.doubts)
     z = final.fit.z.reshape(final.discrepancy.mean.shape)
     rebuilt = (mixed(study.bench, judged.rigs).strip(),) if judged.rigs else ()
@@ -82,11 +83,16 @@ def _left(study: Study, found: Search, judged: Judgement, bars: Thresholds, stro
     words += since(bench, trials, found.base.fit.z.reshape(shape))
     words += mixed(bench, judged.rigs) if judged.rigs else ""
     words += "".join(f" The {limit}." for limit in signs.strained)
-    words += unlike(signs.unseen, final.discrepancy.size) if signs.unseen > max(MUCH, bars.left) else ""
-    if judged.runners_up:
-        first = judged.runners_up[0]
-        effects = tuple(sorted((first.effect, *first.beside)))
-        runner = next(w for w in found.all if w.effects == effects)
-        share = 1.0 - float(np.sqrt(left_out(study, runner.fit).headline / left_out(study, final.fit).headline))
-        words += nearest((first.effect, *first.beside), share)
-    return words
+    found_something = judged.verdict == "partly_explained"
+    return words + (unlike(signs.unseen, final.discrepancy.size) if found_something and signs.unseen > max(MUCH, bars.left) else "")
+
+
+def _hint(study: Study, found: Search, judged: Judgement) -> str:
+    """The runner-up, with the share it takes off the error left out."""
+    if not judged.runners_up:
+        return ""
+    first = judged.runners_up[0]
+    effects = tuple(sorted((first.effect, *first.beside)))
+    runner = next(w for w in found.all if w.effects == effects)
+    share = 1.0 - float(np.sqrt(left_out(study, runner.fit).headline / left_out(study, judged.final.fit).headline))
+    return nearest((first.effect, *first.beside), share)
