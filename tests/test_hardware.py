@@ -75,8 +75,8 @@ def test_sweeps_of_the_three_cable_robot_rise_with_one_cable_and_stay_in_their_b
 
 
 def test_a_camera_that_moved_is_registered_by_four_sweeps_and_judged_by_the_others() -> None:
-    """Turned and shifted tips leave nothing; one sweep 3 mm off leaves that over the root of the sweeps judged, and where it is one
-    of the four it leaves less on more of them."""
+    """Turned and shifted tips leave nothing; one sweep 3 mm off leaves that over the root of the sweeps judged; where it is one
+    of the four it shifts the camera by a quarter of that on all others, and turns it a little."""
     rng = np.random.default_rng(11)
     tips = [rng.normal(size=(30, 3)) for _ in range(7)]
     turn = Rotation.from_rotvec([0.4, -1.0, 2.0])
@@ -84,7 +84,7 @@ def test_a_camera_that_moved_is_registered_by_four_sweeps_and_judged_by_the_othe
     assert sweeps._off(tips, seen, (0, 2, 3, 6)) == pytest.approx(0.0, abs=1e-9)
     seen[5] = seen[5] + np.array([0.0, 0.0, 3e-3])
     assert sweeps._off(tips, seen, (0, 2, 3, 6)) == pytest.approx(3.0 / np.sqrt(3.0))
-    assert 0.3 < sweeps._off(tips, seen, (0, 2, 3, 5)) < 1.5
+    assert sweeps._off(tips, seen, (0, 2, 3, 5)) == pytest.approx(3.0 / 4.0, rel=0.1)
     every = sweeps.ways(7)
     assert every[0] == (0, 1, 2, 3)
     assert len(set(every)) == len(every) == 35
@@ -175,6 +175,7 @@ def test_any_runs_of_the_cable_tool_are_told_by_what_was_measured_and_loads_not_
         assert "not told" not in loop.measured
     *_, loop = cable_runs.judged(every[cable_tool.TOOL], {30, 40})
     assert "not told, 20 %" in loop.measured, "of what is soft near no load loops from 30 % on say little"
+    assert loop.met is None, "what is not told is not met"
 
 
 def test_a_loop_is_as_wide_as_it_was_made() -> None:

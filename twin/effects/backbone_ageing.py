@@ -55,5 +55,5 @@ class BackboneAgeing(Effect):
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
         levelling = self["levelling"]
-        gone_on = -np.expm1(-levelling * clock) / levelling if levelling > 0.0 else clock
-        return np.maximum(SOFTEST, 1.0 - self["rate"] * gone_on)
+        aged = -np.expm1(-levelling * clock) / levelling if levelling > 0.0 else clock
+        return np.maximum(SOFTEST, 1.0 - self["rate"] * aged)
