@@ -91,13 +91,16 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return said
 
 
-def judged(best: Any, *others: Any, small: tuple[str, ...] = (), doubts: tuple[Any, ...] = ()) -> Any:
+def judged(
+    best: Any, *others: Any, small: tuple[str, ...] = (), doubts: tuple[Any, ...] = (), settled: tuple[Any, ...] = ()
+) -> Any:
     base = weighed(BASE, -400.0, cost=1000.0, size=2.0)
     ranked = tuple(sorted((base, best, *others), key=lambda w: -w.score))
     sizes = {"friction": 1.0, "creep": 3.0}
     gated = SimpleNamespace(
         best=best,
         doubts=doubts,
+        settled=settled,
         small=tuple(SimpleNamespace(effect=e) for e in small),
         contribution=lambda study, e: sizes.get(e, 0.0),
     )
@@ -173,27 +176,16 @@ def test_no_second_robot_is_seen_where_one_of_two_effects_explains_as_much(stage
     assert judged(base, doubts=(doubt,)).rigs is staged["rigs"]
 
 
-def test_what_stands_beside_either_of_two_that_data_cannot_tell_apart_is_claimed(
-    staged: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Alone it leaves much, which is the one's or the other's. Not so where one of the two explains nothing, or does without it."""
-    alone = replace(CLEAN, after=1.5, halved=False)
-    left = {BASE: alone, FRICTION: alone, BOTH: CLEAN, ("delay", "friction"): replace(CLEAN, after=0.03), ("creep", "delay"): CLEAN}
-    monkeypatch.setattr(stage, "look", lambda study, base, best, bars: left[best.effects])
-
-    def beside(other: tuple[str, ...]) -> Any:
-        return judged(weighed(FRICTION, -50.0), doubts=(SimpleNamespace(found=weighed(BOTH, 0.0), other=weighed(other, -5.0)),))
-
-    found = beside(("delay", "friction"))
-    assert (found.verdict, [c.effect for c in found.claims], found.final.effects) == ("partly_explained", ["friction"], FRICTION)
-    assert found.claims[0].probability > 0.99  # what it leaves alone has a cause that is known but for its name
-    assert found.signs.after == 1.5
-    assert beside(("creep", "delay")).verdict == "unexplained"
-    assert judged(weighed(FRICTION, -50.0)).verdict == "unexplained"
-    left["delay", "friction"] = replace(CLEAN, after=0.5)
-    assert (beside(("delay", "friction")).verdict, beside(("delay", "friction")).claims) == ("unexplained", ())
-    left["delay", "friction"], staged["rigs"] = CLEAN, SimpleNamespace(fall=1e4)
-    assert beside(("delay", "friction")).verdict == "unexplained"
+def test_the_likelier_of_two_that_data_cannot_tell_apart_leaves_both_sets_ambiguous(staged: dict[str, Any]) -> None:
+    """And the experiment that is asked for lies between the two, also where a third set has more evidence than the rival's."""
+    best, other = weighed(BOTH, 0.0), weighed(("delay", "friction"), -20.0)
+    doubt = SimpleNamespace(found=best, other=other)
+    found = judged(best, other, weighed(DELAY, -11.0), settled=(doubt,))
+    assert (found.verdict, [c.effect for c in found.claims]) == ("explained", ["creep", "friction"])
+    assert found.ambiguous == (BOTH, ("delay", "friction"), DELAY)
+    assert found.between == (best, other)
+    creep = next(c for c in found.claims if c.effect == "creep")
+    assert creep.probability == pytest.approx(1.0 / (1.0 + np.exp(-1.0) + np.exp(-0.55)))  # a factor e for 20 of score
 
 
 def test_effects_that_do_worse_on_trials_left_out_count_nothing(staged: dict[str, Any]) -> None:

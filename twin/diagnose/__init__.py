@@ -8,6 +8,7 @@ screen.py      what each effect would do, what noise alone would show, what the 
 search.py      beam search over sets of effects
 choose.py      the set that predicts trials left out
 gate.py        what is too small, or cannot be told apart
+settle.py      of two that cannot be told apart the likelier, where one of them is there
 judge.py       the verdict, the claims, how sure they are
 describe.py    what is left, in words
 seal.py        the error on trials that neither fit nor choice has seen

@@ -37,12 +37,13 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Gated:
-    """What stays, its refits with one effect dropped, and what did not pass."""
+    """What stays, its refits with one effect dropped, and what did not pass; the doubts of which `settle` took the likelier."""
 
     best: Weighed
     without: dict[str, Weighed] = field(default_factory=dict)
     small: tuple[Small, ...] = ()
     doubts: tuple[Doubt, ...] = ()
+    settled: tuple[Doubt, ...] = ()
 
     def contribution(self, study: Study, effect: str) -> float:
         return contribution(study, self.best, self.without[effect])

@@ -70,22 +70,19 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     signs = look(study, base, best, bars)
     apart = rigs(study.bench, study.trials, base.fit)
     # What effects explain needs no second robot, also where data cannot tell which of two it is.
-    least = min(w.fit.cost for w in (best, *(w for d in gated.doubts for w in (d.found, d.other))))
-    if apart is not None and apart.fall < base.fit.cost - least:
+    alike = [w for d in (*gated.settled, *gated.doubts) for w in (d.found, d.other)]
+    if apart is not None and apart.fall < base.fit.cost - min(w.fit.cost for w in (best, *alike)):
         apart = None
     said = "unexplained" if apart else verdict(bool(added), signs, bars)
-    either = _with_either(study, base, gated, added, bars) if said == "unexplained" and not apart else None
-    said = "partly_explained" if either else said
     if said in ("noise", "unexplained") and best is not base:
         after, unseen = base.discrepancy.size, left_out(study, base.fit).structure
         signs = replace(signs, after=after, unseen=unseen, quick=quick(study, base), strained=())
         best, added = base, ()
-    claims = _claims(study, found, gated, best, added, either or signs, bars)
+    claims = _claims(study, found, gated, best, added, signs, bars)
     doubtful = unsure(claims) if said == "explained" else ()
     said = "partly_explained" if doubtful else said
     runners = _runners_up(found, gated, () if said == "unexplained" else added)
-    doubts = tuple(w.effects for d in gated.doubts for w in (d.found, d.other))
-    ambiguous = tuple(dict.fromkeys((*doubts, *_as_good(found, gated, best))))
+    ambiguous = tuple(dict.fromkeys((*(w.effects for w in alike), *_as_good(found, gated, best))))
     return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart, doubtful)
 
 
@@ -102,17 +99,6 @@ def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
     unseen = left_out(study, best.fit).structure
     strange = bent or at_once or bool(limits)
     return Signs(base.discrepancy.size, after, unseen, line, quick(study, best), halved(study, base, best), strange, limits)
-
-
-def _with_either(study: Study, base: Weighed, gated: Gated, added: tuple[str, ...], bars: Thresholds) -> Signs | None:
-    """The signs of these effects beside one that was dropped only because data cannot tell it from its rival, where the two sets,
-    with it and with the rival, both explain the day: what the effects alone leave is then either's, and no reason to doubt them."""
-    for doubt in gated.doubts:
-        if added and set(added) <= set(doubt.found.effects) & set(doubt.other.effects):
-            signs = [look(study, base, w, bars) for w in (doubt.found, doubt.other)]
-            if all(verdict(True, s, bars) == "explained" for s in signs):
-                return signs[0]
-    return None
 
 
 def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
@@ -183,7 +169,7 @@ def _as_good(found: Search, gated: Gated, final: Weighed) -> tuple[tuple[str, ..
 def _rivals(found: Search, gated: Gated, final: Weighed) -> tuple[Weighed, Weighed] | None:
     """Two models that tell different stories: an effect and what these data cannot tell it from, else the model in force and the
     best set that does not contain it."""
-    for doubt in gated.doubts:
+    for doubt in (*gated.settled, *gated.doubts):
         return doubt.found, doubt.other
     for w in found.all:
         if w.effects not in (final.effects, found.base.effects) and not set(final.effects) < set(w.effects):

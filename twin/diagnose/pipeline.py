@@ -28,6 +28,7 @@ from twin.diagnose.objective import objective_of
 from twin.diagnose.screen import screen
 from twin.diagnose.seal import Opened, predicted
 from twin.diagnose.search import search
+from twin.diagnose.settle import settle
 from twin.diagnose.spikes import without_spikes
 from twin.diagnose.split import blind, split
 from twin.diagnose.study import Progress, silent
@@ -102,7 +103,7 @@ def conclude(
     screening = screen(study, base, settings.seed)
     found = choose(study, search(study, base, screening.patterns, screening.bars), screening.bars)
     found = lateness(study, found)
-    gated = gate(study, found, screening)
+    found, gated = settle(study, found, gate(study, found, screening), screening.bars)
     judged = with_systematic(study, judge(study, found, gated, screening.bars), screening.patterns)
     return Conclusion(study, screening, found, gated, judged, (*notes, *study.budget.words()))
 
