@@ -50,20 +50,20 @@ def sets(**scores: float) -> Any:
 def test_probability_is_the_tempered_share_of_the_sets_with_the_effect() -> None:
     found = sets(friction=0.0, creep=-20.0, none=-400.0)
     weights = np.exp(np.array([0.0, -1.0, -20.0]))  # a factor e for 20 of score
-    assert probability(found, "friction", set()) == pytest.approx(weights[0] / weights.sum())
-    assert probability(found, "creep", set()) == pytest.approx(weights[1] / weights.sum())
+    assert probability(found, ("friction",), set()) == pytest.approx(weights[0] / weights.sum())
+    assert probability(found, ("creep",), set()) == pytest.approx(weights[1] / weights.sum())
 
 
 def test_a_set_with_an_immaterial_effect_does_not_count() -> None:
     found = sets(friction=0.0, friction__delay=30.0, creep=0.0)
-    assert probability(found, "friction", {"delay"}) == pytest.approx(0.5)
-    assert probability(found, "friction", set()) > 0.5
+    assert probability(found, ("friction",), {"delay"}) == pytest.approx(0.5)
+    assert probability(found, ("friction",), set()) > 0.5
 
 
 def test_an_effect_weighed_only_beside_an_immaterial_one_has_the_share_it_had_there() -> None:
     found = sets(friction=0.0, friction__lag__delay=20.0)
-    assert probability(found, "lag", {"delay"}) == pytest.approx(np.e / (1.0 + np.e))
-    assert probability(found, "friction", {"delay"}) == pytest.approx(1.0)
+    assert probability(found, ("lag",), {"delay"}) == pytest.approx(np.e / (1.0 + np.e))
+    assert probability(found, ("friction",), {"delay"}) == pytest.approx(1.0)
 
 
 BASE, FRICTION, BOTH, CREEP, DELAY = (), ("friction",), ("creep", "friction"), ("creep",), ("delay",)
@@ -114,7 +114,7 @@ def test_an_explanation_less_likely_than_not_is_a_part_of_one(staged: dict[str, 
     best, other = weighed(BOTH, 0.0, cost=100.0), weighed(("friction", "tilt"), 60.0)
     found = judged(best, other)
     assert found.verdict == "partly_explained"
-    assert unsure(found.claims) == ("creep",)  # friction is in both
+    assert unsure(found.claims, {}) == ("creep",)  # friction is in both
     late = weighed(("time_delay",), 0.0, cost=100.0)
     assert judged(late, weighed(("actuator_lag",), 5.0), weighed(("tilt",), 1.0)).verdict == "explained"
 
@@ -179,13 +179,21 @@ def test_no_second_robot_is_seen_where_one_of_two_effects_explains_as_much(stage
 def test_the_likelier_of_two_that_data_cannot_tell_apart_leaves_both_sets_ambiguous(staged: dict[str, Any]) -> None:
     """And the experiment that is asked for lies between the two, also where a third set has more evidence than the rival's."""
     best, other = weighed(BOTH, 0.0), weighed(("delay", "friction"), -20.0)
-    doubt = SimpleNamespace(found=best, other=other)
+    doubt = SimpleNamespace(effect="creep", rival="delay", found=best, other=other)
     found = judged(best, other, weighed(DELAY, -11.0), settled=(doubt,))
     assert (found.verdict, [c.effect for c in found.claims]) == ("explained", ["creep", "friction"])
     assert found.ambiguous == (BOTH, ("delay", "friction"), DELAY)
     assert found.between == (best, other)
     creep = next(c for c in found.claims if c.effect == "creep")
+    assert unsure((replace(creep, probability=0.4),), {"creep": 0.45, "delay": 0.9}) == ("creep",)
     assert creep.probability == pytest.approx(1.0 / (1.0 + np.exp(-1.0) + np.exp(-0.55)))  # a factor e for 20 of score
+    # A third set with more evidence makes it less likely than not, and one of the two still likely: by 0.55 and 0.20.
+    other, third = weighed(("lag", "friction"), -1.0), weighed(("tilt", "friction"), 3.0)
+    doubt = SimpleNamespace(effect="creep", rival="lag", found=best, other=other)
+    found = judged(best, other, third, settled=(doubt,))
+    assert next(c for c in found.claims if c.effect == "creep").probability < 0.5
+    assert found.verdict == "explained"
+    assert judged(best, other, third).verdict == "partly_explained"
 
 
 def test_effects_that_do_worse_on_trials_left_out_count_nothing(staged: dict[str, Any]) -> None:

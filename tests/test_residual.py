@@ -129,6 +129,24 @@ def test_without_repeats_noise_is_read_off_second_differences_and_said() -> None
     assert len(notes) == 1
 
 
+def test_a_robot_that_snaps_from_row_to_row_is_not_noisy() -> None:
+    """A body that slips over an obstacle in every twentieth row, by twenty to fifty sigma; what is noise is cut in one row of a
+    million. Cells whose noise nobody declared are found beside it, where they move markers by up to twice the markers' own."""
+    lone = bench(payload=0.01)
+    rng = np.random.default_rng(9)
+    snaps = np.where(np.arange(N) % 20 == 0, SIGMA * rng.uniform(20.0, 50.0, size=N), 0.0)[:, None]
+    residual = [SIGMA * rng.normal(size=(N, 3)) for _ in range(2)]
+    residual[1] = residual[1] + snaps
+    noise, _ = estimate_noise(lone, [0, 1], residual, DEAF)
+    np.testing.assert_allclose(noise.sigma, SIGMA, rtol=0.06)
+    silent = (*(Channel(f"tendon_{i}_tension", "input", "N") for i in (1, 2, 3)), *CHANNELS[3:])
+    G = np.tile(SIGMA / 0.01 * np.eye(3), (N, 1, 1)) * (1.0 + np.sin(0.2 * TIME))[:, None, None]
+    felt = [r + np.einsum("nij,nj->ni", G, 0.01 * rng.normal(size=(N, 3))) for r in residual]
+    noise, _ = estimate_noise(bench(payload=0.01, channels=silent), [0, 1], felt, [G, G])
+    np.testing.assert_allclose(noise.sigma, SIGMA, rtol=0.1)
+    np.testing.assert_allclose(noise.drive, 0.01, rtol=0.1)  # told from the markers' own by how they vary: less surely
+
+
 def test_repeats_have_the_same_loads_and_the_same_commands_but_for_noise() -> None:
     assert repeats(TWO) == [(0, 1)]
     assert repeats(bench(payload=1e-3)) == []

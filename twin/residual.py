@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.stats import chi2
 
 from twin.bench import Bench, Inputs
 from twin.effects import Drive
@@ -27,6 +28,7 @@ from twin.effects import Drive
 DECLARED = "as declared"
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
 LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
+OUTLYING = 1e-6  # probability: rows that noise makes less often are not noise
 SAME = (
     0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
 )
@@ -249,9 +251,10 @@ def _likeliest(
     sigma: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Maximum-likelihood sigma per group and that of the inputs, a common multiple of `reading` (n_tendon,), for differences
-    d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G')."""
+    d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Rows whose |z|^2 noise exceeds in one of a million are left out, again and
+    again until none is left: a body that snaps over an obstacle from row to row is not noisy."""
     present = np.isfinite(d)
-    count = present.sum(axis=0)
+    unlikely = chi2.isf(OUTLYING, np.maximum(present.sum(axis=1), 1))
     scale = _scales(d, member)
     d, G = np.where(present, d, 0.0), G * present[:, :, None]  # what is missing says nothing, of no channel and no input
 
@@ -259,19 +262,26 @@ def _likeliest(
         s = sigma if sigma is not None else (scale * np.exp(x[:n_group]))[member]
         return s, drive if drive is not None else reading * np.exp(x[-1])
 
-    def minus_log_likelihood(x: np.ndarray) -> float:
+    def of_rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Each row's |z|^2 and the logarithm of its covariance's determinant."""
         s, s_u = unpack(x)
         A, r = s_u * G / s[:, None], d / s
         inner = np.eye(G.shape[2]) + np.einsum("nmt,nms->nts", A, A)
         b = np.einsum("nmt,nm->nt", A, r)
-        quadratic = (r**2).sum() - np.einsum("nt,nt->", b, np.linalg.solve(inner, b[..., None])[..., 0])
-        return 0.5 * (quadratic + np.linalg.slogdet(inner)[1].sum()) + float(count @ np.log(s))
+        square = (r**2).sum(axis=1) - np.einsum("nt,nt->n", b, np.linalg.solve(inner, b[..., None])[..., 0])
+        return square, np.linalg.slogdet(inner)[1] + 2.0 * present @ np.log(s)
 
-    start = np.zeros((0 if sigma is not None else n_group) + (drive is None))
-    if start.size == 0:
-        return unpack(start)
-    bounds = [(-3.0, 3.0)] * start.size
-    return unpack(minimize(minus_log_likelihood, start, method="L-BFGS-B", bounds=bounds).x)
+    def minus_log_likelihood(x: np.ndarray) -> float:
+        square, log_determinant = of_rows(x)
+        return 0.5 * float((square + log_determinant)[usual].sum())
+
+    x = np.zeros((0 if sigma is not None else n_group) + (drive is None))
+    usual, outlying = np.zeros(len(d), dtype=bool), np.zeros(len(d), dtype=bool)
+    while x.size and not np.array_equal(usual, ~outlying):
+        usual = ~outlying
+        x = minimize(minus_log_likelihood, x, method="L-BFGS-B", bounds=[(-3.0, 3.0)] * x.size).x
+        outlying |= of_rows(x)[0] > unlikely
+    return unpack(x)
 
 
 def _correlation(noise: Noise, d: Sequence[np.ndarray], G: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:

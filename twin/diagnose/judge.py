@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,7 +80,9 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
         signs = replace(signs, after=after, unseen=unseen, quick=quick(study, base), strained=())
         best, added = base, ()
     claims = _claims(study, found, gated, best, added, signs, bars)
-    doubtful = unsure(claims) if said == "explained" else ()
+    small = {s.effect for s in gated.small}
+    either = {e: probability(found, pair, small) for pair in ((d.effect, d.rival) for d in gated.settled) for e in pair}
+    doubtful = unsure(claims, either) if said == "explained" else ()
     said = "partly_explained" if doubtful else said
     runners = _runners_up(found, gated, () if said == "unexplained" else added)
     ambiguous = tuple(dict.fromkeys((*(w.effects for w in alike), *_as_good(found, gated, best))))
@@ -112,21 +115,23 @@ def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
     return "partly_explained" if s.halved else "unexplained"
 
 
-def unsure(claims: tuple[Claim, ...]) -> tuple[str, ...]:
+def unsure(claims: tuple[Claim, ...], either: Mapping[str, float]) -> tuple[str, ...]:
     """Claims less likely than not: other sets explain the data better, and what they all imitate may be none of them. A lag or a
-    delay is one of few laws that `lateness` weighed, and the likeliest."""
-    return tuple(c.effect for c in claims if c.probability < EVEN and c.effect not in LATE)
+    delay is one of few laws that `lateness` weighed, and the likeliest; of a claim that `settle` took, and of its rival, one or the
+    other must be likely, and that is `either`."""
+    return tuple(c.effect for c in claims if max(c.probability, either.get(c.effect, 0.0)) < EVEN and c.effect not in LATE)
 
 
-def probability(found: Search, effect: str, small: set[str]) -> float:
-    """Share of the tempered weight exp(score / 20) of sets with the effect; sets with a `small`, immaterial one do not count,
-    unless the effect was weighed beside such a one only."""
+def probability(found: Search, effects: Collection[str], small: set[str]) -> float:
+    """Share of the tempered weight exp(score / 20) of sets with one of the effects; sets with a `small`, immaterial one do not
+    count, unless they were weighed beside such a one only."""
+    wanted = set(effects)
     material = [w for w in found.all if not small & set(w.effects)]
-    if not any(effect in w.effects for w in material):
+    if not any(wanted & set(w.effects) for w in material):
         material = list(found.all)
     top = max(w.score for w in material)
     weights = np.array([np.exp((w.score - top) / TEMPER) for w in material])
-    inside = np.array([effect in w.effects for w in material])
+    inside = np.array([bool(wanted & set(w.effects)) for w in material])
     return float(weights[inside].sum() / weights.sum())
 
 
@@ -139,7 +144,8 @@ def _claims(
     sure = min(sure, EVEN) if signs.strained else sure
     small = {s.effect for s in gated.small}
     claims = [
-        Claim(e, best.fit.fitted(e), float("nan"), sure * probability(found, e, small), gated.contribution(study, e)) for e in added
+        Claim(e, best.fit.fitted(e), float("nan"), sure * probability(found, (e,), small), gated.contribution(study, e))
+        for e in added
     ]
     return tuple(sorted(claims, key=lambda c: -c.contribution))
 
@@ -152,7 +158,7 @@ def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[
         for e in w.effects:
             if e not in claimed and e not in found.base.effects and e not in out and e not in small:
                 others = tuple(o for o in w.effects if o != e)
-                out[e] = Claim(e, w.fit.fitted(e), float("nan"), probability(found, e, small), beside=others)
+                out[e] = Claim(e, w.fit.fitted(e), float("nan"), probability(found, (e,), small), beside=others)
     return tuple(list(out.values())[:RUNNERS])
 
 
