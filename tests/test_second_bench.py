@@ -256,7 +256,7 @@ def test_a_killed_run_goes_on(made: Path, tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_the_totals_count_effects_hardly_told_apart_as_one() -> None:
     def answer(verdict: str, *names: str) -> dict[str, Any]:
-        return {"verdict": verdict, "claims": [{"id": name} for name in names]}
+        return {"verdict": verdict, "claims": [{"id": name} for name in names], "errors": [2.0, float(len(names)), 0.5]}
 
     def truth(*names: str, known: bool = True) -> dict[str, Any]:
         return {"effects": [{"id": name, "known": known} for name in names]}
@@ -271,7 +271,9 @@ def test_the_totals_count_effects_hardly_told_apart_as_one() -> None:
             (answer("partly_explained", "contact"), truth("magnet", known=False)),
         ]
     )
-    assert [line.split()[-1] for line in lines] == ["1/2", "1/1", "0/1", "0/0", "0/0", "1/1"]
+    assert [line.split()[-1] for line in lines] == ["1/2", "1/1", "0/1", "0/0", "0/0", "1/1", "4.00"]
+    pair = (answer("explained", "contact"), truth("contact", "base_tilt"))  # after 1.0 for 0.5; the other day 2.0
+    assert totals([pair, (answer("explained", "contact", "base_tilt"), truth("contact"))])[-1].endswith(" 3.00, 3.80")
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

@@ -15,6 +15,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tools.attribution_table import same
 from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.errors import TwinError
@@ -112,6 +114,8 @@ def totals(pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> list[str]:
         return f"{of:44}{sum(hits)}/{len(hits)}"
 
     by = {name: [(row, truth) for row, truth in pairs if kind(truth) == name] for name in ("none", "one", "pair", "odd")}
+    over = [row["errors"][1] / row["errors"][2] for row, _ in (*by["one"], *by["pair"]) if row["errors"]]
+    ratios = [f"{q:.2f}" for q in np.quantile(over, [0.5, 0.9])] if over else ["-"]
     return [
         count("false positives, no effect", [bool(claims(row)) or row["verdict"] != "noise" for row, _ in by["none"]]),
         count("right effect first, one effect", [first(row, true(truth)) for row, truth in by["one"]]),
@@ -119,6 +123,7 @@ def totals(pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> list[str]:
         count("first is a true one, two effects", [first(row, true(truth)) for row, truth in by["pair"]]),
         count("exact set, two effects", [exact(row, true(truth)) for row, truth in by["pair"]]),
         count("out of catalogue, flagged", [row["verdict"] in FLAGS for row, _ in by["odd"]]),
+        f"{'sealed error over floor, known (median, 90 %)':46}{', '.join(ratios)}",
     ]
 
 
