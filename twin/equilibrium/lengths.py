@@ -31,7 +31,7 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # m/N of the backbone: three taut tendons are redundant, and this decides between them. An inextensible robot has none, 120 mm of
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
-PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
+PULL = 1e5  # N/m: some of the stiffness a held length has against its tendon's pull
 STEPS = 40
 SMALLEST = 1e-3  # of a jump
 WARY = 2e-4  # m: a part of it by a post, before which the robot may be caught; its tip moves by some 3 mm
