@@ -53,6 +53,16 @@ def test_what_cannot_be_told_apart_is_said_where_nothing_is_claimed():
     assert "It could be tendon friction or backbone creep: these data cannot tell which, so neither is claimed." in words
 
 
+def test_a_name_that_is_as_good_as_another_does_not_stand_alone():
+    d = diagnosis(ambiguous=(("tendon_friction",), ("backbone_creep",)))
+    unsure = replace(d, claims=(replace(d.claims[0], probability=0.5),))
+    assert sentence(unsure).startswith(
+        "Missing effect: tendon friction or backbone creep, these data cannot tell which. The twin has tendon friction, "
+        "mu = 0.1030 ± 0.0013. It explains 95 % of the structured error. On 2 sealed trials"
+    )
+    assert sentence(d).startswith("Missing effect: tendon friction, mu = ")  # 0.99
+
+
 def test_other_explanations_that_contain_the_claim_are_no_rivals():
     assert "cannot tell" not in sentence(diagnosis(ambiguous=(("tendon_friction", "time_delay"),)))
 

@@ -127,7 +127,7 @@ def settled(now, near, how):
 @part
 def keep_tangent(now, LU):
     """The present tangent's factors to LU; where it has none, those last used."""
-    if not tangent(now.at, now.state, now.held.which, 0.0, LU, now.factors.held_by):
+    if not tangent(now.at, now.state, now.held, 0.0, LU, now.factors.held_by):
         for k in range(now.last.size):
             assign(LU[k], now.factors.LU[k])
 

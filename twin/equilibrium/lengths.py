@@ -31,7 +31,8 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # m/N of the backbone: three taut tendons are redundant, and this decides between them. An inextensible robot has none, 120 mm of
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
-PULL = 1e5  # N/m: some of the stiffness a held length has against its tendon's pull
+PULL = 1e5  # N/m: some of the stiffness that a motor's length has against its tendon's pull; of 1e3 too little to see that it holds
+SOFT = 1e3  # N/m: the same of a spring, which gives way by 2 to 20 mm/N; with PULL Newton loses its way
 STEPS = 40
 SMALLEST = 1e-3  # of a step
 
@@ -167,8 +168,14 @@ def tauten(C, gap, T, by_length, dT):
 
 
 @inner
-def tangent(at, state, by_length, rate, LU, held_by):
-    """Factors of J + rate K + PULL sum B_i A_i' over the taut tendons of `by_length`, which `held_by` (n_tendon,) then names.
+def firm(held, t):
+    """The stiffness (N/m) that a held tendon has in the tangent."""
+    return SOFT if held.by_spring[t] else PULL
+
+
+@inner
+def tangent(at, state, held, rate, LU, held_by):
+    """Factors of J + rate K + sum firm_i B_i A_i' over the taut tendons that are held, which `held_by` (n_tendon,) then names.
 
     J alone need not be positive: a shape that gives way under constant tension may be held by the lengths. Returns whether this is.
     """
@@ -181,11 +188,11 @@ def tangent(at, state, by_length, rate, LU, held_by):
     for i in range(nv):
         LU[i, i] += rate * at.chain.stiffness[i]
     for t in range(nt):
-        held_by[t] = by_length[t] and state.T[t] > 0.0
+        held_by[t] = held.which[t] and state.T[t] > 0.0
         if held_by[t]:
             for i in range(nv):
                 for j in range(nv):
-                    LU[i, j] += PULL * B[t, i] * A[t, j]
+                    LU[i, j] += firm(held, t) * B[t, i] * A[t, j]
     return factorise(LU)
 
 
@@ -203,7 +210,7 @@ def advance(at, state, factors, held, z, s, r):
         gap[t] = lack(held, t, s[t, 0], tension)
         if held_by[t]:
             for i in range(nv):
-                r[i] += PULL * gap[t] * B[t, i]
+                r[i] += firm(held, t) * gap[t] * B[t, i]
     substitute(LU, r)
     for t in range(nt):
         gap[t] -= dot_n(A[t], r)
@@ -212,7 +219,7 @@ def advance(at, state, factors, held, z, s, r):
         for i in range(nt):
             if held_by[i]:
                 for k in range(nv):
-                    D[j, k] -= PULL * longer(held, i, j) * B[i, k]
+                    D[j, k] -= firm(held, i) * longer(held, i, j) * B[i, k]
         substitute(LU, D[j])
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + longer(held, i, j)
@@ -284,7 +291,7 @@ def hold(at, state, factors, held, flow, tol):
             continue
         chord = fresh[0] and size <= CONTRACTION * before
         if not chord:
-            fresh[0] = tangent(at, state, held.which, flow.rate, factors.LU, factors.held_by)
+            fresh[0] = tangent(at, state, held, flow.rate, factors.LU, factors.held_by)
             if not fresh[0]:
                 return 0
         before, step = size, 1.0

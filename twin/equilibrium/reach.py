@@ -84,7 +84,7 @@ def snap(at, state, factors, held, tol):
         factors.fresh[0] = False
         found = hold(at, state, factors, held, Flow(rate, start.q), tol) == 1
         if found and rate == 0.0:
-            found = tangent(at, state, held.which, 0.0, factors.LU, factors.held_by)
+            found = tangent(at, state, held, 0.0, factors.LU, factors.held_by)
             if found:
                 return True
         if not found:  # too long a step; or no rest near here, where it may be slow: then a longer one than before

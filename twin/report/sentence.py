@@ -12,6 +12,7 @@ from twin.evaluate import KIND
 from twin.report.numbers import SHOWN, number, percent, plus_minus
 
 MOST = 3  # parameters of an effect named in a sentence
+SURE = 0.9  # probability below which what a lone claim cannot be told from is named as well as it
 
 
 def effect_words(identifier: str) -> str:
@@ -117,6 +118,11 @@ def verdict_words(diagnosis: Diagnosis) -> str:
     they = "Together they explain" if many else "It explains"
     explains = "" if share is None else f" {they} {percent(share)} of the structured error."
     doubt = f" These data cannot tell {'them' if many else 'it'} from {' or '.join(others[:2])}." if others else ""
+    if others and not many and d.claims[0].probability < SURE:
+        names = (
+            f"{' or '.join((effect_words(d.claims[0].effect), *others[:2]))}, these data cannot tell which. The twin has {names}"
+        )
+        doubt = ""
     little = left and d.structure_after <= d.bars.left and d.line[0] <= d.bars.faint
     rest = " Little is left, but something speaks against it: see what is left, and the notices." if little else ""
     rest = f" What is left moves mostly with {left}." if left and not little else rest
