@@ -32,7 +32,7 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
 PULL = 1e5  # N/m: some of the stiffness that a motor's length has against its tendon's pull; of 1e3 too little to see that it holds
-SOFT = 1e3  # N/m: the same of a spring, which gives way by 2 to 20 mm/N; with PULL Newton loses its way
+SOFT = 1e3  # N/m: the same of a spring, whose plateaus give way by up to a metre per newton; with PULL Newton loses its way
 STEPS = 40
 SMALLEST = 1e-3  # of a step
 
