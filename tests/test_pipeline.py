@@ -35,6 +35,7 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
     stage("choose", "chosen")
     stage("lateness", "told")
     stage("gate", "gated")
+    stage("settle", ("all told", "settled"))
     stage("judge", "judged")
     stage("with_systematic", "as unsure as it is")
     settings = Settings(seed=7)
@@ -46,10 +47,11 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         "choose": (study, "found", "bars"),
         "lateness": (study, "chosen"),
         "gate": (study, "told", screening),
-        "judge": (study, "told", "gated", "bars"),
+        "settle": (study, "told", "gated", "bars"),
+        "judge": (study, "all told", "settled", "bars"),
         "with_systematic": (study, "judged", "patterns"),
     }
-    assert (made.study, made.found, made.gated, made.judged) == (study, "told", "gated", "as unsure as it is")
+    assert (made.study, made.found, made.gated, made.judged) == (study, "all told", "settled", "as unsure as it is")
     assert made.notices[0] == "a note"
     assert "not tried: friction" in made.notices[1]
 
