@@ -31,8 +31,9 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # m/N of the backbone: three taut tendons are redundant, and this decides between them. An inextensible robot has none, 120 mm of
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
-PULL = 1e5  # N/m: some of the stiffness that a motor's length has against its tendon's pull; of 1e3 too little to see that it holds
-SOFT = 1e3  # N/m: the same of a spring, whose plateaus give way by up to a metre per newton; with PULL Newton loses its way
+PULL = 1e5  # N/m: some of the stiffness that a motor's length has against its tendon's pull; 1e3 are too few to see that it holds
+FIRMER = 10.0  # times what a tendon that stretches or beds in has itself, at most: Newton loses its way with a hundred
+SOFT = 1e3  # N/m: of a spring, whose plateaus give way by up to a metre per newton
 STEPS = 40
 SMALLEST = 1e-3  # of a step
 
@@ -170,7 +171,10 @@ def tauten(C, gap, T, by_length, dT):
 @inner
 def firm(held, t):
     """The stiffness (N/m) that a held tendon has in the tangent."""
-    return SOFT if held.by_spring[t] else PULL
+    if held.by_spring[t]:
+        return SOFT
+    gives = max(held.elastic, STIFFEST) + (held.bedding / held.bedding_tension if held.bedding > 0.0 else 0.0)
+    return min(PULL, FIRMER / gives)
 
 
 @inner
