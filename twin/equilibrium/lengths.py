@@ -33,7 +33,7 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 COMPRESSION = 1e-6
 PULL = 1e5  # N/m: some of the stiffness that a motor's length has against its tendon's pull; 1e3 are too few to see that it holds
 FIRMER = 10.0  # times what a tendon that stretches or beds in has itself, at most: Newton loses its way with a hundred
-SOFT = 1e3  # N/m: of a spring, whose plateaus give way by up to a metre per newton
+SOFT = 1e3  # N/m: of a spring, whose plateaus give way by up to a metre per newton; of all where no obstacle is
 STEPS = 40
 SMALLEST = 1e-3  # of a step
 
@@ -169,9 +169,9 @@ def tauten(C, gap, T, by_length, dT):
 
 
 @inner
-def firm(held, t):
+def firm(at, held, t):
     """The stiffness (N/m) that a held tendon has in the tangent."""
-    if held.by_spring[t]:
+    if held.by_spring[t] or not at.law.wall[4] > 0.0:
         return SOFT
     gives = max(held.elastic, STIFFEST) + (held.bedding / held.bedding_tension if held.bedding > 0.0 else 0.0)
     return min(PULL, FIRMER / gives)
@@ -196,7 +196,7 @@ def tangent(at, state, held, rate, LU, held_by):
         if held_by[t]:
             for i in range(nv):
                 for j in range(nv):
-                    LU[i, j] += firm(held, t) * B[t, i] * A[t, j]
+                    LU[i, j] += firm(at, held, t) * B[t, i] * A[t, j]
     return factorise(LU)
 
 
@@ -214,7 +214,7 @@ def advance(at, state, factors, held, z, s, r):
         gap[t] = lack(held, t, s[t, 0], tension)
         if held_by[t]:
             for i in range(nv):
-                r[i] += firm(held, t) * gap[t] * B[t, i]
+                r[i] += firm(at, held, t) * gap[t] * B[t, i]
     substitute(LU, r)
     for t in range(nt):
         gap[t] -= dot_n(A[t], r)
@@ -223,7 +223,7 @@ def advance(at, state, factors, held, z, s, r):
         for i in range(nt):
             if held_by[i]:
                 for k in range(nv):
-                    D[j, k] -= firm(held, i) * longer(held, i, j) * B[i, k]
+                    D[j, k] -= firm(at, held, i) * longer(held, i, j) * B[i, k]
         substitute(LU, D[j])
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + longer(held, i, j)
