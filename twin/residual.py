@@ -280,7 +280,7 @@ def _likeliest(
     while x.size and not np.array_equal(usual, ~outlying):
         usual = ~outlying
         x = minimize(minus_log_likelihood, x, method="L-BFGS-B", bounds=[(-3.0, 3.0)] * x.size).x
-        outlying |= of_rows(x)[0] > unlikely
+        outlying |= (of_rows(x)[0] > unlikely) & (sigma is None)  # a declared sigma may leave out what rows scatter by
     return unpack(x)
 
 
