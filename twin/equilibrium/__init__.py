@@ -4,8 +4,7 @@ engine.py   MuJoCo's kinematics, called by symbol      elastic.py  the elastic e
 chain.py    balance of forces and its tangent          newton.py   one equilibrium
 linear.py   factorisation                              lengths.py  tensions that hold given tendon lengths
 move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
-trial.py    what all trials share                      reach.py   from lengths to the next, in parts or with a snap
-pulled.py   a trial of given tensions, sample by sample
+trial.py    what all trials share                      pulled.py  a trial of given tensions, sample by sample
 antagonists.py  a jaw between two tendons              held.py    a trial of tendons held at lengths or by SMA springs
 """
 

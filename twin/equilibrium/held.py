@@ -8,8 +8,7 @@ sample, under the current and at the elongation of the sample before.
 from __future__ import annotations
 
 from twin.compiled import assign, jit, part
-from twin.equilibrium.lengths import hold_once, remember, tangent
-from twin.equilibrium.reach import move, reach
+from twin.equilibrium.lengths import hold_once, move, reach, remember, tangent
 from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, wary, weigh
 from twin.springs.heat import heated
 
@@ -127,7 +126,7 @@ def settled(now, near, how):
 @part
 def keep_tangent(now, LU):
     """The present tangent's factors to LU; where it has none, those last used."""
-    if not tangent(now.at, now.state, now.held, 0.0, LU, now.factors.held_by):
+    if not tangent(now.at, now.state, now.held.which, LU, now.factors.held_by):
         for k in range(now.last.size):
             assign(LU[k], now.factors.LU[k])
 

@@ -23,7 +23,7 @@ from twin.compiled import assign, dot, inner, jit
 from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, copied, lever, settle
 from twin.equilibrium.linear import factorise, substitute
-from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, allowed, commit, place, pushed
+from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, allowed, commit, place
 from twin.springs.force import piece
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
@@ -31,11 +31,10 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # m/N of the backbone: three taut tendons are redundant, and this decides between them. An inextensible robot has none, 120 mm of
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
-PULL = 1e5  # N/m: some of the stiffness that a motor's length has against its tendon's pull; 1e3 are too few to see that it holds
-FIRMER = 10.0  # times what a tendon that stretches or beds in has itself, at most: Newton loses its way with a hundred
-SOFT = 1e3  # N/m: of a spring, whose plateaus give way by up to a metre per newton; of all where no obstacle is
+PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
 STEPS = 40
-SMALLEST = 1e-3  # of a step
+SMALLEST = 1e-3  # of a jump
+WARY = 2e-4  # m: a part of it by a post, before which the robot may be caught; its tip moves by some 3 mm
 
 
 class Held(NamedTuple):
@@ -169,17 +168,8 @@ def tauten(C, gap, T, by_length, dT):
 
 
 @inner
-def firm(at, held, t):
-    """The stiffness (N/m) that a held tendon has in the tangent."""
-    if held.by_spring[t] or not at.law.wall[4] > 0.0:
-        return SOFT
-    gives = max(held.elastic, STIFFEST) + (held.bedding / held.bedding_tension if held.bedding > 0.0 else 0.0)
-    return min(PULL, FIRMER / gives)
-
-
-@inner
-def tangent(at, state, held, rate, LU, held_by):
-    """Factors of J + rate K + sum firm_i B_i A_i' over the taut tendons that are held, which `held_by` (n_tendon,) then names.
+def tangent(at, state, by_length, LU, held_by):
+    """Factors of J + PULL sum B_i A_i' over the taut tendons of `by_length`, which `held_by` (n_tendon,) then names.
 
     J alone need not be positive: a shape that gives way under constant tension may be held by the lengths. Returns whether this is.
     """
@@ -189,15 +179,68 @@ def tangent(at, state, held, rate, LU, held_by):
     place(at, state.q)
     balance(at, state, z, s, r, LU)
     pulls(at, z, A, B)
-    for i in range(nv):
-        LU[i, i] += rate * at.chain.stiffness[i]
     for t in range(nt):
-        held_by[t] = held.which[t] and state.T[t] > 0.0
+        held_by[t] = by_length[t] and state.T[t] > 0.0
         if held_by[t]:
             for i in range(nv):
                 for j in range(nv):
-                    LU[i, j] += firm(at, held, t) * B[t, i] * A[t, j]
+                    LU[i, j] += PULL * B[t, i] * A[t, j]
     return factorise(LU)
+
+
+class Sought(NamedTuple):
+    """What holds the tendons is to become: free lengths (n_tendon,) m of motors, temperatures (n_tendon,) K of springs."""
+
+    free: np.ndarray
+    temperature: np.ndarray
+
+
+@jit
+def reach(at, state, factors, held, last, sought, tol, wary):
+    """Equilibrium with the tendons that motors and springs hold as `sought`, and all tensions.
+
+    Where the guess state.q does not lead there the jump is made from the shape `last`, which was at held.free and held.temperature,
+    in ever smaller parts if need be, or at once in such as `WARY` says. held.free and held.temperature follow.
+
+    Returns 1, 2 where parts were needed, 0 where no tensions were found. Commits the slip; with parts, after each. The springs'
+    memory is left to `remember`.
+    """
+    T, fresh = state.T, factors.fresh
+    q0, T0, T1, was = last.copy(), T.copy(), T.copy(), Sought(held.free.copy(), held.temperature.copy())
+    move(held, was, sought, 1.0)
+    if not wary and hold(at, state, factors, held, tol) == 1:
+        return 1
+    longest = 0.0
+    for t in range(T.size):
+        longest = max(longest, abs(held.free[t] - was.free[t]) if held.which[t] and not held.by_spring[t] else 0.0)
+    whole = min(1.0, WARY / longest) if wary and longest > 0.0 else 1.0
+    done, part = 0.0, whole
+    while done < 1.0:
+        move(held, was, sought, done + part)
+        assign(T, T0)
+        assign(state.q, q0)
+        fresh[0] = False
+        if hold(at, state, factors, held, tol) == 1:
+            done += part
+            part = min(2.0 * part, whole, 1.0 - done)
+            assign(q0, state.q)
+            assign(T0, T)
+        else:
+            part *= 0.5
+            if part < SMALLEST:
+                move(held, was, sought, 1.0)
+                assign(T, T1)
+                return 0
+    return 1 if wary else 2
+
+
+@inner
+def move(held, was, sought, share):
+    """Sets held.free and held.temperature on the way from one to the other."""
+    for t in range(sought.free.size):
+        if not held.by_spring[t]:
+            held.free[t] = was.free[t] + share * (sought.free[t] - was.free[t])
+        held.temperature[t] = was.temperature[t] + share * (sought.temperature[t] - was.temperature[t])
 
 
 @inner
@@ -214,7 +257,7 @@ def advance(at, state, factors, held, z, s, r):
         gap[t] = lack(held, t, s[t, 0], tension)
         if held_by[t]:
             for i in range(nv):
-                r[i] += firm(at, held, t) * gap[t] * B[t, i]
+                r[i] += PULL * gap[t] * B[t, i]
     substitute(LU, r)
     for t in range(nt):
         gap[t] -= dot_n(A[t], r)
@@ -223,7 +266,7 @@ def advance(at, state, factors, held, z, s, r):
         for i in range(nt):
             if held_by[i]:
                 for k in range(nv):
-                    D[j, k] -= firm(at, held, i) * longer(held, i, j) * B[i, k]
+                    D[j, k] -= PULL * longer(held, i, j) * B[i, k]
         substitute(LU, D[j])
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + longer(held, i, j)
@@ -265,10 +308,10 @@ def between(state, start, end, share):
 
 
 @inner
-def hold(at, state, factors, held, flow, tol):
+def hold(at, state, factors, held, tol):
     """Newton on shape and tensions at once, with the chord LU while it contracts; a step that lets the residual grow is halved.
 
-    Returns 1 and commits the slip, or 0. With the drag of a `flow` that has a rate, a step of the robot's motion at these lengths.
+    Returns 1 and commits the slip, or 0.
     """
     r, none, fresh = np.empty(state.q.size), np.empty((0, 0)), factors.fresh
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
@@ -277,7 +320,6 @@ def hold(at, state, factors, held, flow, tol):
     for _ in range(STEPS):
         place(at, state.q)
         balance(at, state, z, s, r, none)
-        pushed(at.chain, flow, state.q, r)
         size = unmet(at, state, held, s, r)
         if size < tol:
             settle(state, z, s)
@@ -295,7 +337,7 @@ def hold(at, state, factors, held, flow, tol):
             continue
         chord = fresh[0] and size <= CONTRACTION * before
         if not chord:
-            fresh[0] = tangent(at, state, held, flow.rate, factors.LU, factors.held_by)
+            fresh[0] = tangent(at, state, held.which, factors.LU, factors.held_by)
             if not fresh[0]:
                 return 0
         before, step = size, 1.0
