@@ -251,8 +251,8 @@ def _likeliest(
     sigma: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Maximum-likelihood sigma per group and that of the inputs, a common multiple of `reading` (n_tendon,), for differences
-    d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Rows whose |z|^2 noise exceeds in one of a million are left out, again and
-    again until none is left: a body that snaps over an obstacle from row to row is not noisy."""
+    d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Where sigma is sought, rows whose |z|^2 noise exceeds in one of a
+    million are left out, again and again until none is left: a body that snaps over an obstacle from row to row is not noisy."""
     present = np.isfinite(d)
     unlikely = chi2.isf(OUTLYING, np.maximum(present.sum(axis=1), 1))
     scale = _scales(d, member)
@@ -280,7 +280,7 @@ def _likeliest(
     while x.size and not np.array_equal(usual, ~outlying):
         usual = ~outlying
         x = minimize(minus_log_likelihood, x, method="L-BFGS-B", bounds=[(-3.0, 3.0)] * x.size).x
-        outlying |= (of_rows(x)[0] > unlikely) & (sigma is None)  # a declared sigma may leave out what rows scatter by
+        outlying |= (of_rows(x)[0] > unlikely) & (sigma is None)
     return unpack(x)
 
 
