@@ -22,6 +22,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
+from twin.autocorrelation import autocorrelation
 from twin.bench import Bench, Inputs
 from twin.effects import Drive
 
@@ -148,8 +149,8 @@ def estimate_noise(
     """The noise of the listed trials, and what had to be assumed, in plain words.
 
     From repeats among the trials (differences cancel what the model lacks), else as declared, else from second differences along
-    each trial (which cancel what is smooth, and cannot see correlated noise). Tension noise as declared, else by maximum likelihood
-    from the same differences. `residual` and `sensitivity` follow `trials`.
+    each trial (which cancel what is smooth), its correlation from what channels do not share. Tension noise as declared, else by
+    maximum likelihood from the same differences. `residual` and `sensitivity` follow `trials`.
     """
     place = {k: i for i, k in enumerate(trials)}
     pairs = [(place[a], place[b]) for a, b in repeats(bench) if a in place and b in place]
@@ -166,13 +167,15 @@ def estimate_noise(
         ]
         G, source = [sensitivity[a] for a, _ in pairs], f"{len(pairs)} pairs of repeated trials"
     else:
-        d, G = _along_rows(residual, sensitivity)
-        source = "second differences along each trial; assumed white in time"
+        rho = autocorrelation(residual, member)
+        d, G = _along_rows(residual, sensitivity, rho)
+        in_time = "white in time" if not rho.any() else "correlated from row to row as what no two channels share"
         if np.isfinite(declared).all():
             source = DECLARED
-            notes.append("no repeated trials: the noise is taken as declared, and as white in time")
+            notes.append(f"no repeated trials: the noise is taken as declared, and as {in_time}")
         else:
-            notes.append("no repeated trials: the noise floor is read off second differences and assumed white in time")
+            source = f"second differences along each trial; taken as {in_time}"
+            notes.append(f"no repeated trials: the noise floor is read off second differences and taken as {in_time}")
     D, G_all = np.concatenate(d), np.concatenate(G)
     if source == DECLARED:
         sigma = declared
@@ -182,8 +185,7 @@ def estimate_noise(
         sigma, fitted = _likeliest(D, G_all, member, len(groups), bench.reading, drive=drive)
         drive = fitted if drive is None else drive
     noise = Noise(sigma, drive, np.zeros(len(sigma)), source)
-    if pairs:
-        noise = replace(noise, rho=_correlation(noise, d, G, member))
+    noise = replace(noise, rho=_correlation(noise, d, G, member) if pairs else rho)
     if not np.isfinite(cells).all():
         units = ["mm" if d is Drive.DISPLACEMENT else f"m{d.shown[0]}" for d in bench.drives]
         said = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
@@ -194,7 +196,7 @@ def estimate_noise(
 def row_noise(bench: Bench, residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], drive: np.ndarray) -> Noise:
     """What rows scatter by within trials, beside the inputs' noise `drive` (n_tendon,): from second differences, whatever repeats
     or a bench say. What was never measured has an infinite one, and tells nothing."""
-    d, G = (np.concatenate(x) for x in _along_rows(residual, sensitivity))
+    d, G = (np.concatenate(x) for x in _along_rows(residual, sensitivity, np.zeros(residual[0].shape[1])))
     seen = np.isfinite(d).any(axis=0)
     sigma = np.full(d.shape[1], np.inf)
     if np.any(seen):
@@ -203,8 +205,13 @@ def row_noise(bench: Bench, residual: Sequence[np.ndarray], sensitivity: Sequenc
     return Noise(sigma, drive, np.zeros(len(sigma)), "rows of a trial")
 
 
-def _along_rows(residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    return [(r[:-2] - 2 * r[1:-1] + r[2:]) / np.sqrt(6.0) for r in residual], [g[1:-1] for g in sensitivity]
+def _along_rows(
+    residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], rho: np.ndarray
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Second differences, of the variance of noise with the lag-1 correlation rho (n_output,), and what inputs add to them."""
+    size = np.sqrt(6.0 - 8.0 * rho + 2.0 * rho**2)
+    shrunk = np.sqrt(6.0) / size[:, None]
+    return [(r[:-2] - 2 * r[1:-1] + r[2:]) / size for r in residual], [g[1:-1] * shrunk for g in sensitivity]
 
 
 def _members(bench: Bench) -> tuple[list[str], np.ndarray]:
