@@ -84,14 +84,19 @@ def test_a_delay_shifts_tensions_and_displacements_alike() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_cell_drifts_by_its_rate_and_bends_over_the_hour(sign: float) -> None:
-    """rate t + bend t^2 / 1 h: after half an hour and after two."""
-    drift = law("load_cell_drift", rate_1=sign * 1e-4, bend_1=sign * 2e-5, bend_3=sign * 5e-5)
+def test_a_cell_drifts_by_its_rate_and_ever_less_where_it_warms_up(sign: float) -> None:
+    """rate t; and rate tau (1 - exp(-t / tau)) with tau of half an hour, after half an hour and two; ever faster with -tau."""
     seen = some_signals(n=2).with_(clock=np.array([1800.0, 7200.0]))
-    wander = drift.sense(seen).tension - seen.tension
-    np.testing.assert_allclose(wander[:, 0], sign * np.array([0.18 + 0.018, 0.72 + 0.288]), rtol=1e-12)
-    np.testing.assert_allclose(wander[:, 1], 0.0, atol=1e-15)
-    np.testing.assert_allclose(wander[:, 2], sign * np.array([0.045, 0.72]), rtol=1e-12)
+
+    def wander(levelling: float) -> np.ndarray:
+        drift = law("load_cell_drift", rate_1=sign * 1e-4, rate_3=sign * 5e-5, levelling=levelling)
+        return sign * (drift.sense(seen).tension - seen.tension)
+
+    np.testing.assert_allclose(wander(0.0), [[0.18, 0.0, 0.09], [0.72, 0.0, 0.36]], rtol=1e-12, atol=1e-15)
+    left = np.exp([-1.0, -4.0])
+    np.testing.assert_allclose(wander(1.0 / 1800.0)[:, 0], 0.18 * (1.0 - left), rtol=1e-12)
+    np.testing.assert_allclose(wander(-1.0 / 7200.0)[:, 2], 0.36 * (np.exp([0.25, 1.0]) - 1.0), rtol=1e-12)
+    np.testing.assert_allclose(wander(1e-9), wander(0.0), rtol=1e-5)  # the limit: 7200 s of 1e-9 / s, half of it
 
 
 def test_cells_read_what_their_equations_say() -> None:
@@ -470,8 +475,8 @@ def test_springs_may_cool_as_fast_as_in_a_fans_wind_and_no_faster() -> None:
 
 def test_what_may_have_either_sign_may_be_as_large_either_way() -> None:
     """A day seen in a mirror, or counted the other way, is a day as well. Not so a draught, which carries off more heat, hardly
-    less, and a hysteresis, which is narrowed to none at most."""
-    one_way = {("sma_cooling", "forced"), ("sma_hysteresis", "width")}
+    less, a hysteresis, which is narrowed to none at most, and a warm-up, which comes to an end within minutes; nothing runs away so."""
+    one_way = {("sma_cooling", "forced"), ("sma_hysteresis", "width"), ("load_cell_drift", "levelling")}
     for name, effect in catalogue().items():
         for p in effect.declared(3):
             if p.low < 0.0 < p.high and p.value == 0.0 and (name, p.name) not in one_way:
@@ -479,16 +484,25 @@ def test_what_may_have_either_sign_may_be_as_large_either_way() -> None:
 
 
 def test_fits_start_at_every_guess_and_at_each_tendon_alone_and_all() -> None:
-    """Of a law of each tendon: one start a tendon and one of all, with its first parameter, then with both."""
-    starts = list(named("load_cell_drift").starts([], 3))
+    """Of a law of each tendon: one start a tendon and one of all, with its first parameter, then with both; of a drift those with
+    its rate, then with a levelling of all that leaves e^-3 of it at the session's end."""
+    starts = list(named("tendon_routing").starts([], 3))
     assert [s.free for s in starts] == [
-        ("rate_1",), ("rate_2",), ("rate_3",), ("rate_1", "rate_2", "rate_3"),
-        ("rate_1", "bend_1"), ("rate_2", "bend_2"), ("rate_3", "bend_3"),
-        ("rate_1", "bend_1", "rate_2", "bend_2", "rate_3", "bend_3"),
+        ("angle_1",), ("angle_2",), ("angle_3",), ("angle_1", "angle_2", "angle_3"),
+        ("angle_1", "radius_1"), ("angle_2", "radius_2"), ("angle_3", "radius_3"),
+        ("angle_1", "radius_1", "angle_2", "radius_2", "angle_3", "radius_3"),
     ]  # fmt: skip
-    table = {p.name: p for p in named("load_cell_drift").declared(3)}
+    table = {p.name: p for p in named("tendon_routing").declared(3)}
     for start in starts:
         assert dict(start.values) == {n: table[n].value + table[n].step for n in start.free}
+    still = [some_signals().with_(clock=np.array([0.0, 900.0, 3000.0]))]
+    drifts = list(named("load_cell_drift").starts(still, 3))
+    rates = [("rate_1",), ("rate_2",), ("rate_3",), ("rate_1", "rate_2", "rate_3")]
+    assert [s.free for s in drifts] == [*rates, *((*free, "levelling") for free in rates)]
+    for plain, levelled in zip(drifts[:4], drifts[4:], strict=True):
+        assert dict(plain.values) == dict.fromkeys(plain.free, 2e-5)
+        assert dict(levelled.values) == {**dict.fromkeys(plain.free, pytest.approx(6e-5)), "levelling": pytest.approx(1e-3)}
+    assert [s.free for s in named("load_cell_drift").starts([], 3)] == rates  # of no session it is not said how it ends
     creep = list(named("backbone_creep").starts([], 3))
     assert [dict(s.values)["time"] for s in creep] == [3.0, 15.0, 80.0]
     assert {s.free for s in creep} == {("amplitude", "time")}  # the second retardation time only where the first is in force

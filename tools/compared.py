@@ -65,7 +65,7 @@ COMPARED: dict[str, Compare] = {
     # A common factor of all cells is the hole radius's, a nuisance: what differs between them is compared.
     "load_cell_gain": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "gain"))), SAME),
     "load_cell_bias": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "bias"))), SAME),
-    "load_cell_drift": lambda t, v: (  # the bend takes part of it
+    "load_cell_drift": lambda t, v: (  # its bend there, its levelling here, take part of it
         _differ(0.05 * t.strength * np.array(t.share) / HOUR), _differ(np.array(_each(v, "rate"))), OTHER,
     ),
     "tendon_routing": lambda t, v: (

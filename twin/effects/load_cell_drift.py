@@ -2,34 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from twin.effects.effect import Effect, Signals
+from twin.effects.effect import Effect, Signals, Start
 from twin.quantities import Parameter
 
-HOUR = 3600.0  # s
+LEVELLED = 3.0  # times over which a warm-up may have levelled off by the session's end
 
 
 class LoadCellDrift(Effect):
-    """Reading of cell i = tension_i + rate_i t + bend_i t^2 / hour, t the time since the first trial.
+    """Reading of cell i = tension_i + rate_i (1 - exp(-levelling t)) / levelling, t the time since the first trial: at first by its
+    rate, and ever less where the cells warm up, to rate_i / levelling; ever more where levelling is negative, else rate_i t.
 
     Where tensions drive the twin, the true ones are found by inverting this.
 
-    Source: second-order Taylor expansion of a slow zero drift.
+    Source: a body that warms up in a room nears its end exponentially (Newton's law of cooling), and a bridge's zero follows its
+    temperature; the cells share the amplifier and the room. A bend the other way is second-order Taylor expansion.
 
-    >>> law, z = LoadCellDrift(rate_1=1e-4), np.zeros
-    >>> seen = Signals(z(2), np.array([0.0, 3600.0]), np.ones((2, 3)), z((2, 3)), z((2, 1, 3)), z(2))
+    >>> law, z = LoadCellDrift(rate_1=1e-4, levelling=1e-3), np.zeros
+    >>> seen = Signals(z(2), np.array([0.0, 36000.0]), np.ones((2, 3)), z((2, 3)), z((2, 1, 3)), z(2))
+    >>> law.sense(seen).tension[1].round(6).tolist()
+    [1.1, 1.0, 1.0]
     >>> bool(np.allclose(law.sense(law.command(seen)).tension, 1.0))
     True
     """
 
     id = "load_cell_drift"
-    per_tendon = (
-        Parameter("rate", 0.0, "N/s", -2e-3, 2e-3, "warm-up of the amplifier; 0.1 N/h to 1 N/h", std=1e-4, scale=2e-5),
-        Parameter("bend", 0.0, "N/s", -2e-3, 2e-3, "curvature of the drift over an hour", std=1e-4, scale=2e-5),
+    parameters = (
+        Parameter(
+            "levelling", 0.0, "1/s", -3e-4, 2e-2, "warm-up of an amplifier: minutes to an hour; ever faster: e-fold an hour", scale=1e-4
+        ),
     )
+    per_tendon = (Parameter("rate", 0.0, "N/s", -2e-3, 2e-3, "warm-up of the amplifier; 0.1 N/h to 1 N/h", std=1e-4, scale=2e-5),)
+    shape = ("levelling",)
     needs = frozenset({"load cells"})
     moves_with = "the time of day"
+
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Each cell alone and all, all through the session alike, then levelled off by its end."""
+        yield from super().starts(predicted, n_tendon)
+        session = max((float(s.clock.max(initial=0.0)) for s in predicted), default=0.0)
+        if session > 0.0:
+            levelling = min(LEVELLED / session, cls.parameters[0].high)
+            for plain in super().starts(predicted, n_tendon):
+                rates = {name: LEVELLED * rate for name, rate in plain.values.items()}
+                yield Start({**rates, "levelling": levelling}, (*plain.free, "levelling"))
 
     def sense(self, true: Signals) -> Signals:
         return true.with_(tension=true.tension + self.wander(true.clock))
@@ -39,5 +59,5 @@ class LoadCellDrift(Effect):
 
     def wander(self, clock: np.ndarray) -> np.ndarray:
         """The zero (N), shape (n, n_tendon), at `clock` (n,) s."""
-        t = np.asarray(clock, float)[:, None]
-        return self.each("rate") * t + self.each("bend") * t**2 / HOUR
+        t, levelling = np.asarray(clock, float)[:, None], self["levelling"]
+        return self.each("rate") * (-np.expm1(-levelling * t) / levelling if levelling else t)
