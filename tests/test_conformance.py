@@ -216,7 +216,7 @@ def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: R
 def test_a_stroke_that_ends_does_something_where_lengths_command(law: type[Effect], two_trials: Recording) -> None:
     pulled = by_length(two_trials)
     plain, effects = predict((), pulled), starts(law, pulled)
-    assert all("stroke" in e.values and e["loss_1"] + e["loss_2"] + e["loss_3"] > 0.0 for e in effects)
+    assert all(e["loss_1"] + e["loss_2"] + e["loss_3"] > 0.0 or np.isfinite(e.route().stall) for e in effects)
     for effect in effects:
         change = max(np.abs(a - b).max() for a, b in zip(plain, predict((effect,), pulled), strict=True))
         assert 1e-6 < change < 0.05  # m, as above

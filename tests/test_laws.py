@@ -420,16 +420,23 @@ def _touched(wall, x):
 
 
 def test_strokes_are_sought_of_all_drives_that_come_so_far() -> None:
-    """Only where lengths command every tendon; of drives that all reach as far, all; of one that stays behind, not it."""
+    """Only where lengths command every tendon; of drives that all reach as far, all; of one that stays behind, not it. Motors may
+    stall where some rows, not most, have a tendon pull harder."""
     saturation, u = named("actuator_saturation"), 1e-2 * np.linspace(0.0, 1.0, 5)[:, None]
     held = some_signals(n=5).with_(drives=(Drive.DISPLACEMENT,) * 3, displacement=u * np.ones(3))
     starts = list(saturation.starts([held], 3))
     assert starts
+    stalls = [s.values["stall"] for s in starts if s.free == ("stall",)]
+    assert len(stalls) == 2
+    for stall in stalls:
+        assert 0.0 < (held.tension.max(axis=1) > stall).mean() < 0.5
+    starts = [s for s in starts if s.free != ("stall",)]
     for start in starts:
         assert 0.0 < start.values["stroke"] < 1e-2
         assert start.free == ("stroke", "give", "loss_1", "loss_2", "loss_3")
     behind = held.with_(displacement=u * [1.0, 0.1, 1.0])
-    assert {s.free for s in saturation.starts([behind], 3)} == {("stroke", "give", "loss_1", "loss_3")}
+    assert {s.free for s in saturation.starts([behind], 3)} == {("stroke", "give", "loss_1", "loss_3"), ("stall",)}
+    assert [s.free for s in saturation.starts([held.with_(tension=0.0 * held.tension)], 3) if "stall" in s.free] == []
     mixed = held.with_(drives=(Drive.DISPLACEMENT, Drive.DISPLACEMENT, Drive.TENSION))
     assert not any("stroke" in s.free for s in saturation.starts([mixed], 3))
 
@@ -475,7 +482,7 @@ def test_springs_may_cool_as_fast_as_in_a_fans_wind_and_no_faster() -> None:
 
 def test_what_may_have_either_sign_may_be_as_large_either_way() -> None:
     """A day seen in a mirror, or counted the other way, is a day as well. Not so a draught, which carries off more heat, hardly
-    less, a hysteresis, which is narrowed to none at most, and a warm-up, which comes to an end within minutes; nothing runs away so."""
+    less, a hysteresis, which is narrowed to none at most, and a warm-up, which may end within minutes; nothing runs away so."""
     one_way = {("sma_cooling", "forced"), ("sma_hysteresis", "width"), ("load_cell_drift", "levelling")}
     for name, effect in catalogue().items():
         for p in effect.declared(3):

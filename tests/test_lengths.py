@@ -15,7 +15,7 @@ from twin.bench import prepare
 from twin.body import TOLERANCE, Path, Problem
 from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
-from twin.equilibrium.lengths import CLOSED, COMPRESSION, STIFFEST
+from twin.equilibrium.lengths import CLOSED, COMPRESSION, GIVE, STIFFEST
 from twin.errors import DataError, SolveError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
@@ -93,6 +93,51 @@ def test_tendons_that_bed_in_are_longer_by_their_law(amount: float, over: float)
     np.testing.assert_allclose(found.markers, truth.markers, rtol=0, atol=SAME_SHAPE)
     stiff = by_length(u, SIDEWAYS)
     assert np.abs(stiff.markers - truth.markers).max() > 5e-4, "it shows"
+
+
+@pytest.mark.parametrize("stretch", [STIFFEST, 5e-4])
+@pytest.mark.parametrize("bedding", [0.0, 2e-4])
+@pytest.mark.parametrize("stall", [0.7, 1.5, 2.9])
+def test_motors_that_stall_hold_a_tension_and_no_length(stall: float, bedding: float, stretch: float) -> None:
+    """The shapes that tensions up to the stall make, and motors told to wind in up to 5 mm more than these take: the same, at the
+    stall where they were told so and at their lengths elsewhere, on the way up and back."""
+    T = pulls()
+    cut = np.minimum(T, stall)
+    truth = by_tension(cut, SIDEWAYS)
+    more = 5e-3 * np.maximum(T - stall, 0.0) / (3.0 - stall)
+    u = displacement(truth, stretch) + bedding * (1.0 - np.exp(-cut / 0.5)) + more
+    route = Route(stretch=stretch, bedding=bedding, bedding_tension=0.5, stall=stall)
+    found = by_length(u, SIDEWAYS, route)
+    # What is wound in besides makes a tenth of a millinewton a millimetre, less in the others, and the tip moves by 40 mm/N.
+    extra = more.max() / GIVE
+    np.testing.assert_allclose(found.tension, cut, rtol=0, atol=SAME_TENSION + extra)
+    np.testing.assert_allclose(found.markers, truth.markers, rtol=0, atol=SAME_SHAPE + 0.04 * extra)
+    assert np.abs(by_tension(T, SIDEWAYS).markers - truth.markers).max() > 1e-3, "it shows"
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_a_motor_stalls_at_its_tension_whatever_the_bodys_stiffness(factor: float) -> None:
+    u = displacement(by_tension(pulls(), NOWHERE))
+    problem = Problem(np.arange(len(u), dtype=float), u, NOWHERE, Route(stall=0.5), (Drive.DISPLACEMENT,) * 3)
+    found = solver().solve(replace(problem, stiffness=np.full(len(u), factor)))
+    assert found.status.all()
+    assert found.tension.max() == pytest.approx(0.5, abs=2e-3)  # 12 mm more than it gives: a millinewton
+    again = solver().solve(
+        Problem(np.arange(len(u), dtype=float), found.tension, NOWHERE, Route(), stiffness=np.full(len(u), factor))
+    )
+    np.testing.assert_allclose(found.markers, again.markers, rtol=0, atol=SAME_SHAPE)
+
+
+def test_from_a_neighbour_that_stalled_elsewhere_one_step_is_first_order() -> None:
+    """What a fit's derivatives are taken by: all samples in one Newton step from the solution at another stall."""
+    u = displacement(by_tension(pulls(), SIDEWAYS))
+    problem = Problem(np.arange(len(u), dtype=float), u, SIDEWAYS, Route(stall=1.5), (Drive.DISPLACEMENT,) * 3, keep=True)
+    near = solver().solve(problem)
+    there = replace(problem, route=Route(stall=1.501), near=near, keep=False)
+    full, once = (solver().solve(replace(there, once=o)).markers for o in (False, True))
+    moved = np.abs(full - near.markers).max()
+    assert moved > 1e-5  # m: it shows
+    np.testing.assert_allclose(once, full, rtol=0, atol=0.02 * moved)  # second order, and samples that begin or end to stall
 
 
 def test_a_twin_shows_how_much_longer_its_tendons_are() -> None:

@@ -69,6 +69,15 @@ def test_with_friction_it_settles_where_lengths_have_it() -> None:
     np.testing.assert_allclose(moved.markers[REST], still.markers[REST], rtol=0, atol=5e-5)
 
 
+@pytest.mark.parametrize("loads", [HANGING, SIDEWAYS], ids=["hanging", "sideways"])
+def test_it_settles_where_motors_that_stall_have_it(loads: Loads) -> None:
+    moved, still = both(*TAUT_AND_SLACK, loads, Route(stretch=1e-5, stall=0.6))
+    assert still.tension[REST].max() == pytest.approx(0.6, abs=2e-3)  # N: it does stall
+    np.testing.assert_allclose(moved.markers[REST], still.markers[REST], rtol=0, atol=1e-6)  # m, N: as above
+    np.testing.assert_allclose(moved.tension[REST], still.tension[REST], rtol=0, atol=0.02)
+    assert moved.tension.max() < 0.65  # N: nor does it pull more on the way, but for the step in which it meets its limit
+
+
 def test_a_tendon_pulls_at_its_length_or_is_slack_while_it_moves() -> None:
     t = np.linspace(0.0, 3.0, 1501)
     u = np.random.default_rng(1).uniform(-4e-3, 8e-3, (13, 3))

@@ -263,11 +263,13 @@ class Fit:
         }
 
     def _form(self, free: Free) -> float:
-        """What the form of a law is good for, of its amplitude (SI); nothing of where and when it acts, or of the robot's own."""
+        """What the form of a law is good for, of its amplitude (SI), which is counted from OFF or from zero, whichever is less (a
+        limit that is never reached is OFF); nothing of where and when it acts, or of the robot's own."""
         law = next((e for e in self.model.twin.effects if e.id == free.effect), None)
         if law is None or free.parameter.name in law.shape:
             return 0.0
-        return LAW * abs(self.model.value(free) - free.parameter.value)
+        value = self.model.value(free)
+        return LAW * min(abs(value - free.parameter.value), abs(value))
 
     def at_bound(self) -> np.ndarray:
         """Which free parameters (n_free,) stand at an end of their range."""

@@ -35,6 +35,8 @@ class Laws:
             if lacking := effect.needs - body.parts:
                 what = " and ".join(sorted(lacking))
                 raise DataError(f"effect {effect.id} acts on {what}, which robot {robot!r} has not: remove the effect")
+            if np.isfinite(effect.route().stall) and "rope" not in body.parts:
+                raise DataError(f"effect {effect.id}: motors that stall are not solved on robot {robot!r}: leave `stall` out")
 
     def command(self, reported: Signals) -> Signals:
         """The true inputs behind what was reported."""
@@ -67,13 +69,13 @@ class Laws:
 
     @property
     def route(self) -> Route:
-        """Along the tendons: the first friction of each kind, the first that beds in, and all stretch."""
+        """Along the tendons: the first friction of each kind, the first that beds in, all stretch, and the least stall."""
         routes = [e.route() for e in self.effects]
         rubbing, beds = (next((r for r in routes if getattr(r, kind) > 0.0), Route()) for kind in ("mu", "bedding"))
         bearing = next((r.bearing for r in routes if r.bearing != Bearing()), Bearing())
         return Route(
             rubbing.mu, rubbing.presliding, sum(r.stretch for r in routes), beds.bedding, beds.bedding_tension,
-            bearing, max((r.mounted for r in routes), default=0.0),
+            bearing, max((r.mounted for r in routes), default=0.0), min((r.stall for r in routes), default=np.inf),
         )  # fmt: skip
 
     @property

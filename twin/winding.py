@@ -71,7 +71,7 @@ def winding(problem: Problem, moving: Equilibrium, start: ChainPath, zero: np.nd
     held = Held(
         motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
-        0.0, 1.0, np.zeros(nt),
+        0.0, 1.0, np.zeros(nt), float(problem.route.stall),
     )  # fmt: skip
     number = np.array([model.tendon(whole(t)).id if held.which[t] else -1 for t in range(nt)], np.int64)
     stiffness, band, bowing = model.tendon_stiffness.reshape(model.ntendon, -1), model.tendon_lengthspring, np.zeros(nt)
@@ -108,7 +108,7 @@ def let_go(winding, state, t):
     held, k, path = winding.held, winding.number[t], state.s[t, 0]
     free = held.free[t]
     if not held.by_spring[t]:
-        free += COMPRESSION * winding.shared[0]
+        free += held.bedded[t] + COMPRESSION * winding.shared[0]
     taut = state.T[t] > 0.0 or path > free
     winding.stiffness[k, 0] = 1.0 / held.stretch[t]
     winding.band[k, 1] = free - winding.bowing[t]

@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.effects.effect import Effect, Signals, Start
+from twin.effects.effect import Effect, Route, Signals, Start
 from twin.quantities import Parameter
 
 REACHED = (0.7, 0.85)  # shares of the largest command at which the limit may lie
+OVER = (0.25, 0.1)  # shares of the rows that may ask for more than a motor can pull
+NEVER = 1e3  # N: no motor of these stalls there
 MOVED = 1e-4  # m of travel below which no end of a stroke shows
 
 
@@ -23,7 +25,8 @@ def _beyond(command: np.ndarray, limit: float, corner: float) -> np.ndarray:
 class ActuatorSaturation(Effect):
     """Delivered = c - loss r(c - limit), r(x) = (x + sqrt(x^2 + corner^2)) / 2: all of it below the limit, the share 1 - loss of
     what is above, with a corner of that width. Of tensions `loss` is common to the drives, with `limit` and `corner` in N; of
-    lengths drive i has its own `loss_i`, beyond a `stroke` with a corner `give` that the drives, which are alike, share.
+    lengths drive i has its own `loss_i`, beyond a `stroke` with a corner `give` that the drives, which are alike, share; and a
+    motor that holds a length gives way where its tendon would pull more than `stall`, and is back where it would not.
 
     A drive that stalls or stands on its end stop has a loss of 1, one that stalls on a spring less. Commands are what is logged: a
     drive that reports where it is shows nothing of it.
@@ -40,6 +43,8 @@ class ActuatorSaturation(Effect):
     >>> stops = ActuatorSaturation({"loss_1": 1.0, "stroke": 5e-3, "give": 1e-5}, 1)
     >>> (1e3 * stops.drive(s).displacement[:, 0]).round(3).tolist()
     [2.0, 5.0]
+    >>> ActuatorSaturation(stall=1.5).route().stall
+    1.5
     """
 
     id = "actuator_saturation"
@@ -49,6 +54,7 @@ class ActuatorSaturation(Effect):
         Parameter("corner", 0.1, "N", 1e-4, 2.0, "softness of the corner; ours", scale=0.1),
         Parameter("stroke", 1e-2, "m", 1e-4, 0.5, "the drive's own; ours: from toys to cable tools", scale=3e-4),
         Parameter("give", 2e-4, "m", 1e-6, 5e-3, "softness of the stroke's end; ours", scale=2e-4),
+        Parameter("stall", NEVER, "N", 0.1, NEVER, "a motor's largest current, a torque limit, a slipping clutch", scale=0.1),
     )
     per_tendon = (Parameter("loss", 0.0, "1", 0.0, 1.0, "1: not a millimetre more than the stroke", scale=0.2),)
     shape = ("limit", "corner", "stroke", "give")
@@ -58,7 +64,7 @@ class ActuatorSaturation(Effect):
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """Limits below the largest pull of the day; where lengths command all tendons strokes below the largest length, of all
-        drives that come so far at once."""
+        drives that come so far at once, and tensions that some rows' tautest tendon would exceed."""
         held = [s.displacement for s in predicted if s.by_length.all()]
         if len(held) == len(predicted):
             top = np.concatenate(held).max(axis=0)
@@ -66,6 +72,10 @@ class ActuatorSaturation(Effect):
                 names = tuple(f"loss_{i}" for i in range(1, n_tendon + 1) if top[i - 1] > stroke)
                 if stroke > MOVED:
                     yield Start({"stroke": stroke, **dict.fromkeys(names, 0.3)}, ("stroke", "give", *names))
+            tautest = np.concatenate([s.tension.max(axis=1) for s in predicted])
+            for share in OVER:
+                if 0.1 < (stall := float(np.quantile(tautest, 1.0 - share))) < NEVER:
+                    yield Start({"stall": stall}, ("stall",))
             return
         largest = max(float(s.tension.max(initial=0.0)) for s in predicted)
         for share in REACHED:
@@ -80,3 +90,6 @@ class ActuatorSaturation(Effect):
             stopped = displacement - loss * _beyond(displacement, self["stroke"], self["give"])
             displacement = np.where(command.by_length, stopped, displacement)
         return command.with_(tension=tension, displacement=displacement)
+
+    def route(self) -> Route:
+        return Route(stall=self["stall"] if self["stall"] < NEVER else np.inf)

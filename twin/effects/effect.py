@@ -103,6 +103,7 @@ class Bearing:
 class Route:
     """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N); by how much it beds in (m) and over which tension
     (N). Of antagonists also how the joint that they turn rubs.
+    `stall`: the tension (N) at which a motor that holds a tendon at a length gives way, and holds no more.
     `mounted`: the share of its rest bend that the body had when SMA springs were put on."""
 
     mu: float = 0.0
@@ -112,6 +113,7 @@ class Route:
     bedding_tension: float = 1.0
     bearing: Bearing = field(default_factory=Bearing)
     mounted: float = 0.0
+    stall: float = np.inf
 
     def elongation(self, tension: np.ndarray) -> np.ndarray:
         """By how much (m) a tendon is longer under a tension (N) than slack."""

@@ -32,7 +32,13 @@ class LoadCellDrift(Effect):
     id = "load_cell_drift"
     parameters = (
         Parameter(
-            "levelling", 0.0, "1/s", -3e-4, 2e-2, "warm-up of an amplifier: minutes to an hour; ever faster: e-fold an hour", scale=1e-4
+            "levelling",
+            0.0,
+            "1/s",
+            -3e-4,
+            2e-2,
+            "warm-up of an amplifier: minutes to an hour; or ever faster",
+            scale=1e-4,
         ),
     )
     per_tendon = (Parameter("rate", 0.0, "N/s", -2e-3, 2e-3, "warm-up of the amplifier; 0.1 N/h to 1 N/h", std=1e-4, scale=2e-5),)

@@ -149,6 +149,7 @@ class Equilibrium:
             stretch=float(problem.route.stretch),
             bedding=float(problem.route.bedding),
             bedding_tension=float(problem.route.bedding_tension),
+            stall=float(problem.route.stall),
             least_stretch=STIFFEST,
             stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),
             ambient=np.zeros(n) if heating is None else np.array(heating.ambient, float),

@@ -3,7 +3,8 @@
 For each such tendon   T >= 0,   gap = path(T) - free length - stretch T - COMPRESSION sum T <= 0,   T gap = 0,
 
 the sum over the tendons that motors hold: what all of them pull, the backbone carries in compression. A tendon that beds in gives
-way by e = bedding (1 - exp(-T/T_b)) besides: at each step it is one of free length free + e - e' T whose stretch is e' more.
+way by e = bedding (1 - exp(-T/T_b)) besides: at each step it is one of free length free + e - e' T whose stretch is e' more. A
+motor that stalls pulls no more than T_s: a tendon that would need more is one that gives `GIVE` a newton from there.
 
 An SMA spring holds its tendon in the same way: on each linear piece Y = Y_0 + slope (e - e_0) of its law (twin/springs/force.py),
 at an elongation e = e_start + path - straight path - stretch T, it is a tendon of free length path - stretch T - Y/slope whose
@@ -32,6 +33,7 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
+GIVE = 10.0  # m/N of a motor that stalls: a millimetre less than commanded is a tenth of a millinewton more
 STEPS = 40
 SMALLEST = 1e-3  # of a jump
 WARY = 2e-4  # m: a part of it by a post, before which the robot may be caught; its tip moves by some 3 mm
@@ -54,6 +56,7 @@ class Held(NamedTuple):
     bedding: float  # m, of tendons that motors hold
     bedding_tension: float  # N
     bedded: np.ndarray  # (n_tendon,) m, e - e' T
+    stall: float  # N, of motors
 
 
 @inner
@@ -73,11 +76,30 @@ def linearise(held, s, tension):
             elastic = held.elastic / held.factor[0]
             held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
             held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
-        elif held.bedding > 0.0:
-            over = held.bedding_tension * held.factor[0]
-            loose = np.exp(-tension[t] / over)
-            held.bedded[t] = held.bedding * (1.0 - loose * (1.0 + tension[t] / over))
-            held.stretch[t] = max(held.elastic, STIFFEST) / held.factor[0] + held.bedding / over * loose
+        elif held.bedding > 0.0 or held.stall < np.inf:
+            bed_in(held, t, tension[t])
+    if held.stall < np.inf:
+        for t in range(tension.size):
+            if held.which[t] and not held.by_spring[t]:
+                give_way(held, t, s[t, 0], tension)
+
+
+@inner
+def bed_in(held, t, tension):
+    """What is left of the bedding in of tendon t at a tension, and its stretch there."""
+    over = held.bedding_tension * held.factor[0]
+    loose = np.exp(-tension / over)
+    held.bedded[t] = held.bedding * (1.0 - loose * (1.0 + tension / over))
+    held.stretch[t] = max(held.elastic, STIFFEST) / held.factor[0] + held.bedding / over * loose
+
+
+@inner
+def give_way(held, t, path, tension):
+    """Tendon t on the piece where its motor stalls, if at this path and these tensions it would pull more than that."""
+    if tension[t] / held.factor[0] + PULL * lack(held, t, path, tension) > held.stall:
+        longer_by = max(held.elastic, STIFFEST) * held.stall + held.bedding * (1.0 - np.exp(-held.stall / held.bedding_tension))
+        held.bedded[t] = longer_by - GIVE * held.stall
+        held.stretch[t] = GIVE / held.factor[0]
 
 
 @inner
@@ -294,6 +316,8 @@ def unmet(at, state, held, s, r):
     for t in range(state.T.size):
         if held.which[t]:
             gap = lack(held, t, s[t, 0], state.T)
+            if held.stretch[t] >= GIVE / held.factor[0]:  # (T_s - T) / PULL, as large as the other piece has it where they meet
+                gap /= GIVE * PULL
             size = max(size, (abs(gap) if state.T[t] > 0.0 else gap) / CLOSED)
     return size
 
