@@ -70,6 +70,15 @@ def test_with_friction_it_settles_where_lengths_have_it() -> None:
 
 
 @pytest.mark.parametrize("loads", [HANGING, SIDEWAYS], ids=["hanging", "sideways"])
+def test_it_settles_where_tendons_that_bed_in_have_it(loads: Loads) -> None:
+    moved, still = both(*TAUT_AND_SLACK, loads, Route(stretch=1e-5, bedding=1e-3, bedding_tension=0.4))
+    stiff = solvers()[1].solve(Problem(*TAUT_AND_SLACK, loads, Route(stretch=1e-5), (Drive.DISPLACEMENT,) * 3))
+    assert np.abs(stiff.markers[REST] - still.markers[REST]).max() > 1e-3  # m: it shows
+    np.testing.assert_allclose(moved.markers[REST], still.markers[REST], rtol=0, atol=1e-6)  # m, N: as above
+    np.testing.assert_allclose(moved.tension[REST], still.tension[REST], rtol=0, atol=0.02)
+
+
+@pytest.mark.parametrize("loads", [HANGING, SIDEWAYS], ids=["hanging", "sideways"])
 def test_it_settles_where_motors_that_stall_have_it(loads: Loads) -> None:
     moved, still = both(*TAUT_AND_SLACK, loads, Route(stretch=1e-5, stall=0.6))
     assert still.tension[REST].max() == pytest.approx(0.6, abs=2e-3)  # N: it does stall

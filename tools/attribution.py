@@ -47,7 +47,6 @@ NO_SPRINGS = {
     "actuator_lag",
     "tendon_backlash",
     "backbone_creep",
-    "constructional_stretch",
 }  # not on the bench where springs pull
 
 

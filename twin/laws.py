@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from twin.effects import Bearing, Creep, Effect, Loads, Route, Signals
+from twin.effects import ROPES, Bearing, Creep, Effect, Loads, Route, Signals
 from twin.errors import DataError
 from twin.springs import Spring
 
@@ -35,8 +35,11 @@ class Laws:
             if lacking := effect.needs - body.parts:
                 what = " and ".join(sorted(lacking))
                 raise DataError(f"effect {effect.id} acts on {what}, which robot {robot!r} has not: remove the effect")
-            if np.isfinite(effect.route().stall) and "rope" not in body.parts:
-                raise DataError(f"effect {effect.id}: motors that stall are not solved on robot {robot!r}: leave `stall` out")
+            route = effect.route()
+            if (route.bedding or np.isfinite(route.stall)) and not body.parts >= ROPES:
+                raise DataError(
+                    f"effect {effect.id}: robot {robot!r} has no ropes that bed in or stall motors: leave toe and stall out"
+                )
 
     def command(self, reported: Signals) -> Signals:
         """The true inputs behind what was reported."""

@@ -23,7 +23,6 @@ from twin.compiled import inner
 from twin.effects import Drive
 from twin.equilibrium import ChainPath, Equilibrium
 from twin.equilibrium.lengths import COMPRESSION, STIFFEST, Held, elongation
-from twin.errors import SolveError
 from twin.hinges import HingeChain
 from twin.springs.heat import heated
 from twin.springs.spring import no_springs
@@ -57,21 +56,16 @@ def hang(spec: mujoco.MjSpec, body: HingeChain, which: np.ndarray) -> None:
 
 
 def winding(problem: Problem, moving: Equilibrium, start: ChainPath, zero: np.ndarray) -> Winding:
-    """Of tendons that rest as in `start`, where MuJoCo's data is; `zero` (n_tendon,) m as `Equilibrium.zero_path`.
-
-    Raises SolveError for held tendons that bed in.
-    """
+    """Of tendons that rest as in `start`, where MuJoCo's data is; `zero` (n_tendon,) m as `Equilibrium.zero_path`."""
     model, data, nt, path, tension = moving.model, moving.data, problem.command.shape[1], start.path[0], start.tension[0]
     motors, springs = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
-    if problem.route.bedding and (motors | springs).any():
-        raise SolveError("held tendons that bed in are not stepped here; use static equilibria, or remove constructional_stretch")
     stretch = max(problem.route.stretch, STIFFEST)
     records = no_springs(nt).records if problem.heating is None else problem.heating.spring.records
     elongated = records["initial_elongation"] + path - zero - problem.route.stretch * tension
     held = Held(
         motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
-        0.0, 1.0, np.zeros(nt), float(problem.route.stall),
+        float(problem.route.bedding), float(problem.route.bedding_tension), np.zeros(nt), float(problem.route.stall),
     )  # fmt: skip
     number = np.array([model.tendon(whole(t)).id if held.which[t] else -1 for t in range(nt)], np.int64)
     stiffness, band, bowing = model.tendon_stiffness.reshape(model.ntendon, -1), model.tendon_lengthspring, np.zeros(nt)

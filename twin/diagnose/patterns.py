@@ -55,7 +55,7 @@ def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = N
     for identifier, law in catalogue().items():
         if identifier in present or present & set(law.akin) or not law.needs <= parts or not (among is None or identifier in among):
             continue
-        for start in law.starts(predicted, bench.n_tendon):
+        for start in (s for s in law.starts(predicted, bench.n_tendon) if s.needs <= parts):
             try:
                 models, names = _patterns(fit.model, bench, identifier, start)
             except TwinError:

@@ -10,10 +10,11 @@ import importlib
 import pkgutil
 from functools import cache
 
-from twin.effects.effect import Bearing, Creep, Drive, Drives, Effect, Loads, Push, Route, Signals, Start, driven_by
+from twin.effects.effect import ROPES, Bearing, Creep, Drive, Drives, Effect, Loads, Push, Route, Signals, Start, driven_by
 from twin.errors import UnknownNameError
 
 __all__ = [
+    "ROPES",
     "Bearing",
     "Creep",
     "Drive",

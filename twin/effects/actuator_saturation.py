@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.effects.effect import Effect, Route, Signals, Start
+from twin.effects.effect import ROPES, Effect, Route, Signals, Start
 from twin.quantities import Parameter
 
 REACHED = (0.7, 0.85)  # shares of the largest command at which the limit may lie
@@ -75,7 +75,7 @@ class ActuatorSaturation(Effect):
             tautest = np.concatenate([s.tension.max(axis=1) for s in predicted])
             for share in OVER:
                 if 0.1 < (stall := float(np.quantile(tautest, 1.0 - share))) < NEVER:
-                    yield Start({"stall": stall}, ("stall",))
+                    yield Start({"stall": stall}, ("stall",), ROPES)
             return
         largest = max(float(s.tension.max(initial=0.0)) for s in predicted)
         for share in REACHED:

@@ -185,12 +185,16 @@ def between_rows(signals: Signals, command: np.ndarray) -> PPoly:
     return PPoly(np.stack([0.0 * chords, 0.0 * chords, chords, command[:-1]]), signals.time)
 
 
+ROPES = frozenset({"rope"})  # tendons that may bed in, and whose motors may stall
+
+
 @dataclass(frozen=True)
 class Start:
-    """Where a fit of an effect may begin, and which of its parameters it then frees."""
+    """Where a fit of an effect may begin, which of its parameters it then frees, and which parts of a body these besides act on."""
 
     values: Mapping[str, float]
     free: tuple[str, ...]
+    needs: frozenset[str] = frozenset()
 
 
 class Effect(ABC):
