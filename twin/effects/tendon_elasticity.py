@@ -44,8 +44,8 @@ class TendonElasticity(Effect):
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Stretch alone; the toe alone, of antagonists below their pretension, of a backbone's tendons over shares of the largest
-        pull of the day; and there both."""
+        """Stretch alone; or the toe alone, of antagonists below their pretension, of a backbone's over shares of the largest pull of
+        the day. Both at once lose on other sweeps of the three-cable robot what they gain on those fitted."""
         yield Start({"stretch": 5e-5}, ("stretch",))
         if any(s.antagonists for s in predicted):
             for toe, tension in ((1e-3, 1.0), (4e-4, 2.0)):
@@ -53,9 +53,7 @@ class TendonElasticity(Effect):
             return
         largest = max((float(s.tension.max(initial=0.0)) for s in predicted), default=0.0)
         for share in SHARES if largest > 0.0 else ():
-            toe = {"toe": 5e-4, "toe_tension": float(np.clip(share * largest, 0.3, 20.0))}
-            yield Start(toe, ("toe", "toe_tension"), ROPES)
-            yield Start({"stretch": 5e-5, **toe}, ("stretch", "toe", "toe_tension"), ROPES)
+            yield Start({"toe": 5e-4, "toe_tension": float(np.clip(share * largest, 0.3, 20.0))}, ("toe", "toe_tension"), ROPES)
 
     def route(self) -> Route:
         return Route(stretch=self["stretch"], bedding=self["toe"], bedding_tension=self["toe_tension"])
