@@ -44,8 +44,8 @@ class TendonElasticity(Effect):
 
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Stretch alone; or the toe alone, of antagonists below their pretension, of a backbone's over shares of the largest pull of
-        the day. Both at once lose on other sweeps of the three-cable robot what they gain on those fitted."""
+        """Stretch alone; or the toe alone, of antagonists below their pretension, of a backbone's over shares of the largest
+        pull of the day. Both at once lose on other sweeps of the three-cable robot what they gain on those fitted."""
         yield Start({"stretch": 5e-5}, ("stretch",))
         if any(s.antagonists for s in predicted):
             for toe, tension in ((1e-3, 1.0), (4e-4, 2.0)):
