@@ -47,6 +47,7 @@ NO_SPRINGS = {
     "actuator_lag",
     "tendon_backlash",
     "backbone_creep",
+    "tendon_elasticity",
 }  # not on the bench where springs pull
 
 
