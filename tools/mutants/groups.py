@@ -56,6 +56,7 @@ GROUPS = {
         ),
     ),
     "residual": Group(("twin/residual.py",), ("tests/test_residual.py",)),
+    "autocorrelation": Group(("twin/autocorrelation.py",), ("tests/test_autocorrelation.py",)),
     "laws": Group(("twin/laws.py",), ("tests/test_laws.py", "tests/test_dynamics.py", "-k", "laws or alike")),
     "bench": Group(("twin/bench.py",), ("tests/test_prepare.py", "tests/test_evaluate.py", "tests/test_design.py")),
     "twin": Group(
