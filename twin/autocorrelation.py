@@ -19,7 +19,7 @@ def autocorrelation(residual: Sequence[np.ndarray], member: np.ndarray) -> np.nd
     """Lag-1 correlation (n_output,) of AR(1) noise, one a group of channels (`member` (n_output,)), from residuals (n_k, n_output)
     of one unit in a group; zero where it is not clearly there, or too few channels tell.
 
-    With V_k = mean (r_i - r_(i-k))^2 / 2 of what no two channels share, sigma^2 (1 - rho^k) of such noise, rho = V_2 / V_1 - 1:
+    With V_k = mean (r_i - r_(i-k))^2 of what no two channels share, 2 sigma^2 (1 - rho^k) of such noise, rho = V_2 / V_1 - 1:
     what is slow takes no part in it. Shared is what stands out of the covariance of r_i - r_(i-4), beyond the lags that rho is read
     from (from the same ones it would come out larger by one standard error): its largest eigenvalues down to the edge
     (1 + sqrt(m / n))^2 that independent channels have (Marchenko and Pastur 1967), n rows told as half since they may be
@@ -37,7 +37,7 @@ def autocorrelation(residual: Sequence[np.ndarray], member: np.ndarray) -> np.nd
         own = _own(four)
         if own.shape[1] < LEAST:
             continue
-        V_1, V_2 = (float(np.mean((d @ own) ** 2)) / 2.0 for d in (one, two))
+        V_1, V_2 = (float(np.mean((d @ own) ** 2)) for d in (one, two))
         found = V_2 / V_1 - 1.0 if V_1 > 0.0 else 0.0
         if found > CLEAR * np.sqrt(2.0 / (len(two) * own.shape[1])):
             rho[member == g] = min(found, 0.9)
