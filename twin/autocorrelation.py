@@ -26,7 +26,7 @@ def autocorrelation(residual: Sequence[np.ndarray], member: np.ndarray) -> np.nd
     correlated. The standard error of rho is sqrt(2 / (n m)), that of white noise.
     """
     rho = np.zeros(member.size)
-    seen = np.mean([np.isfinite(row) for r in residual for row in r], axis=0)
+    seen = np.isfinite(np.concatenate(residual)).mean(axis=0)
     for g in range(member.max() + 1):
         columns = np.flatnonzero((member == g) & (seen > SEEN))
         if columns.size < LEAST:
