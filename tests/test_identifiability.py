@@ -25,7 +25,7 @@ from twin.twin import Twin
 
 SIGMA = {"marker": 2.5e-4, "displacement": 5e-5, "tension": 1e-2}  # m, m, N
 MATERIAL = 0.1  # sigma
-WITHOUT_LOG = {"temperature_softening", "tendon_backlash", "tendon_elasticity"}
+WITHOUT_LOG = {"temperature_softening", "tendon_backlash", "tendon_elasticity", "constructional_stretch"}
 
 
 # ---- by hand ---------------------------------------------------------------------------------------------------------------

@@ -63,7 +63,7 @@ OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "joint_friction
 
 
 DAYS = [(effect, "") for effect in sorted(set(catalogue()) - OF_OTHERS)] + [
-    ("actuator_saturation", "by_length"), ("tendon_elasticity", "by_length"), ("backbone_precurvature", "by_current"),
+    ("actuator_saturation", "by_length"), ("constructional_stretch", "by_length"), ("backbone_precurvature", "by_current"),
 ]  # fmt: skip
 
 

@@ -424,7 +424,7 @@ def test_a_spring_pulls_in_what_its_elastic_tendon_stretches_too(tmp_path: Path)
         tmp_path / "day",
         "an elastic tendon",
         day,
-        run(Rod(), [TendonElasticity(4.0, 0.0, 1.0)], day),
+        run(Rod(), [TendonElasticity(4.0)], day),
         noise,
         rng,
         displacement=True,

@@ -47,7 +47,7 @@ NO_SPRINGS = {
     "actuator_lag",
     "tendon_backlash",
     "backbone_creep",
-    "tendon_elasticity",
+    "constructional_stretch",
 }  # not on the bench where springs pull
 
 
