@@ -37,9 +37,7 @@ class Laws:
                 raise DataError(f"effect {effect.id} acts on {what}, which robot {robot!r} has not: remove the effect")
             route = effect.route()
             if (route.bedding or np.isfinite(route.stall)) and not body.parts >= ROPES:
-                raise DataError(
-                    f"effect {effect.id}: robot {robot!r} has no ropes that bed in or stall motors: leave toe and stall out"
-                )
+                raise DataError(f"effect {effect.id}: robot {robot!r} has no ropes that bed in or stall motors: leave them out")
 
     def command(self, reported: Signals) -> Signals:
         """The true inputs behind what was reported."""
