@@ -4,9 +4,8 @@ Two noises meet in a marker. Its own, sigma, and that of the readings that drive
 by du moves the predicted shape by G du, the same way in all channels; so does a row whose inputs and markers were not taken at
 quite the same moment, by a small share of the input's change from row to row. With A = sigma_u G / sigma the residual in sigmas has
 covariance
-I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Sensors' noise
-may remember the row before (AR(1), rho per group): before, x_k = (r_k - rho^g r_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples
-makes it white in time. The readings' does not, and sqrt((1 + rho^(2g)) / (1 - rho^(2g))) of it is in x_k.
+I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Successive
+samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples.
 
 A tendon that a law makes slack does not feel its reading's noise, and |z|^2 falls by it though the law need not be true: the robot
 has never felt it. `Whitener.heard` is what that noise adds where the tendon is taut, so that laws can be compared without it
@@ -76,30 +75,25 @@ class Whitener:
     ) -> None:  # fmt: skip
         self.noise = noise
         self.present = [np.isfinite(y) for y in measured]
+        self._mix = [self._across(p, g, u) for p, g, u in zip(self.present, sensitivity, command, strict=True)]
         self._memory = [self._along(p) for p in self.present]
-        self._mix = [self._across(k, g, u) for k, (g, u) in enumerate(zip(sensitivity, command, strict=True))]
         self.heard = [self._heard(k, G) for k, G in enumerate(taut or sensitivity)]
 
-    def _across(self, k: int, G: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _across(self, present: np.ndarray, G: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         change = np.abs(np.diff(command, axis=0, prepend=command[:1], append=command[-1:]))  # (n + 1, t)
         spread = np.hypot(self.noise.drive, SYNC * np.maximum(change[1:], change[:-1]))  # (n, t)
-        A = spread[:, None, :] * self._felt(k, G)  # (n, m, t)
+        A = spread[:, None, :] * G / self.noise.sigma[:, None] * present[:, :, None]  # (n, m, t)
         eigen, V = np.linalg.eigh(np.einsum("nmt,nms->nts", A, A))
         eigen = np.maximum(eigen, 1e-12)
         core = np.einsum("nij,nj,nkj->nik", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
         return A, core
 
     def _heard(self, k: int, G: np.ndarray) -> np.ndarray:
-        a = self.noise.drive * self._felt(k, G)
+        a = self.noise.drive * G / self.noise.sigma[:, None] * self.present[k][:, :, None]
         A, core = self._mix[k]
         white = a + np.einsum("nmt,nts,nls,nlr->nmr", A, core, A, a, optimize=True)
-        return np.einsum("nmt,nmt->nt", white, white)
-
-    def _felt(self, k: int, G: np.ndarray) -> np.ndarray:
-        """What a unit of a reading's noise, which is of its row alone, adds (RMS) to a sample less what is remembered of the one
-        before: (n, m, n_tendon) sigmas."""
         _, decay, scale = self._memory[k]
-        return G / self.noise.sigma[:, None] * (np.sqrt(1.0 + decay**2) * scale)[:, :, None]
+        return np.einsum("nm,nmt,nmt->nt", (1.0 + decay**2) * scale**2, white, white)
 
     def of(self, which: Sequence[int]) -> Whitener:
         """The same of some of its trials alone, by their positions."""
@@ -112,10 +106,10 @@ class Whitener:
         """Whitened residual (n, m) of trial k; zero where nothing was measured. Works for columns of a Jacobian alike."""
         present = self.present[k]
         x = np.where(present, r, 0.0) / self.noise.sigma
-        before, decay, scale = self._memory[k]
-        x = (x - decay * np.take_along_axis(x, before, axis=0)) * scale
         A, core = self._mix[k]
-        return x + np.einsum("nmt,nt->nm", A, np.einsum("nts,ns->nt", core, np.einsum("nmt,nm->nt", A, x)))
+        x = x + np.einsum("nmt,nt->nm", A, np.einsum("nts,ns->nt", core, np.einsum("nmt,nm->nt", A, x)))
+        before, decay, scale = self._memory[k]
+        return (x - decay * np.take_along_axis(x, before, axis=0)) * scale
 
     def _along(self, present: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """For each sample (n, m): the row of the one measured before it, its correlation with that one, and 1 / the spread left."""
