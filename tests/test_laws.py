@@ -221,6 +221,10 @@ def test_a_law_that_finds_nothing_to_act_on_is_refused() -> None:
     jaw = load("cable_tool")
     with pytest.raises(DataError, match=r"backbone_creep acts on viscosity, which robot 'cable_tool' has not"):
         Twin(jaw, {}, (named("backbone_creep")({"amplitude": 0.1}, 2),)).body()
+    finger, saturation = load("finger"), named("actuator_saturation")
+    with pytest.raises(DataError, match="motors that stall are not solved on robot 'finger'"):
+        Twin(finger, {}, (saturation({"stall": 2.0}, 4),)).body()
+    Twin(finger, {}, (saturation({"loss_1": 0.5, "stroke": 5e-3}, 4),)).body()  # a stroke that ends is
 
 
 def test_laws_that_change_the_body_all_change_it() -> None:

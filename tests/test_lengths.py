@@ -15,7 +15,8 @@ from twin.bench import prepare
 from twin.body import TOLERANCE, Path, Problem
 from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
-from twin.equilibrium.lengths import CLOSED, COMPRESSION, GIVE, STIFFEST
+from twin.equilibrium.holder import COMPRESSION, GIVE, STIFFEST
+from twin.equilibrium.lengths import CLOSED
 from twin.errors import DataError, SolveError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load

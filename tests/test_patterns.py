@@ -94,10 +94,13 @@ def test_what_is_there_what_is_like_it_and_what_the_body_has_no_part_for_has_no_
         "routing": law([ONE], akin=("gain",), needs=frozenset({"tendons"})),
         "bedding": law([ONE], needs=frozenset({"antagonists"})),
         "mirror": law([Start({"a": -1.0}, ("a",)), ONE]),
+        "saturation": law([Start({"a": 0.7}, ("a",), frozenset({"ropes"})), Start({"a": 0.6}, ("a",), frozenset({"tendons"}))]),
     }
-    assert [p.effect for p in World(monkeypatch, laws, ("friction",)).found().patterns] == ["routing", "mirror"]
-    assert [p.effect for p in World(monkeypatch, laws).found().patterns] == ["friction", "stretch", "routing", "mirror"]
-    assert World(monkeypatch, laws).found().patterns[-1].start is ONE, "a start outside the law's range is passed over"
+    assert [p.effect for p in World(monkeypatch, laws, ("friction",)).found().patterns] == ["routing", "mirror", "saturation"]
+    found = World(monkeypatch, laws).found().patterns
+    assert [p.effect for p in found] == ["friction", "stretch", "routing", "mirror", "saturation"]
+    assert found[-2].start is ONE, "a start outside the law's range is passed over"
+    assert dict(found[-1].start.values) == {"a": 0.6}, "so is one of parameters that act on what the body has not"
 
 
 def test_a_pattern_without_equilibrium_is_zero_and_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

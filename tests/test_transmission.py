@@ -11,7 +11,7 @@ import pytest
 from twin.bench import prepare
 from twin.diagnose import Settings, diagnose
 from twin.effects import Effect, Signals, named
-from twin.equilibrium.lengths import STIFFEST
+from twin.equilibrium.holder import STIFFEST
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load

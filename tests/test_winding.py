@@ -11,7 +11,7 @@ from twin.body import Heating, Path, Problem
 from twin.dynamics import Dynamics
 from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
-from twin.equilibrium.lengths import COMPRESSION, STIFFEST
+from twin.equilibrium.holder import COMPRESSION, STIFFEST
 from twin.robots import load
 
 HANGING, SIDEWAYS = Loads(np.array([0.0, 0.0, 9.81]), 0.01), Loads(np.array([9.81, 0.0, 0.0]), 0.02)

@@ -22,7 +22,7 @@ from twin.engine import mj_step
 from twin.equilibrium import ChainPath, Equilibrium
 from twin.equilibrium.chain import State, laid, lay, lever, pass_on, shorter
 from twin.equilibrium.elastic import COUPLING, bendings, springs
-from twin.equilibrium.lengths import linearise
+from twin.equilibrium.holder import linearise
 from twin.equilibrium.newton import place
 from twin.equilibrium.trial import Slow, rested, some
 from twin.equilibrium.trial import creep as advance_creep

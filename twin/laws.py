@@ -35,9 +35,8 @@ class Laws:
             if lacking := effect.needs - body.parts:
                 what = " and ".join(sorted(lacking))
                 raise DataError(f"effect {effect.id} acts on {what}, which robot {robot!r} has not: remove the effect")
-            route = effect.route()
-            if (route.bedding or np.isfinite(route.stall)) and not body.parts >= ROPES:
-                raise DataError(f"effect {effect.id}: robot {robot!r} has no ropes that bed in or stall motors: leave them out")
+            if np.isfinite(effect.route().stall) and not body.parts >= ROPES:
+                raise DataError(f"effect {effect.id}: motors that stall are not solved on robot {robot!r}: leave `stall` out")
 
     def command(self, reported: Signals) -> Signals:
         """The true inputs behind what was reported."""

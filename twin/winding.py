@@ -1,6 +1,6 @@
 """Tendons held at lengths while a chain moves: wound up by motors, or pulled by SMA springs that currents heat.
 
-Each is a MuJoCo tendon along its whole path and, while taut, a spring of the stretch and free length that lengths.py gives it:
+Each is a MuJoCo tendon along its whole path and, while taut, a spring of the stretch and free length that holder.py gives it:
 
     T+ = max(0, (path+ - free+) / stretch),    free = straight path - displacement + COMPRESSION S,    S' = (sum T - S) / lag
 
@@ -22,7 +22,7 @@ from twin.body import Problem
 from twin.compiled import inner
 from twin.effects import Drive
 from twin.equilibrium import ChainPath, Equilibrium
-from twin.equilibrium.lengths import COMPRESSION, STIFFEST, Held, elongation
+from twin.equilibrium.holder import COMPRESSION, STIFFEST, Held, elongation
 from twin.hinges import HingeChain
 from twin.springs.heat import heated
 from twin.springs.spring import no_springs

@@ -6,6 +6,7 @@ linear.py   factorisation                              lengths.py  tensions that
 move.py     from one equilibrium to another            hyperelastic.py  the energy of a body that stretches
 trial.py    what all trials share                      pulled.py  a trial of given tensions, sample by sample
 antagonists.py  a jaw between two tendons              held.py    a trial of tendons held at lengths or by SMA springs
+holder.py   what holds a tendon, a motor or a spring
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from twin.effects import Drive, Loads, Push, Route
 from twin.equilibrium import held, pulled
 from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
-from twin.equilibrium.lengths import STIFFEST
+from twin.equilibrium.holder import STIFFEST
 from twin.equilibrium.trial import Driving, Found, How, Near, Slow
 from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs

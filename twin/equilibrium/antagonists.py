@@ -27,7 +27,7 @@ import numpy as np
 from twin.body import DIRECT, NOT_FOUND
 from twin.compiled import jit
 from twin.effects.tendon_friction import slip_state
-from twin.equilibrium.lengths import STIFFEST
+from twin.equilibrium.holder import STIFFEST
 
 CLOSE = 1e-13  # m of tendon: 1e-11 rad of a pulley of a centimetre
 ROUNDS = 200  # a bracket halved so often is closed

@@ -8,7 +8,8 @@ sample, under the current and at the elongation of the sample before.
 from __future__ import annotations
 
 from twin.compiled import assign, jit, part
-from twin.equilibrium.lengths import hold_once, move, reach, remember, tangent
+from twin.equilibrium.holder import remember
+from twin.equilibrium.lengths import hold_once, move, reach, tangent
 from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, wary, weigh
 from twin.springs.heat import heated
 

@@ -1,14 +1,6 @@
 """Tensions that hold given tendon lengths, where motors command displacements: a tendon pulls or is slack, it never pushes.
 
-For each such tendon   T >= 0,   gap = path(T) - free length - stretch T - COMPRESSION sum T <= 0,   T gap = 0,
-
-the sum over the tendons that motors hold: what all of them pull, the backbone carries in compression. A tendon that beds in gives
-way by e = bedding (1 - exp(-T/T_b)) besides: at each step it is one of free length free + e - e' T whose stretch is e' more. A
-motor that stalls pulls no more than T_s: a tendon that would need more is one that gives `GIVE` a newton from there.
-
-An SMA spring holds its tendon in the same way: on each linear piece Y = Y_0 + slope (e - e_0) of its law (twin/springs/force.py),
-at an elongation e = e_start + path - straight path - stretch T, it is a tendon of free length path - stretch T - Y/slope whose
-stretch is 1/slope more, so gap = (Y - T)/slope. The piece is taken anew at every step (semi-smooth Newton: all pieces rise with e).
+For each such tendon   T >= 0,   gap <= 0,   T gap = 0,   the gap by how much it is too long for what holds it (holder.py).
 
 Newton on shape and tensions at once: dpath_i/dT_j = -A_i J^-1 B_j with A_i = dpath_i/dq, B_j = dr/dT_j and J the tangent of the
 balance; which tendons are taut is settled on the linear problem.
@@ -23,110 +15,14 @@ import numpy as np
 from twin.compiled import assign, dot, inner, jit
 from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, copied, lever, settle
+from twin.equilibrium.holder import GIVE, PULL, lack, linearise, longer
 from twin.equilibrium.linear import factorise, substitute
 from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, allowed, commit, place
-from twin.springs.force import piece
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
-STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
-# m/N of the backbone: three taut tendons are redundant, and this decides between them. An inextensible robot has none, 120 mm of
-# NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
-COMPRESSION = 1e-6
-PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
-GIVE = 10.0  # m/N of a motor that stalls: a millimetre less than commanded is a tenth of a millinewton more
 STEPS = 40
 SMALLEST = 1e-3  # of a jump
 WARY = 2e-4  # m: a part of it by a post, before which the robot may be caught; its tip moves by some 3 mm
-
-
-class Held(NamedTuple):
-    """Tendons held at lengths, by motors or by springs, (n_tendon,) each. Tensions count times `factor`, as in `trial.softened`."""
-
-    which: np.ndarray  # whether a tendon is held, and not pulled with a given tension
-    by_spring: np.ndarray  # whether a spring holds it
-    free: np.ndarray  # m
-    stretch: np.ndarray  # m/N
-    straight: np.ndarray  # m, path lengths on the straight robot
-    elastic: float  # m/N, stretch of the tendon alone
-    factor: np.ndarray  # (1,)
-    spring: np.ndarray  # (n_tendon,) `Spring.records`
-    temperature: np.ndarray  # K, of the springs
-    elongation: np.ndarray  # m, of the springs when they last were at rest
-    tension: np.ndarray  # N, theirs then
-    bedding: float  # m, of tendons that motors hold
-    bedding_tension: float  # N
-    bedded: np.ndarray  # (n_tendon,) m, e - e' T
-    stall: float  # N, of motors
-
-
-@inner
-def elongation(held, t, path, tension):
-    """Elongation (m) of the spring that pulls tendon t at a path length (m) and a tension."""
-    return held.spring[t].initial_elongation + path - held.straight[t] - held.elastic * tension / held.factor[0]
-
-
-@inner
-def linearise(held, s, tension):
-    """Free length and stretch of the tendons that springs hold, from the piece of their law they are on, and of those that bed in;
-    s[t, 0] is the path."""
-    for t in range(tension.size):
-        if held.by_spring[t]:
-            e = elongation(held, t, s[t, 0], tension[t])
-            Y, slope = piece(held.spring, t, held.temperature[t], e, held.elongation[t], held.tension[t])
-            elastic = held.elastic / held.factor[0]
-            held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
-            held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
-        elif held.bedding > 0.0 or held.stall < np.inf:
-            bed_in(held, t, tension[t])
-    if held.stall < np.inf:
-        for t in range(tension.size):
-            if held.which[t] and not held.by_spring[t]:
-                give_way(held, t, s[t, 0], tension)
-
-
-@inner
-def bed_in(held, t, tension):
-    """What is left of the bedding in of tendon t at a tension, and its stretch there."""
-    over = held.bedding_tension * held.factor[0]
-    loose = np.exp(-tension / over)
-    held.bedded[t] = held.bedding * (1.0 - loose * (1.0 + tension / over))
-    held.stretch[t] = max(held.elastic, STIFFEST) / held.factor[0] + held.bedding / over * loose
-
-
-@inner
-def give_way(held, t, path, tension):
-    """Tendon t on the piece where its motor stalls, if at this path and these tensions it would pull more than that."""
-    if tension[t] / held.factor[0] + PULL * lack(held, t, path, tension) > held.stall:
-        longer_by = max(held.elastic, STIFFEST) * held.stall + held.bedding * (1.0 - np.exp(-held.stall / held.bedding_tension))
-        held.bedded[t] = longer_by - GIVE * held.stall
-        held.stretch[t] = GIVE / held.factor[0]
-
-
-@inner
-def longer(held, i, j):
-    """How much (m/N) tendon j's tension gives tendon i, both held: by i's own stretch and by the backbone's compression."""
-    own = held.stretch[i] if i == j else 0.0
-    if held.by_spring[i] or held.by_spring[j] or not (held.which[i] and held.which[j]):
-        return own
-    return own + COMPRESSION / held.factor[0]
-
-
-@inner
-def lack(held, t, path, tension):
-    """How much too long (m) tendon t is at a path length (m) and all tensions."""
-    gap = path - held.free[t] - held.bedded[t]
-    for j in range(tension.size):
-        gap -= longer(held, t, j) * tension[j]
-    return gap
-
-
-@jit
-def remember(held, s, tension):
-    """The springs come to rest: their elongations and tensions become those their law goes on from."""
-    for t in range(tension.size):
-        if held.by_spring[t]:
-            held.elongation[t] = elongation(held, t, s[t, 0], tension[t])
-            held.tension[t] = tension[t] / held.factor[0]
 
 
 @inner

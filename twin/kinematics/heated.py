@@ -13,7 +13,8 @@ from twin.body import DIRECT, TOLERANCE, Problem
 from twin.effects import Drive, Loads
 from twin.equilibrium import ChainPath
 from twin.equilibrium.chain import State
-from twin.equilibrium.lengths import Held, Sought, reach, remember
+from twin.equilibrium.holder import Held, remember
+from twin.equilibrium.lengths import Sought, reach
 from twin.equilibrium.newton import no_factors, place
 from twin.errors import SolveError
 from twin.kinematics.robot import LoadedRobot
