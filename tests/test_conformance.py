@@ -28,7 +28,6 @@ FIXED = {
 NEW = {
     "backbone_ageing",
     "transmission_error",
-    "constructional_stretch",
     "joint_friction",
 }  # identifiers of our own, beside those of the contract
 

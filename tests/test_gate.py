@@ -50,7 +50,9 @@ class World:
         plain = np.sqrt([N * (100.0 + sum(a * abs(a) for e, a in self.plainly.items() if e not in effects))])
         fit = SimpleNamespace(z=np.sqrt([square - felt, felt]), effects=tuple(sorted(effects)), fitted=lambda e: {}, plain=plain)
         size = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
-        return SimpleNamespace(effects=tuple(sorted(effects)), fit=fit, score=-square, discrepancy=SimpleNamespace(size=size))
+        laws = tuple((e, "toe" if e == "ropes" else "") for e in sorted(effects))
+        size = SimpleNamespace(size=size)
+        return SimpleNamespace(effects=tuple(sorted(effects)), laws=laws, fit=fit, score=-square, discrepancy=size)
 
     def left_out(self, effects: tuple[str, ...]) -> Any:
         hurt = len(self.harmful & set(effects))
@@ -66,8 +68,19 @@ class World:
         return gate(self.study, found, screening)
 
 
-def row(effect: str, apart: float, rival: str = "rival") -> Visibility:
-    return Visibility(effect, 0.1, apart, 0.1, rival, ("x", 1.0, "1"), ())
+def row(effect: str, apart: float, rival: str = "rival", form: str = "") -> Visibility:
+    return Visibility(effect, 0.1, apart, 0.1, rival, ("x", 1.0, "1"), (), form)
+
+
+@pytest.mark.parametrize(("toe", "stretch", "doubts"), [(0.4, 9.0, 0), (0.6, 0.1, 1)])
+def test_an_effect_is_held_against_what_the_design_tells_of_the_law_in_force(
+    monkeypatch: pytest.MonkeyPatch, toe: float, stretch: float, doubts: int
+) -> None:
+    """Ropes of 0.5 sigma that have a toe: how a stretch would be told from ageing does not count."""
+    table = (row("ropes", stretch, form="stretch"), row("ropes", toe, form="toe"))
+    world = World(monkeypatch, ropes=0.5, rival=0.0)
+    world.of = _as_good(world, "ropes", 20.0)  # type: ignore[method-assign]
+    assert len(world.gated("ropes", table=table).doubts) == doubts
 
 
 def test_an_effect_that_moves_too_little_is_listed_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -155,7 +155,7 @@ def test_the_diagnosed_cable_tool_meets_its_bars(raw: Path) -> None:
     rows, recording, found = comparison.compare(raw / "cable-tool")
     assert len(recording.trials) == 4
     claimed = {c.effect for c in found.claims}
-    assert "constructional_stretch" in claimed
+    assert "tendon_elasticity" in claimed
     assert claimed & comparison.FRICTION
     assert all(row.met is not False for row in rows if "time" not in row.what)
 

@@ -25,7 +25,7 @@ from twin.twin import Twin
 
 SIGMA = {"marker": 2.5e-4, "displacement": 5e-5, "tension": 1e-2}  # m, m, N
 MATERIAL = 0.1  # sigma
-WITHOUT_LOG = {"temperature_softening", "tendon_backlash", "tendon_elasticity", "constructional_stretch"}
+WITHOUT_LOG = {"temperature_softening", "tendon_backlash", "tendon_elasticity"}
 
 
 # ---- by hand ---------------------------------------------------------------------------------------------------------------
@@ -70,6 +70,26 @@ def test_what_is_told_apart_is_the_angle_between_patterns(angle: float) -> None:
         assert v.smallest[1] == pytest.approx(0.5 / s, rel=1e-5)  # one unit leaves one sigma
     assert found["time_delay"].smallest[::2] == ("delay", "s")
     assert CLEAR == 25.0
+
+
+def test_each_law_of_a_name_has_its_own_row_and_is_no_rival_of_the_other() -> None:
+    """A toe is half a lag's, a stretch all a payload's; of a rival the law counts that imitates best."""
+    ropes = "tendon_elasticity"
+    columns = [along(0, 1, 0, 0), along(0, 0, 1, 0), along(0, 1, 0, 1), along(0, 0, 2, 0)]
+    objective: Any = SimpleNamespace(bench=bench(bench_day("default", np.random.default_rng(0))), n=N)
+    amplitudes = ((ropes, "toe"), (ropes, "stretch"), ("time_delay", "delay"), ("tip_payload", "mass"))
+    patterns = tuple(pattern(effect, (name,), i) for i, (effect, name) in enumerate(amplitudes))
+    free: Any = (SimpleNamespace(parameter=SimpleNamespace(std=None, step=1.0)),)
+    base: Any = SimpleNamespace(J=along(1, 0, 0, 0)[:, None], model=SimpleNamespace(free=free), at_bound=lambda: np.zeros(1, bool))
+    table = identifiability(objective, base, Dictionary(patterns, np.stack(columns, axis=1)), MATERIAL)
+    found = {(v.effect, v.form): v for v in table}
+    assert set(found) == {(ropes, "toe"), (ropes, "stretch"), ("time_delay", ""), ("tip_payload", "")}
+    assert (found[ropes, "toe"].rival, found[ropes, "toe"].smallest[0]) == ("time_delay", "toe")
+    assert found[ropes, "toe"].share == pytest.approx(0.5, rel=1e-5)
+    assert (found[ropes, "stretch"].rival, found[ropes, "stretch"].smallest[0]) == ("tip_payload", "stretch")
+    assert found[ropes, "stretch"].share == pytest.approx(0.0, abs=1e-5)
+    assert found["tip_payload", ""].share == pytest.approx(0.0, abs=1e-5), "by the stretch, not by the toe that came first"
+    assert found["time_delay", ""].share == pytest.approx(0.5, rel=1e-5), "by the toe, not by the stretch that came last"
 
 
 def test_what_the_robot_imitates_is_not_seen() -> None:

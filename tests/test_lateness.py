@@ -105,6 +105,11 @@ def test_what_is_surer_counts_for_more() -> None:
 class Set:
     effects: tuple[str, ...]
     score: float
+    form: str = ""
+
+    @property
+    def laws(self) -> tuple[tuple[str, str], ...]:
+        return tuple((e, self.form if e == "tendon_elasticity" else "") for e in self.effects)
 
 
 def test_sets_differ_by_what_their_laws_of_lateness_are_worth() -> None:
@@ -123,6 +128,14 @@ def test_sets_differ_by_what_their_laws_of_lateness_are_worth() -> None:
     assert after["time_delay", "tip_payload"] == pytest.approx(500.0 - behind)
     assert after["time_delay",] == pytest.approx(90.0 - behind)
     assert after[()] == 0.0
+
+
+def test_sets_of_the_same_effects_in_other_forms_are_not_alike() -> None:
+    weights = weighed(trials(80, lag=0.1), 0.1)
+    assert weights is not None
+    effects = ("tendon_elasticity", "actuator_lag")
+    toe, stretch = rescored([Set(effects, 90.0, "toe"), Set(effects, 50.0, "stretch")], weights)  # type: ignore[list-item]
+    assert (toe.score, stretch.score) == (90.0, 50.0)
 
 
 @pytest.mark.parametrize(

@@ -144,7 +144,7 @@ def test_from_a_neighbour_that_stalled_elsewhere_one_step_is_first_order() -> No
 def test_a_twin_shows_how_much_longer_its_tendons_are() -> None:
     """Driven by tensions the displacement alone knows; driven by that displacement the tensions come back."""
     robot, T = load("continuum"), pulls()
-    effect = named("constructional_stretch")({"elongation": 5e-4, "tension": 0.5}, 3)
+    effect = named("tendon_elasticity")({"toe": 5e-4, "toe_tension": 0.5}, 3)
     names = [f"tendon_{i}" for i in (1, 2, 3)]
 
     def day(driven: str, shown: str, values: np.ndarray) -> Recording:
@@ -169,7 +169,7 @@ def test_a_twin_shows_how_much_longer_its_tendons_are() -> None:
 
 def test_tendons_that_bed_in_are_refused_where_nothing_solves_them() -> None:
     robot = load("continuum")
-    effect = named("constructional_stretch")({"elongation": 5e-4}, 3)
+    effect = named("tendon_elasticity")({"toe": 5e-4}, 3)
     outputs = (Channel("tip_x", "output", "m"),)
     names = [f"sma_{i}_current" for i in (1, 2, 3)]
     trial = Trial("a", np.arange(4.0), {n: np.full(4, 1e-3) for n in names} | {"tip_x": np.zeros(4)})

@@ -121,6 +121,7 @@ def ranked(monkeypatch: pytest.MonkeyPatch, of: list[tuple[str, float, float]], 
         return [white if VX is X else beside for _, white, beside in of]
 
     monkeypatch.setattr(stage, "gains", measured)
+    monkeypatch.setattr(stage, "catalogue", lambda: {e: SimpleNamespace(form=lambda free: "") for e, _, _ in of})
     evidence: Any = SimpleNamespace(whiten=lambda discrepancy, X: 0.5 * X)
     found = rank(OBJECTIVE, evidence, fitted(), None, known, top)  # type: ignore[arg-type]
     assert [c.gain for c in found] == sorted((c.gain for c in found), reverse=True)
@@ -144,3 +145,15 @@ def test_what_promises_nothing_is_not_tried_and_no_effect_crowds_out_the_others(
     many = [("a", 9.0 - i, -1.0) for i in range(4)]
     assert ranked(monkeypatch, [*many, ("b", 1.0, -1.0), ("c", 0.0, 0.0)], 3) == [many[0], many[1], ("b", 1.0, -1.0)]
     assert ranked(monkeypatch, [("c", 0.0, -np.inf)], 3) == []
+
+
+def test_forms_of_an_effect_do_not_crowd_out_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two starts of each form: a third of the toe is not tried, the stretch is."""
+    frees = [("toe", "toe_tension")] * 3 + [("stretch",)]
+    found = [stage.Candidate("tendon_elasticity", Start({}, free), 9.0 - i, -1.0) for i, free in enumerate(frees)]
+    monkeypatch.setattr(stage, "gains", lambda *args: [c.gain_white for c in found])
+    known = SimpleNamespace(columns=np.zeros((N, 0)), patterns=[SimpleNamespace(effect=c.effect, start=c.start) for c in found])
+    evidence: Any = SimpleNamespace(whiten=lambda discrepancy, X: X)
+    fit: Any = fitted()
+    chosen = rank(OBJECTIVE, evidence, fit, None, known, top=4)  # type: ignore[arg-type]
+    assert [c.gain_white for c in chosen] == [9.0, 8.0, 6.0]

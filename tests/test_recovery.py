@@ -55,7 +55,7 @@ def fitted_alone(bench: Day, effect: str, seed: int = 5, design: str = "") -> tu
     assert found, "the screening must see an effect of this size"
     fits = [fit(objective, base.model.with_effect(effect, c.start.values, c.start.free, 3), J=base.J) for c in found]
     best = weigh(study, min(fits, key=lambda f: f.cost))
-    return base, fuller(study, best, (effect,), ACCEPT).fit, truth
+    return base, fuller(study, best, ACCEPT).fit, truth
 
 
 # test_finger_day.py and test_transmission.py
@@ -63,7 +63,7 @@ OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "joint_friction
 
 
 DAYS = [(effect, "") for effect in sorted(set(catalogue()) - OF_OTHERS)] + [
-    ("actuator_saturation", "by_length"), ("constructional_stretch", "by_length"), ("backbone_precurvature", "by_current"),
+    ("actuator_saturation", "by_length"), ("tendon_elasticity", "by_length"), ("backbone_precurvature", "by_current"),
 ]  # fmt: skip
 
 

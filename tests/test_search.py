@@ -20,6 +20,16 @@ STUDY: Any = SimpleNamespace(
 )
 
 
+def told(effects: tuple[str, ...], score: float, fit: Any, form: str) -> Any:
+    """A set whose ropes, if it has any, are of this form."""
+    laws = tuple((e, form if e == "ropes" else "") for e in effects)
+
+    def without(effect: str) -> tuple[tuple[str, str], ...]:
+        return tuple(law for law in laws if law[0] != effect)
+
+    return SimpleNamespace(effects=effects, laws=laws, laws_without=without, score=score, fit=fit, discrepancy=None)
+
+
 class World:
     """Every set scores what its effects are worth, one by one, and what they are worth only together."""
 
@@ -29,9 +39,9 @@ class World:
         self.anew: list[set[str]] = []
         monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: self.anew.append(among))
         monkeypatch.setattr(stage, "rank", self.rank)
-        monkeypatch.setattr(stage, "extended", lambda study, member, effect, start, beat=0.0: self.of(*member.effects, effect))
+        monkeypatch.setattr(stage, "extended", self.extended)
         monkeypatch.setattr(stage, "catalogue", lambda: dict.fromkeys(worth, SimpleNamespace(akin=())))
-        monkeypatch.setattr(stage, "fuller", lambda study, w, effects, accept: w)
+        monkeypatch.setattr(stage, "fuller", lambda study, w, accept: w)
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
 
     def of(self, *effects: str) -> Any:
@@ -42,7 +52,10 @@ class World:
         twin = SimpleNamespace(effects=[SimpleNamespace(id=e, values={}) for e in effects])
         free = tuple(Free(e, Parameter("amount", 0.0, "1", 0.0, 1.0, "by hand")) for e in effects)
         fit = SimpleNamespace(effects=effects, z=np.zeros(1), model=SimpleNamespace(free=free, twin=twin), cost=-score)
-        return SimpleNamespace(effects=effects, score=score, fit=fit, discrepancy=None)
+        return told(effects, score, fit, "")
+
+    def extended(self, study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
+        return self.of(*member.effects, effect)
 
     def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
         """All promise enough to be tried but what is worth nothing at all."""
@@ -169,3 +182,28 @@ def test_a_candidate_must_promise_what_would_be_material() -> None:
 def test_every_set_weighed_is_listed_best_first(monkeypatch: pytest.MonkeyPatch) -> None:
     scores = [w.score for w in World(monkeypatch, {"friction": 500.0, "creep": 300.0}).found().all]
     assert scores == sorted(scores, reverse=True)
+
+
+def test_a_set_is_weighed_with_each_law_of_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stretch has more evidence alone, a toe beside creep: each leads to a set of its own, and none takes another's place."""
+    world = World(monkeypatch, {"ropes": 500.0, "creep": 300.0})
+
+    def rank(objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
+        left = [e for e in world.worth if e not in fit.effects]
+        return [SimpleNamespace(effect=e, start=f, gain=1e6) for e in left for f in (("stretch", "toe") if e == "ropes" else ("",))]
+
+    def extended(study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
+        form = start or dict(member.laws).get("ropes", "")
+        made = world.of(*member.effects, effect)
+        worth = {("stretch", 1): 50.0, ("toe", 2): 80.0}.get((form, len(made.effects)), 0.0)
+        return told(made.effects, made.score + worth, made.fit, form)
+
+    monkeypatch.setattr(stage, "rank", rank)
+    monkeypatch.setattr(stage, "extended", extended)
+    found = world.found()
+    scores = {w.laws: w.score for w in found.all}
+    assert scores[("ropes", "stretch"),] == 550.0
+    assert scores[("ropes", "toe"),] == 500.0
+    assert found.best.laws == (("creep", ""), ("ropes", "toe"))
+    assert found.best.score == 880.0
+    assert scores[("creep", ""), ("ropes", "stretch")] == 800.0

@@ -420,7 +420,15 @@ def test_a_spring_pulls_in_what_its_elastic_tendon_stretches_too(tmp_path: Path)
     day = bench_day("by_current", rng)
     day = replace(day, trials=tuple(t for t in day.trials if t.name in ("turns_1", "pair_2")))
     noise = Noise()
-    write_set(tmp_path / "day", "an elastic tendon", day, run(Rod(), [TendonElasticity(4.0)], day), noise, rng, displacement=True)
+    write_set(
+        tmp_path / "day",
+        "an elastic tendon",
+        day,
+        run(Rod(), [TendonElasticity(4.0, 0.0, 1.0)], day),
+        noise,
+        rng,
+        displacement=True,
+    )
     robot = load("continuum")
     bench = prepare(read(tmp_path / "day"), robot)
     at = [i for i, o in enumerate(bench.outputs) if o.channel.kind == "tendon_displacement"]

@@ -111,7 +111,7 @@ def test_taut_tendons_give_way_side_by_side_and_a_slack_one_leaves_the_other_alo
 def test_antagonists_that_bed_in_follow_a_hyperbolic_tangent_and_then_hookes_law() -> None:
     """From exp(-d_1 / T_b) + exp(-d_2 / T_b) = 2, d_i the tensions above pretension, and d_2 - d_1 = F: y = S tanh(F / 2 T_b)."""
     S, T, torque = 4e-4, 2.0, np.linspace(-0.08, 0.08, 9)
-    beds = law("constructional_stretch", elongation=S, tension=T)
+    beds = law("tendon_elasticity", toe=S, toe_tension=T)
     a = solved(RIGID, (beds,), run(np.zeros(9), torque)).others["angle"][:, 1] - REST
     # rad: the least stretch comes on top, at most 1e-6 m/N x 16 N on 5 mm
     np.testing.assert_allclose(a, S * np.tanh(torque / PULLEY / 2 / T) / PULLEY, rtol=0, atol=1.01 * STIFFEST * 16 / abs(PULLEY))

@@ -95,7 +95,7 @@ def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.Monke
     told.progress = said.append
     for score, kept in ((22.0, False), (22.1, True)):
         fits = Fits(monkeypatch, score)
-        found = fuller(told, member, ("base_tilt", CREEP), 12.0)
+        found = fuller(told, member, 12.0)
         assert (found is not member) is kept
         ((model, how),) = fits.asked
         creep = next(e for e in model.twin.effects if e.id == CREEP)
@@ -114,30 +114,30 @@ def test_a_fuller_law_is_fitted_from_each_start_and_the_best_fit_kept(monkeypatc
     monkeypatch.setattr(catalogue()[CREEP], "fuller_starts", lambda law, predicted: iter(starts))
     scores = iter((30.0, 50.0, 40.0))
     monkeypatch.setattr(stage, "weigh", lambda study, model: weighed(model, next(scores)))
-    found = fuller(study(), member, (CREEP,), 12.0)
+    found = fuller(study(), member, 12.0)
     assert [next(e for e in model.twin.effects if e.id == CREEP)["amplitude_2"] for model, _ in fits.asked] == [0.01, 0.02, 0.03]
     assert found.score == 50.0
 
 
 def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     fits, plain = Fits(monkeypatch, 1e9), weighed(calibrated(CREEP))
-    full = fuller(study(), plain, (CREEP,), 12.0)
+    full = fuller(study(), plain, 12.0)
     assert len(fits.asked) == 1
-    assert fuller(study(), full, (CREEP,), 12.0) is full
+    assert fuller(study(), full, 12.0) is full
     late = study(Budget(-1.0))
-    assert fuller(late, plain, (CREEP,), 12.0) is plain
+    assert fuller(late, plain, 12.0) is plain
     assert late.budget.untried == [f"the fuller law of {CREEP}"]
     monkeypatch.setattr(catalogue()[CREEP], "richer_needs", frozenset({"wings"}))
-    assert fuller(study(), plain, (CREEP,), 12.0) is plain
+    assert fuller(study(), plain, 12.0) is plain
     assert len(fits.asked) == 1
     monkeypatch.setattr(catalogue()[CREEP], "richer_needs", ROBOT.build().parts)
-    assert fuller(study(), plain, (CREEP,), 12.0) is not plain, "all the parts that there are"
+    assert fuller(study(), plain, 12.0) is not plain, "all the parts that there are"
 
 
 def test_a_fuller_law_that_cannot_be_solved_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = weighed(calibrated(CREEP))
     Fits(monkeypatch, 1e9, fails=1)
-    assert fuller(study(), plain, (CREEP,), 12.0) is plain
+    assert fuller(study(), plain, 12.0) is plain
 
 
 def test_less_one_effect_the_rest_is_fitted_again_from_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,3 +162,15 @@ def test_without_equilibrium_it_is_fitted_from_the_calibrated_robot_and_at_last_
     np.testing.assert_array_equal(fits.asked[1][1]["J"], base.fit.J)
     Fits(monkeypatch, fails=2)
     assert refit_without(study(), base, best, "base_tilt") is base
+
+
+def test_laws_are_effects_with_the_form_that_is_fitted() -> None:
+    ropes = "tendon_elasticity"
+    model = calibrated("base_tilt")
+    toe = weighed(model.with_effect(ropes, {"toe": 1e-4}, ("toe", "toe_tension"), 3))
+    stretch = weighed(model.with_effect(ropes, {"stretch": 1e-4}, ("stretch",), 3))
+    assert toe.effects == stretch.effects == ("base_tilt", ropes)
+    assert toe.laws == (("base_tilt", ""), (ropes, "toe"))
+    assert stretch.laws == (("base_tilt", ""), (ropes, "stretch"))
+    assert toe.laws_without("base_tilt") == ((ropes, "toe"),)
+    assert toe.laws_without(ropes) == (("base_tilt", ""),)

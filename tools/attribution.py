@@ -47,7 +47,7 @@ NO_SPRINGS = {
     "actuator_lag",
     "tendon_backlash",
     "backbone_creep",
-    "constructional_stretch",
+    "tendon_elasticity",
 }  # not on the bench where springs pull
 
 

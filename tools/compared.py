@@ -83,9 +83,9 @@ COMPARED: dict[str, Compare] = {
     "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
     # It swaps sides by another law there.
     "tendon_backlash": lambda t, v: (1e-4 * t.strength * np.array(t.worn), v["gap"] + np.array(_each(v, "gap")), OTHER),
-    "tendon_elasticity": lambda t, v: (5e-5 * t.strength, v["stretch"], SAME),
-    "constructional_stretch": lambda t, v: (  # a hyperbola there
-        2e-4 * t.strength * PULLS / (PULLS + t.half), -v["elongation"] * np.expm1(-PULLS / v["tension"]), OTHER,
+    "tendon_elasticity": lambda t, v: (  # its toe is a hyperbola there
+        t.strength * (5e-5 * PULLS + t.toe * PULLS / (PULLS + t.half)),
+        v["stretch"] * PULLS - v["toe"] * np.expm1(-PULLS / v["toe_tension"]), OTHER if t.toe else SAME,
     ),
     "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER),  # a whole drum there
     "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),
@@ -104,7 +104,7 @@ KNOWN: dict[str, Callable[[dict[str, Any]], dict[str, float]]] = {
     "tip_payload": lambda t: {"mass": 1e-3 * t["strength"]},
     "time_delay": lambda t: {"delay": 0.1 * t["strength"]},
     "temperature_softening": lambda t: {"rate": 0.005 * t["strength"]},
-    "tendon_elasticity": lambda t: {"stretch": 5e-5 * t["strength"]},
+    "tendon_elasticity": lambda t: {} if t["toe"] else {"stretch": 5e-5 * t["strength"]},
     "tendon_routing": lambda t: {f"angle_{t['tendon'] + 1}": np.radians(3.0) * t["strength"] * t["around"]},
     "camera_misalignment": lambda t: {
         f"turn_{a}": float(np.radians(0.7 * t["strength"]) * x) for a, x in zip("xyz", t["axis"], strict=True)

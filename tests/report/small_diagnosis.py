@@ -111,7 +111,9 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         identifiability=(
             Visibility("tendon_friction", 0.1, 0.1, 0.8, "backbone_creep", ("mu", 0.004, "1"), ()),
             Visibility("time_delay", 0.1, 0.3, 0.06, "actuator_lag", ("delay", 0.01, "s"), ("two rates of pull, ten times apart",)),
-            Visibility("tendon_elasticity", np.inf, np.inf, 0.0, "", ("stretch", np.inf, "m/N"), ("tendon displacements",)),
+            Visibility(
+                "tendon_elasticity", np.inf, np.inf, 0.0, "", ("stretch", np.inf, "m/N"), ("tendon displacements",), "stretch"
+            ),
         ),
         ambiguous=(("tendon_routing", "time_delay"),) if found else (),
         experiment=EXPERIMENT if verdict != "noise" else None,

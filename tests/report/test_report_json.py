@@ -128,6 +128,7 @@ def test_what_the_data_can_tell_is_listed_and_never_is_null():
     friction, delay, stretch = strictly(contents(diagnosis(), PROVENANCE))["identifiability"]
     assert friction == {
         "id": "tendon_friction",
+        "form": None,
         "seen": 0.1,
         "apart": 0.1,
         "share": 0.8,
@@ -138,6 +139,7 @@ def test_what_the_data_can_tell_is_listed_and_never_is_null():
     assert delay["lacking"] == ["two rates of pull, ten times apart"]
     assert stretch == {
         "id": "tendon_elasticity",
+        "form": "stretch",
         "seen": None,
         "apart": None,
         "share": 0.0,

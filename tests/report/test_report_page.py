@@ -184,7 +184,7 @@ def test_what_the_data_can_tell_is_a_row_an_effect():
     assert told(diagnosis()) == [
         ["tendon friction", "0.10", "0.10", "backbone creep, 20 %", "mu 0.0040", ""],
         ["time delay", "0.10", "0.30", "actuator lag, 94 %", "delay 0.010 s", "two rates of pull, ten times apart"],
-        ["tendon elasticity", "never: needs tendon displacements"],
+        ["tendon elasticity (stretch)", "never: needs tendon displacements"],
     ]
 
 

@@ -162,12 +162,14 @@ def test_console_prints_the_sentence_and_reads_no_markup_in_data(verdict):
 def test_effects_hidden_for_one_reason_share_it_and_a_full_design_is_silent():
     of = diagnosis().identifiability
     backlash = replace(of[2], effect="tendon_backlash")
+    toe = replace(of[2], form="toe")  # the same effect, said once
     warm = replace(of[2], effect="temperature_softening", lacking=("a log of the room",))
     words = (
         "These data cannot show: tendon elasticity, tendon backlash (needs tendon displacements); temperature softening (needs a"
     )
-    assert blind(diagnosis(identifiability=(*of, backlash, warm))) == f"{words} log of the room)."
+    assert blind(diagnosis(identifiability=(*of, toe, backlash, warm))) == f"{words} log of the room)."
     assert blind(diagnosis(identifiability=of[:2])) is None
+    assert blind(diagnosis(identifiability=(of[2], replace(toe, seen=0.1)))) is None, "one of its laws would show"
 
 
 def test_of_many_numbers_of_a_kind_the_surest_are_said() -> None:

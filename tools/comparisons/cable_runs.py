@@ -31,7 +31,7 @@ ROUNDS = 4  # of a fit: derivatives of the robot's own numbers are taken once in
 # Value and spread on the tools of development (R_5, L_Roll_3, L_Pitch_3): what another of the make is believed to have.
 MAKE = {
     "tendon_friction": {"mu": (0.010, 0.005), "presliding": (3e-5, 3e-5)},
-    "constructional_stretch": {"elongation": (4e-4, 2e-4), "tension": (2.0, 1.0)},
+    "tendon_elasticity": {"toe": (4e-4, 2e-4), "toe_tension": (2.0, 1.0)},
 }
 
 

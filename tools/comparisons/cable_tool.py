@@ -45,7 +45,7 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
     worst = max(abs(modelled / measured - 1.0) for measured, modelled in widths.values())
     told = ", ".join(f"{name[4:]} %: {measured:.1f}/{modelled:.1f}" for name, (measured, modelled) in widths.items())
     claimed = {c.effect for c in found.claims}
-    named = bool(claimed & FRICTION) and bool(claimed & {"constructional_stretch", "tendon_elasticity", "tendon_backlash"})
+    named = bool(claimed & FRICTION) and bool(claimed & {"tendon_elasticity", "tendon_backlash"})
     alone = ", ".join(f"{c.effect} {np.rad2deg(c.error):.2f}" for c in found.claims)
     return [
         Row(

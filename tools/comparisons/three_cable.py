@@ -28,7 +28,7 @@ from twin.twin import Twin, readings, report, simulate
 SETTINGS = Settings(jobs=1)
 PLAY = "tendon_backlash"
 BY_HAND = ("transmission_error", "tendon_friction", PLAY)
-ROPES = ("constructional_stretch", "transmission_error")
+ROPES = ("tendon_elasticity", "transmission_error")
 REGISTERED = 4  # sweeps by which the camera is registered anew
 WAYS = 200  # of choosing them, at most
 EARLY = 0.775  # of the sweeps

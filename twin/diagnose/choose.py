@@ -13,7 +13,7 @@ from twin.diagnose.patterns import dictionary
 from twin.diagnose.search import Known, Search, extend
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BESIDE, FAR, HALF
-from twin.diagnose.weigh import Weighed, weigh
+from twin.diagnose.weigh import Laws, Weighed, weigh
 from twin.errors import SolveError
 from twin.twin import Twin, simulate
 
@@ -34,7 +34,7 @@ def choose(study: Study, found: Search, bars: Thresholds) -> Search:
     alone = len(core.effects) == len(found.base.effects) + 1
     if alone and study.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
         core = beside(study, core, found, bars)
-    known = {w.effects: w for w in (*found.all, core)}
+    known = {w.laws: w for w in (*found.all, core)}
     return Search(found.base, core, tuple(sorted(known.values(), key=lambda w: -w.score)), predicted=True)
 
 
@@ -47,25 +47,25 @@ def predicting(study: Study, found: Search, accept: float) -> Weighed:
 def most_predictive(study: Study, found: Search) -> Weighed | None:
     """Of the sets that halve the squared error on what was not fitted, near and far (`unseen`), and whose every effect takes a
     quarter of it, the one that errs least there. Halves of the session are fitted for the few that err least on single trials."""
-    base, sets, seen = found.base, {w.effects: w for w in found.all}, dict[tuple[str, ...], Unseen]()
+    base, sets, seen = found.base, {w.laws: w for w in found.all}, dict[Laws, Unseen]()
 
-    def error(effects: tuple[str, ...]) -> Unseen:
-        if effects not in seen:
-            seen[effects] = unseen(study, sets[effects])
-        return seen[effects]
+    def error(laws: Laws) -> Unseen:
+        if laws not in seen:
+            seen[laws] = unseen(study, sets[laws])
+        return seen[laws]
 
     near = {e: _each(e, left_out(study, w.fit).square) for e, w in sets.items()}
-    few = sorted((e for e in sets if near[e] < near[base.effects]), key=lambda e: near[e])[:FAR]
-    for effects in sorted(few, key=lambda e: _each(e, error(e).square)):
-        fewer = [e for e in combinations(effects, len(effects) - 1) if e in sets]
-        if _half(error(effects), error(base.effects)) and all(_quarter(error(effects), error(e)) for e in fewer):
-            return sets[effects]
+    few = sorted((e for e in sets if near[e] < near[base.laws]), key=lambda e: near[e])[:FAR]
+    for laws in sorted(few, key=lambda e: _each(e, error(e).square)):
+        fewer = [e for e in combinations(laws, len(laws) - 1) if e in sets]
+        if _half(error(laws), error(base.laws)) and all(_quarter(error(laws), error(e)) for e in fewer):
+            return sets[laws]
     return None
 
 
-def _each(effects: tuple[str, ...], square: float) -> float:
+def _each(laws: Laws, square: float) -> float:
     """A squared error that every effect of a set must pay for."""
-    return square / BESIDE ** len(effects)
+    return square / BESIDE ** len(laws)
 
 
 def beside(study: Study, core: Weighed, found: Search, bars: Thresholds) -> Weighed:

@@ -38,7 +38,7 @@ def shortcomings(bench: Bench) -> list[tuple[str, set[str]]]:
         hidden = {"stiffness_gradient", "camera_misalignment", "backbone_precurvature", "tendon_routing", "base_tilt"}
         out.append(("three markers along the body", hidden))
     if Drive.DISPLACEMENT not in bench.drives and not any(o.group == "displacement" for o in bench.outputs):
-        out.append(("tendon displacements", {"tendon_backlash", "tendon_elasticity", "constructional_stretch"}))
+        out.append(("tendon displacements", {"tendon_backlash", "tendon_elasticity"}))
     if np.ptp(np.concatenate([i.temperature for i in inputs])) < WARM:
         out.append((f"a logged room temperature that varies by {WARM:.0f} K or more", {"temperature_softening"}))
     if len(inputs) > 2 and _ordered(bench):

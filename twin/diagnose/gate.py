@@ -108,9 +108,9 @@ def _doubt(study: Study, found: Search, screening: Screening, best: Weighed, wit
     """The first effect, of those smaller than what the design tells from its closest rival, that the rival in its place explains as
     well to within five standard errors; None where there is none. A rival that is in the set itself was fitted beside it. What
     `lateness` weighed is claimed with its odds."""
-    rows = {v.effect: v for v in screening.table}
+    rows, form = {(v.effect, v.form): v for v in screening.table}, dict(best.laws)
     for effect in sorted(without, key=lambda e: contribution(study, best, without[e])):
-        row = rows.get(effect)
+        row = rows.get((effect, form[effect]))
         if row is None or row.rival in ("", *best.effects):
             continue
         if {effect, row.rival} == LATE and tells_laws(study):

@@ -25,7 +25,7 @@ from twin.effects import named
 
 @dataclass(frozen=True)
 class Visibility:
-    """What the data could say of one effect.
+    """What the data could say of one effect, in one `form` where it has several.
 
     `seen` and `apart` in sigmas (RMS, after the robot's own parameters are refitted; inf: never); `share` of its signature that its
     closest `rival` cannot imitate; `smallest`: the value (SI, from OFF) of the parameter the data feel most that is told apart;
@@ -39,29 +39,32 @@ class Visibility:
     rival: str
     smallest: tuple[str, float, str]  # parameter, value, unit
     lacking: tuple[str, ...]
+    form: str = ""
 
 
 def identifiability(objective: Objective, base: Fit, known: Dictionary, material: float) -> list[Visibility]:
-    """One row an effect, those that are told apart most easily first; `material` sigmas is the least worth claiming."""
+    """One row an effect and form, those that are told apart most easily first; `material` sigmas is the least worth claiming."""
     k = base.J.shape[1]
     X = np.concatenate([base.J, known.columns], axis=1)
     A = projected(X, X, base)[k:, k:]
     raw = np.einsum("ni,ni->i", known.columns, known.columns)
-    groups: dict[str, list[Pattern]] = {}
+    groups: dict[tuple[str, str], list[Pattern]] = {}
     for p in known.patterns:
-        groups.setdefault(p.effect, []).append(p)
+        groups.setdefault((p.effect, named(p.effect).form(p.start.free)), []).append(p)
     gaps = shortcomings(objective.bench)
     rows = []
-    for effect, patterns in groups.items():
+    for (effect, form), patterns in groups.items():
         p = max(patterns, key=lambda p: len(p.where))
         i = np.array(p.where)
         own = float(np.trace(A[np.ix_(i, i)]))
         lacking = tuple(words for words, blinds in gaps if effect in blinds)
         if own < INVISIBLE * float(raw[i].sum()) or own <= 0.0:
             nowhere = (p.amplitudes[0], np.inf, _unit(effect, p.amplitudes[0], objective))
-            rows.append(Visibility(effect, np.inf, np.inf, 0.0, "", nowhere, lacking))
+            rows.append(Visibility(effect, np.inf, np.inf, 0.0, "", nowhere, lacking, form))
             continue
-        shares = {r: min(_left(A, i, np.array(q.where)) for q in qs) / own for r, qs in groups.items() if r != effect}
+        shares: dict[str, float] = {}
+        for q in (q for q in known.patterns if q.effect != effect):
+            shares[q.effect] = min(shares.get(q.effect, np.inf), _left(A, i, np.array(q.where)) / own)
         rival = min(shares, key=lambda r: shares[r], default="")
         share = max(0.0, shares.get(rival, 1.0))
         seen = max(material, float(np.sqrt(CLEAR / objective.n)))
@@ -69,8 +72,8 @@ def identifiability(objective: Objective, base: Fit, known: Dictionary, material
         plainest = int(np.argmax(np.diag(A)[i]))  # the parameter the data feel most
         value = apart * float(np.sqrt(objective.n / A[i[plainest], i[plainest]]))
         smallest = (p.amplitudes[plainest], value, _unit(effect, p.amplitudes[plainest], objective))
-        rows.append(Visibility(effect, seen, apart, share, rival, smallest, lacking))
-    return sorted(rows, key=lambda v: (v.apart, v.effect))
+        rows.append(Visibility(effect, seen, apart, share, rival, smallest, lacking, form))
+    return sorted(rows, key=lambda v: (v.apart, v.effect, v.form))
 
 
 def _unit(effect: str, name: str, objective: Objective) -> str:

@@ -70,8 +70,8 @@ def lateness(study: Study, found: Search) -> Search:
     best = found.best
     if likely != laws:
         best = _in_place(study, best, weights[likely]) or best
-    ranked = rescored([best, *(w for w in found.all if w.effects != best.effects)], weights)
-    best = next(w for w in ranked if w.effects == best.effects)
+    ranked = rescored([best, *(w for w in found.all if w.laws != best.laws)], weights)
+    best = next(w for w in ranked if w.laws == best.laws)
     return replace(found, best=best, all=tuple(sorted(ranked, key=lambda w: -w.score)))
 
 
@@ -83,18 +83,21 @@ def tells_laws(study: Study) -> bool:
 
 def rescored(sets: list[Weighed], weights: Mapping[Laws, Weight]) -> list[Weighed]:
     """Sets that differ in their laws of lateness alone differ in score by what these are worth; the best of them keeps its own."""
-    top: dict[frozenset[str], float] = {}
+    top: dict[frozenset[tuple[str, str]], float] = {}
     for w in sets:
         if LATE & set(w.effects):
-            rest = frozenset(w.effects) - LATE
-            top[rest] = max(top.get(rest, -np.inf), w.score)
+            top[_rest(w)] = max(top.get(_rest(w), -np.inf), w.score)
     most = max(w.score for w in weights.values())
     out = []
     for w in sets:
         laws = LATE & set(w.effects)
         behind = most - weights[laws].score if laws else 0.0
-        out.append(replace(w, score=top[frozenset(w.effects) - LATE] - behind) if laws else w)
+        out.append(replace(w, score=top[_rest(w)] - behind) if laws else w)
     return out
+
+
+def _rest(w: Weighed) -> frozenset[tuple[str, str]]:
+    return frozenset(law for law in w.laws if law[0] not in LATE)
 
 
 def typical(best: Weighed) -> float:

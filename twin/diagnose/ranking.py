@@ -11,7 +11,7 @@ from twin.calibrate import Fit, Objective, prior_weight
 from twin.diagnose.evidence import Discrepancy, Evidence
 from twin.diagnose.patterns import Dictionary
 from twin.diagnose.thresholds import STARTS, TOP
-from twin.effects import Start
+from twin.effects import Start, catalogue
 from twin.information import solve
 
 
@@ -25,6 +25,11 @@ class Candidate:
     gain_beside: float
 
     @property
+    def law(self) -> tuple[str, str]:
+        """The effect and its form."""
+        return self.effect, catalogue()[self.effect].form(self.start.free)
+
+    @property
     def gain(self) -> float:
         return max(self.gain_white, self.gain_beside)
 
@@ -32,7 +37,7 @@ class Candidate:
 def rank(
     objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, known: Dictionary, top: int = TOP
 ) -> list[Candidate]:
-    """The `top` candidates by either measure, best first, a few starts of each effect.
+    """The `top` candidates by either measure, best first, a few starts of each effect's forms.
 
     With c the effect's white pattern (per free parameter), J the model's derivatives with their priors P and V the residual's
     covariance (I, or I + Phi D Phi'): A = c' V^-1 c - c' V^-1 J (J' V^-1 J + P)^-1 J' V^-1 c, u = c' V^-1 z less the same
@@ -50,7 +55,7 @@ def rank(
                 break
             if c in chosen:
                 taken += 1
-            elif sum(o.effect == c.effect for o in chosen) < STARTS:
+            elif sum(o.law == c.law for o in chosen) < STARTS:
                 chosen.append(c)
                 taken += 1
     return sorted(chosen, key=lambda c: -c.gain)

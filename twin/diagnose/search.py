@@ -11,16 +11,16 @@ from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.ranking import rank
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, HOPELESS, PROMISE, WIDTH
-from twin.diagnose.weigh import Weighed, better, extended, fuller, refit_without
+from twin.diagnose.weigh import Laws, Weighed, better, extended, fuller, refit_without
 from twin.effects import Start, catalogue
 
-Known = dict[tuple[str, ...], Weighed]
+Known = dict[Laws, Weighed]
 
 
 @dataclass(frozen=True)
 class Search:
-    """The base model, the best set found, and every set that was weighed (best start each), best first; whether the best is that
-    for what it predicts, and not by evidence."""
+    """The base model, the best set found, and every set that was weighed (the best start of its laws), best first; whether the best
+    is that for what it predicts, and not by evidence."""
 
     base: Weighed
     best: Weighed
@@ -30,7 +30,7 @@ class Search:
 
 def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) -> Search:
     """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
-    known: Known = {base.effects: base}
+    known: Known = {base.laws: base}
     beam = [base]
     for level in range(1, DEEPEST + 1):
         best_before = max(w.score for w in known.values())
@@ -46,7 +46,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
             study.progress(f"effects, {level} at once")
             extend(study, base, member, lacks, bars, fresh)
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
-        fresh = {k: fuller(study, w, k, bars.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
+        fresh = {k: fuller(study, w, bars.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
         if not beam or beam[0].score < best_before + bars.accept:
@@ -68,8 +68,8 @@ def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars
         study.progress(name)
         beat = HOPELESS * min((w.fit.cost for w in fresh.values()), default=np.inf)
         found = extended(study, member, candidate.effect, candidate.start, beat)
-        if found is not None and (found.effects not in fresh or better(found, fresh[found.effects])):
-            fresh[found.effects] = found
+        if found is not None and (found.laws not in fresh or better(found, fresh[found.laws])):
+            fresh[found.laws] = found
 
 
 def _material(study: Study, base: Weighed, member: Weighed, bar: float) -> float:
@@ -85,14 +85,15 @@ def exchanged(study: Study, best: Weighed, known: Known) -> Weighed:
     Tried is what was better than an effect of the set where both were weighed in the same company, and was not seen in the set's:
     what is too small to be sought beside the true effect may be worth more beside a false one, which it helps to imitate it.
     """
-    for company, weaker in list(known.items()):
-        if not company or not set(company) < set(best.effects):
+    for weaker in list(known.values()):
+        company = set(weaker.laws)
+        if not company or not company < set(best.laws):
             continue
-        for other, stronger in list(known.items()):
-            own, new = set(company) - set(other), set(other) - set(company)
-            if len(own) != 1 or len(new) != 1 or new <= set(best.effects) or stronger.score <= weaker.score:
+        for stronger in list(known.values()):
+            own, new = company - set(stronger.laws), set(stronger.laws) - company
+            if len(own) != 1 or len(new) != 1 or new <= set(best.laws) or stronger.score <= weaker.score:
                 continue
-            found = _in_company(study, stronger, best, set(best.effects) - set(company), known)
+            found = _in_company(study, stronger, best, {e for e, _ in set(best.laws) - company}, known)
             if found is not None and found.score > best.score:
                 return exchanged(study, found, known)
     return best
@@ -102,7 +103,8 @@ def _in_company(study: Study, member: Weighed, best: Weighed, effects: set[str],
     """`member` and these effects of the best set beside, as they were fitted there; None where they are not to be had together or
     were weighed already."""
     together = {*member.effects, *effects}
-    if tuple(sorted(together)) in known or any(together & set(catalogue()[e].akin) for e in together):
+    laws = (*member.laws, *(law for law in best.laws if law[0] in effects))
+    if len(together) < len(laws) or tuple(sorted(laws)) in known or any(together & set(catalogue()[e].akin) for e in together):
         return None
     for effect in sorted(effects):
         if not study.budget.allows(f"{effect} beside {' + '.join(member.effects)}"):
@@ -114,7 +116,7 @@ def _in_company(study: Study, member: Weighed, best: Weighed, effects: set[str],
         if found is None:
             return None
         member = found
-    known[member.effects] = member
+    known[member.laws] = member
     return member
 
 
@@ -123,7 +125,7 @@ def _leaner(study: Study, base: Weighed, best: Weighed, known: Known, accept: fl
     while len(added := [e for e in best.effects if e not in base.effects]) > 1:
         reduced = []
         for effect in added:
-            rest = tuple(e for e in best.effects if e != effect)
+            rest = best.laws_without(effect)
             if rest not in known:
                 known[rest] = refit_without(study, base, best, effect)
             reduced.append(known[rest])

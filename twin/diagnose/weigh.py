@@ -14,6 +14,8 @@ from twin.diagnose.zeros import of_robot
 from twin.effects import Start, catalogue
 from twin.errors import SolveError
 
+Laws = tuple[tuple[str, str], ...]  # effect and its form, sorted; by these sets are told apart
+
 
 @dataclass(frozen=True)
 class Weighed:
@@ -28,6 +30,15 @@ class Weighed:
     def effects(self) -> tuple[str, ...]:
         """Of the robot, that is: not the zeros of this recording that jumped."""
         return tuple(sorted(e.id for e in of_robot(self.fit.model.twin.effects)))
+
+    @property
+    def laws(self) -> Laws:
+        """The same with the form each effect has."""
+        free = {e: tuple(f.parameter.name for f in self.fit.model.free if f.effect == e) for e in self.effects}
+        return tuple((e, catalogue()[e].form(free[e])) for e in self.effects)
+
+    def laws_without(self, effect: str) -> Laws:
+        return tuple(law for law in self.laws if law[0] != effect)
 
 
 def weigh(study: Study, fitted: Fit) -> Weighed:
@@ -47,13 +58,13 @@ def extended(study: Study, member: Weighed, effect: str, start: Start, beat: flo
         return None
 
 
-def fuller(study: Study, found: Weighed, effects: tuple[str, ...], accept: float) -> Weighed:
+def fuller(study: Study, found: Weighed, accept: float) -> Weighed:
     """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it.
 
     Before other effects are added: what the plain law leaves would be taken for them.
     """
     n_tendon, parts = study.bench.n_tendon, study.bench.robot.build().parts
-    for effect in effects:
+    for effect in found.effects:
         richer = catalogue()[effect].richer
         free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
         if not richer or set(richer) & set(free) or not catalogue()[effect].richer_needs <= parts:

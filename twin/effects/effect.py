@@ -18,7 +18,7 @@ An effect that acts in `sense` only needs no new simulation: it is applied to wh
 from __future__ import annotations
 
 from abc import ABC
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
@@ -247,6 +247,12 @@ class Effect(ABC):
             single = [{f"{p.name}_{i}": p.value + p.step for p in kind} for i in tendons]
             for values in (*single, {k: v for s in single for k, v in s.items()}):
                 yield Start(values, tuple(values))
+
+    @classmethod
+    def form(cls, free: Collection[str]) -> str:
+        """Which of several laws of this name is fitted, told by the parameters that are free, where an effect may begin as one or
+        another. Sets of effects are weighed with each; a start of the same form only leads to it from elsewhere."""
+        return ""
 
     def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
         """Where fits of a fuller law may begin, where this is the plain one: its values besides, and what it frees of `richer`;

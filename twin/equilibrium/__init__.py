@@ -137,7 +137,7 @@ class Equilibrium:
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
         if problem.route.bedding and by_spring.any():
-            raise SolveError("tendons that bed in are not solved under SMA springs; remove constructional_stretch")
+            raise SolveError("tendons that bed in are not solved under SMA springs; remove the toe of tendon_elasticity")
         heating = problem.heating
         # In one order in memory: the loop is compiled anew for another, which takes half a minute.
         command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))

@@ -86,6 +86,7 @@ def _visibility(v: Visibility) -> dict[str, Any]:
     name, value, unit = v.smallest
     return {
         "id": v.effect,
+        "form": v.form or None,
         "seen": finite(v.seen),
         "apart": finite(v.apart),
         "share": finite(v.share),

@@ -77,9 +77,9 @@ def needs(lacking: tuple[str, ...]) -> str:
 def blind(diagnosis: Diagnosis) -> str | None:
     """The effects that these data cannot show at any size, with what they lack; None where they can show all."""
     lacking: dict[tuple[str, ...], list[str]] = {}
-    for v in diagnosis.identifiability:
-        if not math.isfinite(v.seen):
-            lacking.setdefault(v.lacking, []).append(effect_words(v.effect))
+    shown = {v.effect for v in diagnosis.identifiability if math.isfinite(v.seen)}
+    for effect, why in dict.fromkeys((v.effect, v.lacking) for v in diagnosis.identifiability if v.effect not in shown):
+        lacking.setdefault(why, []).append(effect_words(effect))
     words = [f"{', '.join(names)} ({needs(why)})" for why, names in lacking.items()]
     return f"These data cannot show: {'; '.join(words)}." if words else None
 

@@ -21,7 +21,7 @@ def _rows(table: tuple[Visibility, ...]) -> list[dict[str, object]]:
     seen, apart = column([v.seen for v in table], 2), column([v.apart for v in table], 2)
     return [
         {
-            "name": effect_words(v.effect),
+            "name": f"{effect_words(v.effect)} ({v.form})" if v.form else effect_words(v.effect),
             "never": None if math.isfinite(v.seen) else f"never: {needs(v.lacking)}",
             "seen": a,
             "apart": b,
