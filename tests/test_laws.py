@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -128,6 +128,44 @@ def test_a_lag_of_a_step() -> None:
     expected = 1.0 - 2.0 * (1 - np.exp(-0.5)) * np.exp(-(t[after] - 1.0) / 2.0)
     np.testing.assert_allclose(lagged.tension[after, 1], expected, rtol=1e-12)
     np.testing.assert_allclose(lagged.displacement[after, 1], 1e-3 * expected, rtol=1e-12)
+
+
+def test_a_current_that_lags_heats_as_an_integrator_has_it() -> None:
+    """Of currents that hold from row to row, from none: the mean square over each interval, by scipy; of none, none."""
+    t, c = np.array([0.0, 0.3, 2.0, 2.1, 9.0]), np.array([1.0, 0.2, 0.0, 1.4, 0.7])
+    current = c[:, None] * np.array([1.0, 0.0, 2.0])
+    seen = Signals(t, t, 0 * current, 0 * current, np.zeros((5, 0, 3)), t, (Drive.CURRENT,) * 3, current)
+    delivered = law("actuator_lag", time=1.7).drive(seen)
+    x, expected = 0.0, []
+    for k in range(4):
+        rest = x - c[k]
+        square = quad(lambda s, k=k, rest=rest: (c[k] + rest * np.exp(-s / 1.7)) ** 2, 0.0, t[k + 1] - t[k], epsrel=1e-12)[0]
+        expected.append(np.sqrt(square / (t[k + 1] - t[k])))
+        x = c[k] + rest * np.exp(-(t[k + 1] - t[k]) / 1.7)
+    np.testing.assert_allclose(delivered.current[:4, 0], expected, rtol=1e-9)
+    np.testing.assert_allclose(delivered.current[:4], np.outer(expected, [1.0, 0.0, 2.0]), rtol=1e-9)
+    assert not delivered.tension.any()
+    fast = law("actuator_lag", time=1e-4).drive(seen).current
+    np.testing.assert_allclose(fast[:4, 0], c[:4], atol=5e-3)  # sqrt(1e-4 s / 2 / 0.1 s) x 0.2 A fades in the third
+    starts = [s.values["time"] for s in named("actuator_lag").starts([seen], 3)]
+    assert max(starts) > 1.0 > min(starts)
+    assert [s.values["time"] for s in named("actuator_lag").starts([some_signals()], 3)] == [0.1]
+    assert not list(law("actuator_lag").fuller_starts([seen])), "an inertia that no current has"
+    assert list(law("actuator_lag").fuller_starts([some_signals()]))
+
+
+def test_a_supply_ends_at_its_ceiling() -> None:
+    t = np.arange(4.0)
+    current = np.array([0.0, 0.5, 1.0, 2.0])[:, None] * np.ones(3)
+    seen = Signals(t, t, 0 * current, 0 * current, np.zeros((4, 0, 3)), t, (Drive.CURRENT,) * 3, current)
+    given = law("actuator_saturation", loss=1.0, ceiling=0.9, knee=1e-3).drive(seen)
+    np.testing.assert_allclose(given.current[:, 1], [0.0, 0.5, 0.9, 0.9], atol=1e-5)
+    assert not given.tension.any()
+    half = law("actuator_saturation", loss=0.5, ceiling=0.9, knee=1e-3).drive(seen).current[:, 2]
+    np.testing.assert_allclose(half, [0.0, 0.5, 0.95, 1.45], atol=1e-5)
+    starts = list(named("actuator_saturation").starts([seen], 3))
+    assert [s.free for s in starts] == [("loss", "ceiling", "knee")] * 2
+    assert all(0.5 < s.values["ceiling"] < 2.0 for s in starts)
 
 
 @pytest.mark.parametrize("smooth", [True, False])
@@ -328,6 +366,22 @@ def test_springs_cool_and_change_phase_as_their_laws_say() -> None:
     )
     np.testing.assert_allclose(moved.detwinning_start, 1.1 * plain.detwinning_start, rtol=1e-12)
     np.testing.assert_allclose(moved.detwinning_finish, 1.1 * plain.detwinning_finish, rtol=1e-12)
+
+
+def test_each_spring_may_change_phase_at_its_own_temperatures() -> None:
+    """By what it has more than the mean; the last one's departures make the sum none."""
+    plain = ROBOT.springs(3)
+    moved = law("sma_hysteresis", width=4.0, shift=1.0, width_1=2.0, shift_1=0.5, width_2=-6.0).spring(plain)
+    width, shift = np.array([6.0, -2.0, 8.0]), np.array([1.5, 1.0, 0.5])
+    for name in ("austenite_start", "austenite_finish"):
+        np.testing.assert_allclose(getattr(moved, name) - getattr(plain, name), shift + width / 2, rtol=0, atol=1e-10)
+    for name in ("martensite_start", "martensite_finish"):
+        np.testing.assert_allclose(getattr(moved, name) - getattr(plain, name), shift - width / 2, rtol=0, atol=1e-10)
+    alone = named("sma_hysteresis")({"width": 4.0}, 1)
+    assert {*alone.values} == {"width", "shift", "spread", "plateau"}
+    own = ("width_1", "shift_1", "width_2", "shift_2")
+    assert [s.free for s in law("sma_hysteresis").fuller_starts([])] == [("spread", "plateau"), ("spread", "plateau", *own)]
+    assert [s.free for s in alone.fuller_starts([])] == [("spread", "plateau")]
 
 
 def test_a_drive_gives_less_beyond_its_limit() -> None:

@@ -17,7 +17,7 @@ from twin.effects import Drive, Loads, Route, named
 from twin.equilibrium import Equilibrium
 from twin.equilibrium.holder import COMPRESSION, GIVE, STIFFEST
 from twin.equilibrium.lengths import CLOSED
-from twin.errors import DataError, SolveError
+from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
 from twin.twin import Twin
@@ -165,17 +165,6 @@ def test_a_twin_shows_how_much_longer_its_tendons_are() -> None:
     held = day("displacement", "tension", predicted((effect,), pulled, "displacement"))
     # The twin's backbone gives way to tendons held at lengths by 1 um/N, which tensions do not have: 5 um of some 2 mm/N.
     np.testing.assert_allclose(predicted((effect,), held, "tension"), T, rtol=0, atol=0.02)
-
-
-def test_tendons_that_bed_in_are_refused_where_nothing_solves_them() -> None:
-    robot = load("continuum")
-    effect = named("tendon_elasticity")({"toe": 5e-4}, 3)
-    outputs = (Channel("tip_x", "output", "m"),)
-    names = [f"sma_{i}_current" for i in (1, 2, 3)]
-    trial = Trial("a", np.arange(4.0), {n: np.full(4, 1e-3) for n in names} | {"tip_x": np.zeros(4)})
-    channels = (*(Channel(n, "input", "A") for n in names), *outputs)
-    with pytest.raises(SolveError, match="bed in are not"):
-        Twin(robot, {}, (effect,)).predict(Recording("continuum", "made", "simulation", None, channels, (trial,)), dynamic=False)
 
 
 @pytest.mark.parametrize("route", [Route(), Route(0.2, 4e-4), Route(0.2, 4e-4, 2e-4)], ids=["smooth", "friction", "and stretch"])

@@ -237,6 +237,25 @@ def test_it_is_the_rod_with_springs(mu: float) -> None:
     np.testing.assert_allclose(found.others["temperature"] - 273.15, truth.temperature, rtol=0, atol=2e-3 if mu == 0.0 else 0.05)
 
 
+@pytest.mark.parametrize("bedding", [0.0, 5e-4])
+def test_springs_pull_in_what_tendons_of_a_toe_give_way(bedding: float) -> None:
+    """A spring's elongation is the path's and the stiff tendon's share of it: the springs by themselves, given elongations so
+    reckoned from the paths and tensions found, pull with these tensions."""
+    time = np.arange(0.0, 100.0, 2.0)
+    route = Route(stretch=1e-4, bedding=bedding, bedding_tension=0.4)
+    found = drive(time, turns(time), SIDEWAYS, route)
+    alone = springs()
+    stretched = alone.initial_elongation + found.path - robot().straight_path - route.stretch * found.tension
+    stretched -= bedding * (1.0 - np.exp(-found.tension / 0.4))
+    temperature, tension = pull(alone, time, turns(time).T, stretched.T, ROOM)
+    # A trial starts from springs at rest under their own weight of 0.7 N, and its load comes on in eight steps: what history that
+    # leaves is gone where a spring has been heated through. 1e-4 N as above.
+    warm = temperature.max(axis=1) > 273.15 + 85.0
+    assert warm.any()
+    np.testing.assert_allclose(temperature.T, found.others["temperature"], rtol=0, atol=1e-2)
+    np.testing.assert_allclose(tension.T[5:, warm], found.tension[5:, warm], rtol=0, atol=2e-3)
+
+
 def bent(mounted: float) -> tuple[Twin, Equilibrium]:
     """A robot that rests with a radius of half a metre, and its springs put on it so."""
     law = named("backbone_precurvature")({"about_y": 2.0, "mounted": mounted})

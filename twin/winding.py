@@ -61,7 +61,7 @@ def winding(problem: Problem, moving: Equilibrium, start: ChainPath, zero: np.nd
     motors, springs = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
     stretch = max(problem.route.stretch, STIFFEST)
     records = no_springs(nt).records if problem.heating is None else problem.heating.spring.records
-    elongated = records["initial_elongation"] + path - zero - problem.route.stretch * tension
+    elongated = records["initial_elongation"] + path - zero - problem.route.elongation(tension)
     held = Held(
         motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from twin.compiled import jit
-from twin.effects.effect import Effect, Signals, between_rows
+from twin.effects.effect import Effect, Signals, Start, between_rows
 from twin.quantities import Parameter
 
 
@@ -49,15 +51,35 @@ def follow(time, cubics, lag, inertia, delivered):
             delivered[i, j] = x
 
 
+@jit
+def held(time, command, lag, delivered):
+    """lag x' + x = c, exact, from none at the first of `time` (n,), for commands (n, m) that hold from row to row; to `delivered`
+    (n, m) the root mean square of x until the next row, which heats a spring as x does.
+
+    With d = x - c at a row and a = dt / lag the square's mean is c^2 + 2 c d (1 - exp(-a)) / a + d^2 (1 - exp(-2 a)) / (2 a).
+    """
+    for j in range(command.shape[1]):
+        x = 0.0
+        for i in range(time.size - 1):
+            a, c = (time[i + 1] - time[i]) / lag, command[i, j]
+            d = x - c
+            square = c * c - 2.0 * c * d * np.expm1(-a) / a - 0.5 * d * d * np.expm1(-2.0 * a) / a
+            delivered[i, j] = np.sqrt(max(0.0, square))
+            x = c + d * np.exp(-a)
+        delivered[-1, j] = x
+
+
 class ActuatorLag(Effect):
     """Lag between command and delivery, of first order: time x' = c - x; of second, inertia time^2 x'' + time x' + x = c.
 
     Damping ratio 1 / (2 sqrt(inertia)): up to 0.25 two first-order lags in series, beyond it the drive overshoots. Behind a steady
     ramp it is late by `time` whatever its inertia.
 
-    Acts on whatever drives the tendons, tension or displacement. Between two rows the command is as `Signals.smooth` says.
+    Acts on whatever drives the tendons. Between two rows a tension or displacement is as `Signals.smooth` says; a current holds,
+    was none before the trial, follows in first order whatever the inertia, and counts by its mean square.
 
-    Source: linear system theory; a valve, a motor's current loop, a gearbox: 10 ms to 1 s.
+    Source: linear system theory; a valve, a motor's current loop, a gearbox: 10 ms to 1 s; a supply that ramps its current, a
+    spring that is heated through its mount: seconds.
 
     >>> t = np.array([0.0, 1.0, 2.0])
     >>> s = Signals(t, t, np.array([[0.0], [1.0], [1.0]]), np.zeros((3, 1)), np.zeros((3, 0, 3)), t)
@@ -67,18 +89,30 @@ class ActuatorLag(Effect):
 
     id = "actuator_lag"
     parameters = (
-        Parameter("time", 0.0, "s", 0.0, 5.0, "time constant; what a bench log's rows can show", scale=0.05),
+        Parameter("time", 0.0, "s", 0.0, 20.0, "time constant; what a bench log's rows can show", scale=0.05),
         Parameter("inertia", 0.0, "1", 0.0, 10.0, "1 / (4 damping ratio^2); 0: first order", scale=0.2),
     )
     richer = ("inertia",)
     akin = ("time_delay",)
-    guesses = ({"time": 0.1},)
     moves_with = "the rate of change of the pull"
+
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Where currents drive, some of the seconds in which a spring warms; else less than a row of most logs."""
+        for time in (0.5, 4.0) if any(s.by_current.any() for s in predicted) else (0.1,):
+            yield Start({"time": time}, ("time",))
+
+    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
+        if not any(s.by_current.all() for s in predicted):
+            yield from super().fuller_starts(predicted)
 
     def drive(self, command: Signals) -> Signals:
         if self["time"] > 0.0 and len(command.time) > 1:
             tension, displacement = (self._lagged(command, c) for c in (command.tension, command.displacement))
-            return command.with_(tension=tension, displacement=displacement)
+            current = np.zeros_like(command.current)
+            if command.by_current.any():
+                held(np.asarray(command.time, float), np.ascontiguousarray(command.current), self["time"], current)
+            return command.with_(tension=tension, displacement=displacement, current=current)
         return command
 
     def _lagged(self, signals: Signals, command: np.ndarray) -> np.ndarray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from twin.effects.effect import Effect, Signals, Start
 from twin.quantities import Parameter
 from twin.springs import Spring
@@ -14,7 +16,8 @@ class SmaHysteresis(Effect):
     A_f - A_s = spread (described), M_s - M_f = spread (described);   forces of the cold plateau = plateau (described).
 
     `width` opens the loop of tension against temperature, `shift` moves it; `spread` tilts its flanks. Heating and cooling branches
-    that move by different amounts a (A_s, A_f) and m (M_s, M_f) are shift = (a + m)/2, width = a - m.
+    that move by different amounts a (A_s, A_f) and m (M_s, M_f) are shift = (a + m)/2, width = a - m. Springs need not be alike:
+    `width_i` and `shift_i` are by how much those of spring i are more, the last one's such that they sum to none.
 
     Source: the transformation temperatures of NiTi move by 10 K for 0.1 % of nickel (Frenzel et al., Acta Materialia 2010) and with
     each annealing; the loop narrows by some 5-10 K over the first hundred cycles.
@@ -36,6 +39,10 @@ class SmaHysteresis(Effect):
     moves_with = "the direction of travel of the springs (hysteresis loop)"
 
     @classmethod
+    def declared(cls, n_tendon: int) -> tuple[Parameter, ...]:
+        return (*cls.parameters, *(p for i in range(1, n_tendon) for p in _own(i)))
+
+    @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """A wider loop, a narrower one, and both moved; nowhere without springs."""
         if any(s.by_current.any() for s in predicted):
@@ -43,8 +50,15 @@ class SmaHysteresis(Effect):
                 for shift in (1.0, -1.0):
                     yield Start({"width": width, "shift": shift}, ("width", "shift"))
 
+    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
+        """Flanks and plateau that all springs share; these, and springs that differ."""
+        for parameters in dict.fromkeys((self.parameters, self.declared(self.n_tendon))):
+            steps = {p.name: p.value + p.step for p in parameters if p.name not in ("width", "shift")}
+            yield Start(steps, tuple(steps))
+
     def spring(self, spring: Spring) -> Spring:
-        up, down = self["shift"] + 0.5 * self["width"], self["shift"] - 0.5 * self["width"]
+        width, shift = (self[name] + self._more(name, len(spring.loss)) for name in ("width", "shift"))
+        up, down = shift + 0.5 * width, shift - 0.5 * width
         a = 0.5 * (spring.austenite_start + spring.austenite_finish)
         m = 0.5 * (spring.martensite_start + spring.martensite_finish)
         return spring._replace(
@@ -55,3 +69,13 @@ class SmaHysteresis(Effect):
             detwinning_start=self["plateau"] * spring.detwinning_start,
             detwinning_finish=self["plateau"] * spring.detwinning_finish,
         )
+
+    def _more(self, name: str, n: int) -> np.ndarray:
+        """(n,) K, what the springs have more than the mean of all."""
+        own = np.array([self[f"{name}_{i}"] for i in range(1, n)])
+        return np.append(own, -own.sum())
+
+
+def _own(i: int) -> Iterator[Parameter]:
+    for name in ("width", "shift"):
+        yield Parameter(f"{name}_{i}", 0.0, "K", -10.0, 10.0, "springs of one wire: kelvins; ours", scale=1.0, std=3.0)

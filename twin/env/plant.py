@@ -73,7 +73,7 @@ class Plant:
             np.zeros(1), np.zeros((1, n)), loads, laws.route, (drive,) * n, laws.creep, stiffness=stiffness, heating=heating
         )
         self.moving = (Moving if dynamic else Resting)(dynamics, problem)
-        self._straight, self._stretch = dynamics.straight_path, laws.route.stretch
+        self._straight, self._route = dynamics.straight_path, laws.route
         self._wires = Wires(laws, drive, n)
         base = self._wires.driven(0.0, np.zeros(n))
         seen, samples, lost = self.moving.run(np.zeros(1), base[None], np.full(1, ROOM))
@@ -98,5 +98,5 @@ class Plant:
 
     def _note(self, seen: Seen, i: int) -> None:
         self._tip, self.q = seen.markers[i, -1], seen.q[i]
-        travel = self._straight - seen.path[i] + self._stretch * seen.tension[i]
+        travel = self._straight - seen.path[i] + self._route.elongation(seen.tension[i])
         self._wires.note(seen.tension[i], travel, self.body.frame.reported(seen.markers[i]))

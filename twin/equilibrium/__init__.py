@@ -24,7 +24,6 @@ from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.holder import STIFFEST
 from twin.equilibrium.trial import Driving, Found, How, Near, Slow
-from twin.errors import SolveError
 from twin.hinges import HingeChain, hinge_pairs
 from twin.springs.spring import no_springs
 
@@ -133,11 +132,9 @@ class Equilibrium:
         return Load(gravity, float(loads.payload), force, aside, pushed)
 
     def driving(self, problem: Problem) -> Driving:
-        """What drives the trial. Raises SolveError for SMA springs that pull tendons which bed in."""
+        """What drives the trial."""
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
-        if problem.route.bedding and by_spring.any():
-            raise SolveError("tendons that bed in are not solved under SMA springs; remove the toe of tendon_elasticity")
         heating = problem.heating
         # In one order in memory: the loop is compiled anew for another, which takes half a minute.
         command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))
@@ -172,7 +169,7 @@ class Equilibrium:
     def solve(self, problem: Problem) -> ChainPath:
         """Equilibria in the order of `twin.equilibrium.pulled`, or `held` where a tendon is held at a length or by a spring.
 
-        Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before. Raises as `driving`.
+        Where no equilibrium was found the sample's status is NOT_FOUND and its shape is the one before.
         """
         (n, nt), nv, creep, near = problem.command.shape, self.n_slow, problem.creep, problem.near
         amplitude = np.array(creep.amplitude, float)

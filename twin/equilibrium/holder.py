@@ -5,9 +5,9 @@ them pull, the backbone carries in compression. A tendon that beds in gives way 
 step it is one of free length free + e - e' T whose stretch is e' more. A motor that stalls pulls no more than T_s: a tendon that
 would need more is one that gives `GIVE` a newton from there.
 
-An SMA spring: on each linear piece Y = Y_0 + slope (e - e_0) of its law (twin/springs/force.py), at an elongation
-e = e_start + path - straight path - stretch T, it is a tendon of free length path - stretch T - Y/slope whose stretch is 1/slope
-more, so gap = (Y - T)/slope. The piece is taken anew at every step (semi-smooth Newton: all pieces rise with e).
+An SMA spring: on each linear piece Y = Y_0 + slope (e_s - e_0) of its law (twin/springs/force.py), at an elongation
+e_s = e_start + path - straight path - stretch T - e, it is a tendon of free length path - (stretch + e') T - Y/slope whose stretch
+is e' + 1/slope more, so gap = (Y - T)/slope. The piece is taken anew at every step (semi-smooth Newton: all pieces rise with e).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Held(NamedTuple):
     temperature: np.ndarray  # K, of the springs
     elongation: np.ndarray  # m, of the springs when they last were at rest
     tension: np.ndarray  # N, theirs then
-    bedding: float  # m, of tendons that motors hold
+    bedding: float  # m
     bedding_tension: float  # N
     bedded: np.ndarray  # (n_tendon,) m, e - e' T
     stall: float  # N, of motors
@@ -50,7 +50,10 @@ class Held(NamedTuple):
 @inner
 def elongation(held, t, path, tension):
     """Elongation (m) of the spring that pulls tendon t at a path length (m) and a tension."""
-    return held.spring[t].initial_elongation + path - held.straight[t] - held.elastic * tension / held.factor[0]
+    longer_by = held.elastic * tension / held.factor[0]
+    if held.bedding > 0.0:
+        longer_by += held.bedding * (1.0 - np.exp(-tension / (held.bedding_tension * held.factor[0])))
+    return held.spring[t].initial_elongation + path - held.straight[t] - longer_by
 
 
 @inner
@@ -62,6 +65,9 @@ def linearise(held, s, tension):
             e = elongation(held, t, s[t, 0], tension[t])
             Y, slope = piece(held.spring, t, held.temperature[t], e, held.elongation[t], held.tension[t])
             elastic = held.elastic / held.factor[0]
+            if held.bedding > 0.0:
+                over = held.bedding_tension * held.factor[0]
+                elastic += held.bedding / over * np.exp(-tension[t] / over)
             held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
             held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
         elif held.bedding > 0.0 or held.stall < np.inf:

@@ -61,7 +61,7 @@ class HeatedRobot(LoadedRobot):
         self.held = Held(
             sprung.copy(), sprung, path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
-            spring.initial_tension.copy(), 0.0, 1.0, np.zeros(nt), np.inf,
+            spring.initial_tension.copy(), self.route.bedding, self.route.bedding_tension, np.zeros(nt), np.inf,
         )  # fmt: skip
         remember(self.held, self.now.s, self.now.T)
 
