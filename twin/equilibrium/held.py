@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from twin.compiled import assign, jit, part
 from twin.equilibrium.holder import remember
-from twin.equilibrium.lengths import hold_once, move, reach, tangent
+from twin.equilibrium.lengths import hold_once, move, reach, stay, tangent
 from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, wary, weigh
 from twin.springs.heat import heated
 
@@ -109,14 +109,20 @@ def first_tensions(now, near, i):
 
 
 @part
-def settled(now, near, how):
-    """The equilibrium of the present sample. Returns its status; the shape stays the last one where there is none.
+def settled(now, near, how, i):
+    """The equilibrium of sample i. Returns its status; the shape stays the last one where there is none.
 
-    Friction wants it in full: slip carries what a single step leaves on to all samples that follow.
+    Friction wants it in full: slip carries what a single step leaves on to all samples that follow. Where a single step is lost, as
+    beside a spring about to change the branch of its law, there is no first order, and the neighbour's own shape stays.
     """
     if how.once and near.q.size > 0 and not now.at.law.mu > 0.0:
         move(now.held, now.sought, now.sought, 1.0)
         status = hold_once(now.at, now.state, now.factors, now.held)
+        if status == 0:
+            assign(now.state.q, near.q[i])
+            first_tensions(now, near, i)
+            stay(now.at, now.state)
+            status = 1
     else:
         status = reach(now.at, now.state, now.factors, now.held, now.last, now.sought, min(how.tol, FINE), wary(now, near))
     if status == 0:
@@ -146,7 +152,7 @@ def run(plain, driving, slow, near, how, state, found):
         soften(now, driving, i, 1.0)
         command(now, driving, i, 1.0)
         first_tensions(now, near, i)
-        found.status[i] = settled(now, near, how)
+        found.status[i] = settled(now, near, how, i)
         if how.keep:
             keep_tangent(now, found.LU[i])
         remember(now.held, state.s, state.T)

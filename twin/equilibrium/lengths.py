@@ -125,6 +125,9 @@ def reach(at, state, factors, held, last, sought, tol, wary):
     """
     T, fresh = state.T, factors.fresh
     q0, T0, T1, was = last.copy(), T.copy(), T.copy(), Sought(held.free.copy(), held.temperature.copy())
+    for t in range(T.size):
+        if held.by_spring[t]:  # what it had at `last`; T may be a guess
+            T0[t] = held.factor[0] * held.tension[t]
     move(held, was, sought, 1.0)
     if not wary and hold(at, state, factors, held, tol) == 1:
         return 1
@@ -278,9 +281,9 @@ def hold(at, state, factors, held, tol):
 
 @inner
 def hold_once(at, state, factors, held):
-    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent. Commits the slip.
+    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent.
 
-    Returns 1, or 0 where lost.
+    Returns 1 and commits the slip, or 0 where shape and tensions are lost.
     """
     r, none = np.empty(state.q.size), np.empty((0, 0))
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
@@ -288,9 +291,21 @@ def hold_once(at, state, factors, held):
     bowing = balance(at, state, z, s, r, none)
     linearise(held, s, state.T)
     longest = advance(at, state, factors, held, z, s, r)
+    if not 0.0 <= longest < LONGEST_STEP:
+        return 0
     place(at, state.q)
     commit(at, state, bowing)
-    return 1 if 0.0 <= longest < LONGEST_STEP else 0
+    return 1
+
+
+@inner
+def stay(at, state):
+    """Commits the slip of the shape and tensions that the state has."""
+    r, none = np.empty(state.q.size), np.empty((0, 0))
+    z, s = np.empty(state.z.shape), np.empty(state.s.shape)
+    place(at, state.q)
+    balance(at, state, z, s, r, none)
+    settle(state, z, s)
 
 
 @inner
