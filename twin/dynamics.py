@@ -218,7 +218,8 @@ class Moving:
         model.qpos_spring[:] = fixed + delayed.sum(axis=0)
         data.qpos[:] = start.q[0]
         mujoco.mj_forward(model, data)
-        self._winding = winding(problem, moving, start, dynamics.statics.zero_path(route, problem.which(Drive.CURRENT)))
+        springs = None if problem.heating is None else problem.heating.spring
+        self._winding = winding(problem, moving, start, dynamics.statics.zero_path(route, problem.which(Drive.CURRENT), springs))
         motor, self._began = np.zeros(start.slip.shape, np.int64), float(problem.time[0])
         for t, d in ((t, d) for t, n in enumerate(moving.chain.pieces) for d in range(n)):
             motor[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id

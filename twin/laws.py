@@ -76,6 +76,7 @@ class Laws:
         return Route(
             rubbing.mu, rubbing.presliding, sum(r.stretch for r in routes), beds.bedding, beds.bedding_tension,
             bearing, max((r.mounted for r in routes), default=0.0), min((r.stall for r in routes), default=np.inf),
+            max((r.hooked for r in routes), default=0.0),
         )  # fmt: skip
 
     @property

@@ -104,7 +104,8 @@ class Route:
     """A tendon: friction coefficient and pre-sliding travel (m); stretch (m/N); by how much it beds in (m) and over which tension
     (N). Of antagonists also how the joint that they turn rubs.
     `stall`: the tension (N) at which a motor that holds a tendon at a length gives way, and holds no more.
-    `mounted`: the share of its rest bend that the body had when SMA springs were put on."""
+    `mounted`: the share of its rest bend that the body had when SMA springs were put on; `hooked`: that of what their first tension
+    stretches which was stretched then, so that the springs were as long as described."""
 
     mu: float = 0.0
     presliding: float = 4e-4
@@ -114,6 +115,7 @@ class Route:
     bearing: Bearing = field(default_factory=Bearing)
     mounted: float = 0.0
     stall: float = np.inf
+    hooked: float = 0.0
 
     def elongation(self, tension: np.ndarray) -> np.ndarray:
         """By how much (m) a tendon is longer under a tension (N) than slack."""

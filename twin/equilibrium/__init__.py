@@ -25,7 +25,7 @@ from twin.equilibrium.elastic import COUPLING
 from twin.equilibrium.holder import STIFFEST
 from twin.equilibrium.trial import Driving, Found, How, Near, Slow
 from twin.hinges import HingeChain, hinge_pairs
-from twin.springs.spring import no_springs
+from twin.springs.spring import Spring, no_springs
 
 __all__ = ["ChainPath", "Equilibrium"]
 
@@ -143,7 +143,7 @@ class Equilibrium:
             command=command,
             by_length=by_length,
             by_spring=by_spring,
-            straight=self.zero_path(problem.route, by_spring),
+            straight=self.zero_path(problem.route, by_spring, None if heating is None else heating.spring),
             stretch=float(problem.route.stretch),
             bedding=float(problem.route.bedding),
             bedding_tension=float(problem.route.bedding_tension),
@@ -160,11 +160,12 @@ class Equilibrium:
         paid_out, held_by = -self.straight_path[None], (Drive.DISPLACEMENT,) * len(self.straight_path)
         return self.solve(Problem(np.zeros(1), paid_out, Loads(np.zeros(3)), drives=held_by)).path[0]
 
-    def zero_path(self, route: Route, by_spring: np.ndarray) -> np.ndarray:
+    def zero_path(self, route: Route, by_spring: np.ndarray, springs: Spring | None) -> np.ndarray:
         """(n_tendon,) m: path lengths at which motors stand at zero, and springs are as long as when they were put on."""
-        if not (route.mounted and by_spring.any()):
+        if springs is None or not by_spring.any():
             return self.straight_path
-        return self.straight_path + route.mounted * by_spring * (self.rest_path - self.straight_path)
+        put_on = self.straight_path - by_spring * route.hooked * route.elongation(springs.initial_tension)
+        return put_on + route.mounted * by_spring * (self.rest_path - self.straight_path) if route.mounted else put_on
 
     def solve(self, problem: Problem) -> ChainPath:
         """Equilibria in the order of `twin.equilibrium.pulled`, or `held` where a tendon is held at a length or by a spring.

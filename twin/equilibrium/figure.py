@@ -107,6 +107,6 @@ def _stretched(path: Path, i: int, solver: Equilibrium, route: Route, springs: S
     """Elongation (n_tendon, 2) m of the springs at sample i and on the straight robot; none without springs."""
     if springs is None:
         return None
-    put_on = solver.zero_path(route, np.ones(len(path.path[i]), bool))
-    now = springs.initial_elongation + path.path[i] - put_on - route.stretch * path.tension[i]
+    put_on = solver.zero_path(route, np.ones(len(path.path[i]), bool), springs)
+    now = springs.initial_elongation + path.path[i] - put_on - route.elongation(path.tension[i])
     return np.column_stack([now, springs.initial_elongation])

@@ -45,7 +45,7 @@ class HeatedRobot(LoadedRobot):
         """As at the start of a trial: springs at the room's temperature, the straight robot, then its loads. Raises SolveError."""
         nt, c = self.n_tendon, self.solver
         sprung = np.ones(nt, bool)
-        path = c.zero_path(self.route, sprung)
+        path = c.zero_path(self.route, sprung, self.heating.spring)
         start = c.solve(
             Problem(
                 np.zeros(1), np.zeros((1, nt)), self.loads, self.route, (Drive.CURRENT,) * nt, heating=self.heating,

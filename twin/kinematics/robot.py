@@ -104,7 +104,7 @@ class LoadedRobot:
         chain = self.solver.chain
         place(self.statics, self.now.q)
         markers = chain.site[chain.marker]
-        path = self.solver.straight_path - self.now.s[:, 0] + self.route.stretch * self.tension
+        path = self.solver.straight_path - self.now.s[:, 0] + self.route.elongation(self.tension)
         seen = self.twin.laws.sense(self._signals(self.tension, markers).with_(displacement=path[None]))
         return Shape(seen.tension[0], seen.displacement[0], seen.markers[0], chain.site[chain.disk[-1]].copy())
 
