@@ -256,6 +256,44 @@ def test_springs_pull_in_what_tendons_of_a_toe_give_way(bedding: float) -> None:
     np.testing.assert_allclose(tension.T[5:, warm], found.tension[5:, warm], rtol=0, atol=2e-3)
 
 
+@pytest.mark.parametrize("swap", [1e-4, 4e-4])
+def test_springs_that_follow_with_play_stand_still_while_their_tendons_turn_back(swap: float) -> None:
+    """Half a millimetre of play: elongations by a play operator along the paths found, row by row, give springs by themselves the
+    tensions found. All of a turn that lies within the gap stays with the tendon, or the share that a softer gap leaves."""
+    time, half = np.arange(0.0, 100.0, 1.0), 2.5e-4
+    route = Route(play=(half,) * 3, swap=swap)
+    found = drive(time, turns(time), SIDEWAYS, route)
+    alone, swap = springs(), max(swap, half / 0.95)
+    path = found.path - robot().straight_path
+    # Where the first row stands within the gap the solve knows from the load that came on before it, without currents; its own
+    # tensions tell: one of the two ends or between, by least squares.
+    side = np.zeros_like(path)
+    for t in range(3):
+
+        def played(z: float, t: int = t) -> np.ndarray:
+            out = np.empty(len(path))
+            out[0] = z
+            for i in range(1, len(path)):
+                out[i] = z = min(1.0, max(-1.0, z + (path[i, t] - path[i - 1, t]) / swap))
+            return out
+
+        def error(z: float, t: int = t, played=played) -> float:
+            stretched = alone.initial_elongation[:1] + path[:, t] - half * played(z)
+            one = Spring(*(field[t : t + 1] for field in alone))
+            return float(
+                np.abs(pull(one, time, turns(time).T[t : t + 1], stretched[None], ROOM)[1][0] - found.tension[:, t])[10:].max()
+            )
+
+        best = min(np.linspace(-1.0, 1.0, 81), key=error)
+        side[:, t] = played(best)
+    stretched = alone.initial_elongation + path - half * side
+    temperature, tension = pull(alone, time, turns(time).T, stretched.T, ROOM)
+    np.testing.assert_allclose(tension.T[10:], found.tension[10:], rtol=0, atol=5e-3)
+    assert np.ptp(side, axis=0).max() > 1.5, "the gap is crossed"
+    without = pull(alone, time, turns(time).T, (alone.initial_elongation + path).T, ROOM)[1]
+    assert np.abs(without.T - found.tension).max() > 0.1
+
+
 def bent(mounted: float) -> tuple[Twin, Equilibrium]:
     """A robot that rests with a radius of half a metre, and its springs put on it so."""
     law = named("backbone_precurvature")({"about_y": 2.0, "mounted": mounted})

@@ -69,14 +69,15 @@ class Laws:
 
     @property
     def route(self) -> Route:
-        """Along the tendons: the first friction of each kind, the first that beds in, all stretch, and the least stall."""
+        """Along the tendons: the first friction of each kind, the first that beds in or has play, all stretch, the least stall."""
         routes = [e.route() for e in self.effects]
         rubbing, beds = (next((r for r in routes if getattr(r, kind) > 0.0), Route()) for kind in ("mu", "bedding"))
+        loose = next((r for r in routes if any(r.play)), Route())
         bearing = next((r.bearing for r in routes if r.bearing != Bearing()), Bearing())
         return Route(
             rubbing.mu, rubbing.presliding, sum(r.stretch for r in routes), beds.bedding, beds.bedding_tension,
             bearing, max((r.mounted for r in routes), default=0.0), min((r.stall for r in routes), default=np.inf),
-            max((r.hooked for r in routes), default=0.0),
+            max((r.hooked for r in routes), default=0.0), loose.play, loose.swap,
         )  # fmt: skip
 
     @property

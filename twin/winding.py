@@ -22,7 +22,7 @@ from twin.body import Problem
 from twin.compiled import inner
 from twin.effects import Drive
 from twin.equilibrium import ChainPath, Equilibrium
-from twin.equilibrium.holder import COMPRESSION, STIFFEST, Held, elongation
+from twin.equilibrium.holder import COMPRESSION, STIFFEST, Held, of_play, rest
 from twin.hinges import HingeChain
 from twin.springs.heat import heated
 from twin.springs.spring import no_springs
@@ -66,6 +66,7 @@ def winding(problem: Problem, moving: Equilibrium, start: ChainPath, zero: np.nd
         motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
         float(problem.route.bedding), float(problem.route.bedding_tension), np.zeros(nt), float(problem.route.stall),
+        *of_play(problem.route, zero),
     )  # fmt: skip
     number = np.array([model.tendon(whole(t)).id if held.which[t] else -1 for t in range(nt)], np.int64)
     stiffness, band, bowing = model.tendon_stiffness.reshape(model.ntendon, -1), model.tendon_lengthspring, np.zeros(nt)
@@ -113,6 +114,5 @@ def let_go(winding, state, t):
 def heat(winding, state, t, current, ambient, dt):
     """Spring t comes to rest, and is heated for dt (s) by a current (A) in surroundings at `ambient` (K)."""
     held = winding.held
-    held.elongation[t] = elongation(held, t, state.s[t, 0], state.T[t])
-    held.tension[t] = state.T[t]
+    rest(held, t, state.s[t, 0], state.T[t])
     held.temperature[t] = heated(held.spring, t, held.temperature[t], held.elongation[t], current, ambient, dt)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.compiled import jit
-from twin.effects.effect import Effect, Signals, Start
+from twin.effects.effect import Effect, Route, Signals, Start
 from twin.quantities import Parameter
 
 GUESS = 2e-4  # m
@@ -30,6 +30,10 @@ class TendonBacklash(Effect):
     The gap of drive i is `gap`, common to all, plus its own gap_i. The side z changes over the travel `swap`; with swap = gap/2
     the tendon stands still while the motor crosses the gap (the play operator), with less it is a spring-loaded one. `slack` is
     what must be taken up before the tendon pulls.
+
+    An SMA spring follows its tendon with that play: it is longer than the path has it by gap/2 z less, z = +1 after paying out, and
+    with swap = gap/2 stands still while the tendon crosses the gap (95 % of it: play alone would leave no stiffness). Slack is not
+    taken up there.
 
     Antagonists that turn a rigid joint: each of them only ever pulls, so that its play lies on the pulling side, z = +1, whichever
     way it travels. It is slack of gap/2 in both: a dead band that is crossed where the load, not the travel, changes its sign.
@@ -61,6 +65,8 @@ class TendonBacklash(Effect):
         yield Start({"gap": GUESS}, ("gap", "swap"))
         if n_tendon == 1 or any(s.antagonists for s in predicted):
             return
+        if any(s.by_current.any() for s in predicted):
+            yield Start({"gap": 4.0 * GUESS, "swap": 2.0 * GUESS}, ("gap", "swap"))
         travel = np.ptp(np.concatenate([s.displacement for s in predicted]), axis=0)
         for i in np.flatnonzero(travel > GUESS) + 1:
             yield Start({f"gap_{i}": GUESS}, (f"gap_{i}", "swap"))
@@ -71,7 +77,10 @@ class TendonBacklash(Effect):
 
     def sense(self, true: Signals) -> Signals:
         ahead = true.displacement + self["slack"] + 0.5 * self._gap() * self._side(true)
-        return true.with_(displacement=np.where(true.by_length, true.displacement, ahead))
+        return true.with_(displacement=np.where(true.by_length | true.by_current, true.displacement, ahead))
+
+    def route(self) -> Route:
+        return Route(play=tuple(0.5 * self._gap()), swap=self["swap"])
 
     def _gap(self) -> np.ndarray:
         return self["gap"] + self.each("gap")

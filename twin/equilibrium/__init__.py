@@ -22,7 +22,7 @@ from twin.effects import Drive, Loads, Push, Route
 from twin.equilibrium import held, pulled
 from twin.equilibrium.chain import Chain, Law, Load, State, Statics
 from twin.equilibrium.elastic import COUPLING
-from twin.equilibrium.holder import STIFFEST
+from twin.equilibrium.holder import STIFFEST, of_play
 from twin.equilibrium.trial import Driving, Found, How, Near, Slow
 from twin.hinges import HingeChain, hinge_pairs
 from twin.springs.spring import Spring, no_springs
@@ -136,6 +136,7 @@ class Equilibrium:
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
         heating = problem.heating
+        play, swap, _, _ = of_play(problem.route, self.straight_path)
         # In one order in memory: the loop is compiled anew for another, which takes half a minute.
         command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))
         return Driving(
@@ -147,6 +148,8 @@ class Equilibrium:
             stretch=float(problem.route.stretch),
             bedding=float(problem.route.bedding),
             bedding_tension=float(problem.route.bedding_tension),
+            play=play,
+            swap=swap,
             stall=float(problem.route.stall),
             least_stretch=STIFFEST,
             stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),

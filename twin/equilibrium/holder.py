@@ -8,6 +8,8 @@ would need more is one that gives `GIVE` a newton from there.
 An SMA spring: on each linear piece Y = Y_0 + slope (e_s - e_0) of its law (twin/springs/force.py), at an elongation
 e_s = e_start + path - straight path - stretch T - e, it is a tendon of free length path - (stretch + e') T - Y/slope whose stretch
 is e' + 1/slope more, so gap = (Y - T)/slope. The piece is taken anew at every step (semi-smooth Newton: all pieces rise with e).
+A spring that follows its tendon with play is longer by play z less, z = +1 after the path has grown, -1 after it has shrunk,
+z = clip(z + the path's change / swap): between, only k = 1 - play / swap of a change reach it, and gap = (Y - T)/(slope k).
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.compiled import inner, jit
+from twin.effects import Route
+from twin.effects.tendon_friction import slip_state
 from twin.springs.force import piece
 
 STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
@@ -24,6 +28,7 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
+LOOSEST = 0.95  # of a path's change that play may keep from a spring: all of it would leave no stiffness
 GIVE = 10.0  # m/N of a motor that stalls: a millimetre less than commanded is a tenth of a millinewton more
 
 
@@ -45,6 +50,19 @@ class Held(NamedTuple):
     bedding_tension: float  # N
     bedded: np.ndarray  # (n_tendon,) m, e - e' T
     stall: float  # N, of motors
+    play: np.ndarray  # (n_tendon,) m, of tendons that springs pull
+    swap: np.ndarray  # (n_tendon,) m
+    side: np.ndarray  # (n_tendon,) z when the springs last were at rest
+    length: np.ndarray  # (n_tendon,) m, of the paths then
+
+
+@inner
+def loose(held, t, path):
+    """Play (m) of tendon t at a path length (m), and the share of a change of it that reaches the spring."""
+    if held.play[t] == 0.0:
+        return 0.0, 1.0
+    z = slip_state(held.side[t], path - held.length[t], held.swap[t])
+    return held.play[t] * z, 1.0 if abs(z) == 1.0 else 1.0 - held.play[t] / held.swap[t]
 
 
 @inner
@@ -53,7 +71,7 @@ def elongation(held, t, path, tension):
     longer_by = held.elastic * tension / held.factor[0]
     if held.bedding > 0.0:
         longer_by += held.bedding * (1.0 - np.exp(-tension / (held.bedding_tension * held.factor[0])))
-    return held.spring[t].initial_elongation + path - held.straight[t] - longer_by
+    return held.spring[t].initial_elongation + path - held.straight[t] - longer_by - loose(held, t, path)[0]
 
 
 @inner
@@ -68,8 +86,9 @@ def linearise(held, s, tension):
             if held.bedding > 0.0:
                 over = held.bedding_tension * held.factor[0]
                 elastic += held.bedding / over * np.exp(-tension[t] / over)
-            held.free[t] = s[t, 0] - elastic * tension[t] - Y / slope
-            held.stretch[t] = elastic + 1.0 / (slope * held.factor[0])
+            share = loose(held, t, s[t, 0])[1]
+            held.free[t] = s[t, 0] - (elastic * tension[t] + Y / slope) / share
+            held.stretch[t] = (elastic + 1.0 / (slope * held.factor[0])) / share
         elif held.bedding > 0.0 or held.stall < np.inf:
             bed_in(held, t, tension[t])
     if held.stall < np.inf:
@@ -114,10 +133,25 @@ def lack(held, t, path, tension):
     return gap
 
 
+@inner
+def rest(held, t, path, tension):
+    """Spring t comes to rest at a path length (m) under a tension (N)."""
+    held.elongation[t] = elongation(held, t, path, tension * held.factor[0])
+    held.tension[t] = tension
+    if held.play[t] > 0.0:
+        held.side[t] = slip_state(held.side[t], path - held.length[t], held.swap[t])
+    held.length[t] = path
+
+
+def of_play(route: Route, zero: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """`play`, `swap`, `side` and `length` of `Held` before anything has moved, for paths of `zero` (n_tendon,) m."""
+    play = np.array(route.play or np.zeros(zero.size), float)
+    return play, np.maximum(route.swap, play / LOOSEST), np.zeros(zero.size), zero.copy()
+
+
 @jit
 def remember(held, s, tension):
     """The springs come to rest: their elongations and tensions become those their law goes on from."""
     for t in range(tension.size):
         if held.by_spring[t]:
-            held.elongation[t] = elongation(held, t, s[t, 0], tension[t])
-            held.tension[t] = tension[t] / held.factor[0]
+            rest(held, t, s[t, 0], tension[t] / held.factor[0])

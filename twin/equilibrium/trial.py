@@ -28,6 +28,8 @@ class Driving(NamedTuple):
     stretch: float  # m/N, of a tendon
     bedding: float  # m, by which it beds in
     bedding_tension: float  # N, over which it does
+    play: np.ndarray  # (n_tendon,) m, of those that springs pull
+    swap: np.ndarray  # (n_tendon,) m
     stall: float  # N, at which a motor that holds a length gives way
     least_stretch: float  # m/N, of one that a motor holds at a length
     stiffness: np.ndarray  # (n,) of the body over that at its reference temperature
@@ -148,6 +150,7 @@ def at_rest(plain, driving, slow, state):
     held = Held(
         driving.by_spring.copy(), driving.by_spring, straight.copy(), np.empty(nt), straight, driving.stretch, np.ones(1), spring,
         warm.copy(), elongation, tension, driving.bedding, driving.bedding_tension, np.zeros(nt), driving.stall,
+        driving.play, driving.swap, np.zeros(nt), straight.copy(),
     )  # fmt: skip
     now = Now(
         at, load.gravity, load.force, load.push, law.wall[4], plain.rest, state, no_factors(nv, nt), held,

@@ -13,7 +13,7 @@ from twin.body import DIRECT, TOLERANCE, Problem
 from twin.effects import Drive, Loads
 from twin.equilibrium import ChainPath
 from twin.equilibrium.chain import State
-from twin.equilibrium.holder import Held, remember
+from twin.equilibrium.holder import Held, of_play, remember
 from twin.equilibrium.lengths import Sought, reach
 from twin.equilibrium.newton import no_factors, place
 from twin.errors import SolveError
@@ -62,6 +62,7 @@ class HeatedRobot(LoadedRobot):
             sprung.copy(), sprung, path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
             spring.initial_tension.copy(), self.route.bedding, self.route.bedding_tension, np.zeros(nt), np.inf,
+            *of_play(self.route, path),
         )  # fmt: skip
         remember(self.held, self.now.s, self.now.T)
 
