@@ -32,7 +32,7 @@ class TendonBacklash(Effect):
     what must be taken up before the tendon pulls.
 
     An SMA spring follows its tendon with that play: it is longer than the path has it by gap/2 z less, z = +1 after paying out, and
-    with swap = gap/2 stands still while the tendon crosses the gap (95 % of it: play alone would leave no stiffness). Slack is not
+    with swap = gap/2 stands still while the tendon crosses the gap (99 % of it: play alone would leave no stiffness). Slack is not
     taken up there.
 
     Antagonists that turn a rigid joint: each of them only ever pulls, so that its play lies on the pulling side, z = +1, whichever

@@ -28,7 +28,7 @@ STIFFEST = 1e-6  # m/N of any tendon: two taut ones may run side by side
 # NiTi of 0.8 mm 3e-6; at 3 N this is 3 um, less than any encoder sees.
 COMPRESSION = 1e-6
 PULL = 1e3  # N/m: some of the stiffness a held length has against its tendon's pull
-LOOSEST = 0.95  # of a path's change that play may keep from a spring: all of it would leave no stiffness
+LOOSEST = 0.99  # of a path's change that play may keep from a spring: all of it would leave no stiffness
 GIVE = 10.0  # m/N of a motor that stalls: a millimetre less than commanded is a tenth of a millinewton more
 
 
