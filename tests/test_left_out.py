@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from twin.diagnose.left_out import LeftOut, left_out
+from twin.diagnose import left_out as stage
+from twin.diagnose.left_out import LeftOut, left_out, proven
+from twin.diagnose.thresholds import COARSELY, FAR_OFF, LITTLE
+from twin.errors import SolveError
 
 TRIALS = (5, 8, 7)  # rows
 STD = 0.7  # of the first parameter's prior, in steps; the second has none
@@ -52,6 +55,44 @@ def test_it_is_what_refits_without_each_trial_give() -> None:
     np.testing.assert_allclose(found.z.ravel(), refitted(J, z0, TRIALS), rtol=0, atol=1e-7)
     assert found.square == pytest.approx(float(np.mean(refitted(J, z0, TRIALS) ** 2)), rel=1e-7)
     assert found.square > float(np.mean(fit.z**2)), "what is left out is predicted worse than what is fitted"
+
+
+def test_trials_a_step_throws_far_off_are_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second trial, five times its square to first order, is predicted by a fit to the others; the third, which has no
+    equilibrium under that, stays; the first, which doubles at most, is not asked for."""
+    study, fitted, _, _ = linear(np.random.default_rng(3))
+    fitted.model.free = [SimpleNamespace(effect=None), SimpleNamespace(effect="contact")]
+    fitted.evaluation = SimpleNamespace(traces="near")
+    study.bench.inputs = [SimpleNamespace(name=str(k), time=i.time) for k, i in enumerate(study.bench.inputs)]
+    ends, asked, said = np.cumsum([0, *TRIALS]), [], []
+    study.progress = said.append
+
+    def of(trials: list[int]) -> Any:
+        def evaluate(model: str, near: str) -> Any:
+            assert (model, near) == (f"without {trials[0]}", "near")
+            if trials == [2]:
+                raise SolveError("caught")
+            return SimpleNamespace(z=np.full(TRIALS[trials[0]], 7.0))
+
+        return SimpleNamespace(trials=trials, evaluate=evaluate)
+
+    def refit(objective: Any, model: Any, *, near: Any, J: np.ndarray, tolerance: float, worth: float) -> Any:
+        asked.append(objective.trials)
+        (k,) = set(range(3)) - set(objective.trials)
+        np.testing.assert_array_equal(J, np.delete(fitted.J[:, :1], slice(ends[k], ends[k + 1]), axis=0))
+        assert (near, tolerance, worth) == (fitted.evaluation, COARSELY, LITTLE)
+        return SimpleNamespace(model=f"without {k}")
+
+    study.objective.of = of
+    monkeypatch.setattr(stage, "fit", refit)
+    thrown = fitted.z.copy()
+    for k, times in enumerate((FAR_OFF, 5.0, FAR_OFF + 0.01)):
+        thrown[ends[k] : ends[k + 1]] *= np.sqrt(times) * (1.0 - 1e-12)
+    found = proven(study, fitted, LeftOut(study, thrown[:, None])).z.ravel()
+    np.testing.assert_array_equal(found[ends[1] : ends[2]], 7.0)
+    np.testing.assert_array_equal(np.delete(found, slice(ends[1], ends[2])), np.delete(thrown, slice(ends[1], ends[2])))
+    assert asked == [[0, 2], [0, 1]]
+    assert said == ["without 1", "without 2"]
 
 
 def test_trials_of_one_condition_are_left_out_together() -> None:

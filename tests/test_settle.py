@@ -28,9 +28,10 @@ def says(monkeypatch: pytest.MonkeyPatch) -> dict[Any, Any]:
     def left_out(study: Any, fit: Any) -> Any:
         return SimpleNamespace(effects=fit.effects, worse=lambda base: fit.effects in of["worse"] and base.effects == BASE)
 
-    monkeypatch.setattr(stage, "look", lambda study, base, w, bars: w.effects)
+    monkeypatch.setattr(stage, "look", lambda study, base, w, bars, beyond: w.effects)
     monkeypatch.setattr(stage, "verdict", lambda added, signs, bars: of[signs] if added == bool(signs) else "wrongly asked")
     monkeypatch.setattr(stage, "left_out", left_out)
+    monkeypatch.setattr(stage, "unseen", lambda study, w, bars: left_out(study, w.fit))
     monkeypatch.setattr(stage, "refit_without", lambda study, base, best, e: (best.effects, e))
     return of
 

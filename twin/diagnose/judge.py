@@ -13,7 +13,7 @@ from twin.diagnose.doubts import strained
 from twin.diagnose.evidence import Spectrum
 from twin.diagnose.gate import Gated
 from twin.diagnose.lateness import LATE
-from twin.diagnose.left_out import left_out
+from twin.diagnose.left_out import LeftOut, left_out, proven
 from twin.diagnose.null import Thresholds
 from twin.diagnose.places import misbent
 from twin.diagnose.quick import quick
@@ -65,10 +65,11 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     """From what passed the gates; a set that predicts trials left out worse than the calibrated robot counts nothing."""
     study.progress("verdict")
     base, best = found.base, gated.best
-    if best is not base and left_out(study, best.fit).worse(left_out(study, base.fit)):
-        best = base
+    beyond = unseen(study, best, bars)
+    if best is not base and beyond.worse(left_out(study, base.fit)):
+        best, beyond = base, left_out(study, base.fit)
     added = tuple(e for e in best.effects if e not in base.effects)
-    signs = look(study, base, best, bars)
+    signs = look(study, base, best, bars, beyond)
     apart = rigs(study.bench, study.trials, base.fit)
     # What effects explain needs no second robot, also where data cannot tell which of two it is.
     alike = [w for d in (*gated.settled, *gated.doubts) for w in (d.found, d.other)]
@@ -76,8 +77,9 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
         apart = None
     said = "unexplained" if apart else verdict(bool(added), signs, bars)
     if said in ("noise", "unexplained") and best is not base:
-        after, unseen = base.discrepancy.size, left_out(study, base.fit).structure
-        signs = replace(signs, after=after, unseen=unseen, quick=quick(study, base), strained=())
+        signs = replace(
+            signs, after=base.discrepancy.size, unseen=left_out(study, base.fit).structure, quick=quick(study, base), strained=()
+        )
         best, added = base, ()
     claims = _claims(study, found, gated, best, added, signs, bars)
     small = {s.effect for s in gated.small}
@@ -89,8 +91,8 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart, doubtful)
 
 
-def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
-    """The signs of the calibrated `base` and of the `best` set."""
+def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds, beyond: LeftOut) -> Signs:
+    """The signs of the calibrated `base` and of the `best` set, and what it leaves of trials left out."""
     bench, trials = study.bench, study.trials
     after = best.discrepancy.size
     rest = best.discrepancy.mean * study.objective.whitener.noise.sigma  # SI
@@ -99,9 +101,16 @@ def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds) -> Signs:
     limits = tuple(strained(best.fit))
     at_once = base.discrepancy.size > bars.left and change(bench, trials, base.fit.z.reshape(rest.shape)) is not None
     line = Spectrum.of(bench, trials).peak(best.fit.z.reshape(rest.shape) - best.discrepancy.mean)
-    unseen = left_out(study, best.fit).structure
-    strange = bent or at_once or bool(limits)
-    return Signs(base.discrepancy.size, after, unseen, line, quick(study, best), halved(study, base, best), strange, limits)
+    strange, half = bent or at_once or bool(limits), halved(study, base, best)
+    return Signs(base.discrepancy.size, after, beyond.structure, line, quick(study, best), half, strange, limits)
+
+
+def unseen(study: Study, best: Weighed, bars: Thresholds) -> LeftOut:
+    """A set on trials left out. Where it leaves no more than noise of those fitted, and much to first order of those left out, the
+    latter are fitted to the others in truth."""
+    first = left_out(study, best.fit)
+    much = max(MUCH, bars.left)
+    return proven(study, best.fit, first) if best.discrepancy.size <= much < first.structure else first
 
 
 def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:

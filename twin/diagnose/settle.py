@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from twin.diagnose.gate import Gated
-from twin.diagnose.judge import look, verdict
+from twin.diagnose.judge import look, unseen, verdict
 from twin.diagnose.left_out import left_out
 from twin.diagnose.null import Thresholds
 from twin.diagnose.search import Search
@@ -23,13 +23,13 @@ def settle(study: Study, found: Search, gated: Gated, bars: Thresholds) -> tuple
     base = found.base
 
     def says(w: Weighed) -> str:
-        return verdict(w is not base, look(study, base, w, bars), bars)
+        return verdict(w is not base, look(study, base, w, bars, unseen(study, w, bars)), bars)
 
     if not gated.doubts or says(gated.best) in ("noise", "explained"):
         return found, gated
     for n in reversed(range(len(gated.doubts))):
         pair = gated.doubts[n].found, gated.doubts[n].other
-        if any(says(w) != "explained" or left_out(study, w.fit).worse(left_out(study, base.fit)) for w in pair):
+        if any(says(w) != "explained" or unseen(study, w, bars).worse(left_out(study, base.fit)) for w in pair):
             continue
         weighed = (*found.all, *(w for w in pair if all(w.effects != known.effects for known in found.all)))
         best = max(pair, key=lambda w: w.score)

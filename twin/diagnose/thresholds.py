@@ -230,6 +230,10 @@ LITTLE = _row(
 HALF = _row(
     "HALF", 0.5, "of the structure, or of the squared error left out", "effects that leave more do not explain it", BENCHMARK
 )  # fmt: skip
+FAR_OFF = _row(
+    "FAR_OFF", 2.0, "times its square", "of a trial left out by a step to first order, which the others would hardly make of it: "
+    "then it is fitted again without", "judgement: of trials that a law explains leaving one out adds per cents",
+)  # fmt: skip
 WORSE = _row(
     "WORSE", 1.005, "ratio", "of the headline's error on trials left out; refitting alone moves it by some thousandth, as it does "
     "where an effect shows elsewhere", "python -m pytest tests/test_choose.py",

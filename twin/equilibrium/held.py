@@ -112,8 +112,8 @@ def first_tensions(now, near, i):
 def settled(now, near, how, i):
     """The equilibrium of sample i. Returns its status; the shape stays the last one where there is none.
 
-    Friction and play want it in full: they carry what a single step leaves on to all samples that follow. Where a single step is lost, as
-    beside a spring about to change the branch of its law, there is no first order, and the neighbour's own shape stays.
+    Friction and play want it in full: they carry what a single step leaves on to all samples that follow. Where such a step is
+    lost, as beside a spring about to change the branch of its law, there is no first order, and the neighbour's own shape stays.
     """
     if how.once and near.q.size > 0 and not now.at.law.mu > 0.0 and not some(now.held.play > 0.0):
         move(now.held, now.sought, now.sought, 1.0)
