@@ -66,7 +66,7 @@ def winding(problem: Problem, moving: Equilibrium, start: ChainPath, zero: np.nd
         motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
         float(problem.route.bedding), float(problem.route.bedding_tension), np.zeros(nt), float(problem.route.stall),
-        *of_play(problem.route, zero),
+        *of_play(problem.route, zero, springs),
     )  # fmt: skip
     number = np.array([model.tendon(whole(t)).id if held.which[t] else -1 for t in range(nt)], np.int64)
     stiffness, band, bowing = model.tendon_stiffness.reshape(model.ntendon, -1), model.tendon_lengthspring, np.zeros(nt)

@@ -136,7 +136,7 @@ class Equilibrium:
         n, nt = problem.command.shape
         by_length, by_spring = problem.which(Drive.DISPLACEMENT), problem.which(Drive.CURRENT)
         heating = problem.heating
-        play, swap, _, _ = of_play(problem.route, self.straight_path)
+        play, swap, _, _ = of_play(problem.route, self.straight_path, by_spring)
         # In one order in memory: the loop is compiled anew for another, which takes half a minute.
         command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))
         return Driving(

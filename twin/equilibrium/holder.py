@@ -143,9 +143,9 @@ def rest(held, t, path, tension):
     held.length[t] = path
 
 
-def of_play(route: Route, zero: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def of_play(route: Route, zero: np.ndarray, by_spring: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """`play`, `swap`, `side` and `length` of `Held` before anything has moved, for paths of `zero` (n_tendon,) m."""
-    play = np.array(route.play or np.zeros(zero.size), float)
+    play = by_spring * np.array(route.play or np.zeros(zero.size), float)
     return play, np.maximum(route.swap, play / LOOSEST), np.zeros(zero.size), zero.copy()
 
 

@@ -62,7 +62,7 @@ class HeatedRobot(LoadedRobot):
             sprung.copy(), sprung, path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.warm.copy(), spring.initial_elongation.copy(),
             spring.initial_tension.copy(), self.route.bedding, self.route.bedding_tension, np.zeros(nt), np.inf,
-            *of_play(self.route, path),
+            *of_play(self.route, path, sprung),
         )  # fmt: skip
         remember(self.held, self.now.s, self.now.T)
 
