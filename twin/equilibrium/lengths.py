@@ -15,7 +15,7 @@ import numpy as np
 from twin.compiled import assign, dot, inner, jit
 from twin.effects.tendon_friction import turn
 from twin.equilibrium.chain import balance, copied, lever, settle
-from twin.equilibrium.holder import GIVE, PULL, lack, linearise, longer
+from twin.equilibrium.holder import GIVE, PULL, lack, linearise, longer, loose
 from twin.equilibrium.linear import factorise, substitute
 from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, allowed, commit, place
 
@@ -217,6 +217,8 @@ def unmet(at, state, held, s, r):
             gap = lack(held, t, s[t, 0], state.T)
             if held.stretch[t] >= GIVE / held.factor[0]:  # (T_s - T) / PULL, as large as the other piece has it where they meet
                 gap /= GIVE * PULL
+            elif held.by_spring[t]:  # (Y - T) / slope, on either side of an end of the gap
+                gap *= loose(held, t, s[t, 0])[1]
             size = max(size, (abs(gap) if state.T[t] > 0.0 else gap) / CLOSED)
     return size
 
