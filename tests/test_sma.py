@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -337,10 +338,31 @@ def test_springs_put_on_a_robot_held_straight_pull_it_straighter() -> None:
     assert path.tension[0, 0] < half.tension[0, 0] < kept.tension[0, 0]
 
 
-@pytest.mark.parametrize("mounted", [0.0, 1.0])
-def test_heat_steps_find_the_springs_where_they_were_put_on(mounted: float) -> None:
+def corded(hooked: float) -> tuple[Twin, Equilibrium]:
+    """Cords that 0.7 N, the springs' first pull, stretch by 0.21 mm and by a toe of 0.4 (1 - exp(-0.7/0.4)) = 0.33 mm."""
+    law = named("tendon_elasticity")({"stretch": 3e-4, "toe": 4e-4, "toe_tension": 0.4, "hooked": hooked})
+    twin = Twin(load("continuum"), {}, (law,))
+    return twin, Equilibrium(twin.robot.chain(twin.body()))
+
+
+def test_springs_hooked_in_under_their_first_tension_are_as_long_as_described() -> None:
+    """Else they are shorter by what that tension stretches, and pull the less: by some 0.4 mm at 785 N/m, 0.3 N."""
+    twin, solver = corded(1.0)
+    path = cold(twin, solver)
+    np.testing.assert_allclose(path.tension[0], 0.7, rtol=2e-3)
+    shown = _stretched(path, 0, solver, twin.laws.route, springs())
+    assert shown is not None
+    np.testing.assert_allclose(shown[:, 0], springs().initial_elongation, rtol=0, atol=5e-6)
+    slack = cold(*corded(0.0))
+    lost = 785.0 * twin.laws.route.elongation(slack.tension[0])
+    np.testing.assert_allclose(slack.tension[0], 0.7 - lost, rtol=0, atol=0.02)
+    assert np.all(lost > 0.2)
+
+
+@pytest.mark.parametrize("put_on", [lambda: bent(0.0), lambda: bent(1.0), lambda: corded(0.0), lambda: corded(1.0)])
+def test_heat_steps_find_the_springs_where_they_were_put_on(put_on: Callable[[], tuple[Twin, Equilibrium]]) -> None:
     """A robot that is led from outside stands where a prediction has it; its pictures show springs of that length."""
-    twin, solver = bent(mounted)
+    twin, solver = put_on()
     robot, path = HeatedRobot(twin, Loads(np.zeros(3)), ROOM), cold(twin, solver, 1.0)
     np.testing.assert_allclose(robot.tension, path.tension[0], rtol=0, atol=1e-4)
     robot.step(np.ones(3), 20.0)

@@ -120,16 +120,22 @@ def test_the_settled_shape_does_not_depend_on_the_step() -> None:
     np.testing.assert_allclose(coarse, fine, rtol=0, atol=1e-6)  # m: no memory
 
 
-def test_heated_springs_pull_as_they_do_in_statics() -> None:
+SOFT = Route(stretch=1e-4, bedding=4e-4, bedding_tension=0.4, hooked=1.0)
+LOOSE = Route(play=(3e-4,) * 3, swap=3e-4)
+
+
+@pytest.mark.parametrize("route", [FRICTION, SOFT, LOOSE], ids=["friction", "toe", "play"])
+def test_heated_springs_pull_as_they_do_in_statics(route: Route) -> None:
     t = np.arange(0.0, 30.0, 0.02)
     current = 1.7 * np.stack([np.interp(t, [s, s + 3, s + 9, s + 12], [0, 1, 1, 0], 0, 0) for s in (0.0, 8.0, 16.0)], axis=1)
-    moved, still = both(t, current, HANGING, FRICTION, Drive.CURRENT)
+    moved, still = both(t, current, HANGING, route, Drive.CURRENT)
     assert np.ptp(still.markers[:, -1], axis=0).max() > 1e-3
     assert np.ptp(still.others["temperature"]) > 40.0  # K
     # m: while a spring changes phase the robot moves 10 mm in seconds and lags statics by its damping time of 30 ms; at rest only
     # what the spring's history differs by is left, taken every 20 ms in statics and every one here.
     off = np.linalg.norm(moved.markers - still.markers, axis=2).max(axis=1)
-    assert off.max() < 1e-3
+    # At an end of its gap a spring begins to hold what it let go before, and the robot is as late as it was fast: 1.17 mm.
+    assert off.max() < (1.5e-3 if route is LOOSE else 1e-3)
     assert off[-1] < 5e-5
     np.testing.assert_allclose(moved.tension[-1], still.tension[-1], rtol=0, atol=2e-3)  # N, as 50 um
     np.testing.assert_allclose(moved.others["temperature"], still.others["temperature"], rtol=0, atol=0.05)  # K, as before
