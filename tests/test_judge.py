@@ -114,7 +114,7 @@ def judged(
 def test_what_leaves_noise_inside_and_much_beyond_to_first_order_is_proven(
     monkeypatch: pytest.MonkeyPatch, inside: float, first: float, asked: bool
 ) -> None:
-    """A wall that two trials touch: left out to first order they were missed by thirty sigmas, fitted again by a few tenths."""
+    """A wall that two trials touch: left out to first order what was missed of them was 31 sigma, fitted again 1.8."""
     step, truth = SimpleNamespace(structure=first), SimpleNamespace(structure=0.1)
     monkeypatch.setattr(stage, "left_out", lambda study, fit: step)
     monkeypatch.setattr(stage, "proven", lambda study, fit, known: truth if known is step else None)

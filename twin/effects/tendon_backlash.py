@@ -33,7 +33,7 @@ class TendonBacklash(Effect):
 
     An SMA spring follows its tendon with that play: it is longer than the path has it by gap/2 z less, z = +1 after paying out, and
     with swap = gap/2 stands still while the tendon crosses the gap (99 % of it: play alone would leave no stiffness). Slack is not
-    taken up there.
+    taken up there, and a displacement that is logged there is the tendon's own.
 
     Antagonists that turn a rigid joint: each of them only ever pulls, so that its play lies on the pulling side, z = +1, whichever
     way it travels. It is slack of gap/2 in both: a dead band that is crossed where the load, not the travel, changes its sign.

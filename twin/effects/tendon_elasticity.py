@@ -39,7 +39,7 @@ class TendonElasticity(Effect):
         Parameter("stretch", 0.0, "m/N", 0.0, 1e-2, "ropes and lines of a metre: 0.01-1 mm/N", scale=2e-5),
         Parameter("toe", 0.0, "m", 0.0, 2e-3, "below 1 % of a rope; of 0.8 m, prestretched: 0.1-1 mm", scale=5e-5),
         Parameter("toe_tension", 2.0, "N", 0.3, 20.0, "a small part of the pretension; ours", scale=0.5),
-        Parameter("hooked", 1.0, "1", 0.0, 1.0, "share of it that was there when SMA springs were put on", scale=1.0),
+        Parameter("hooked", 1.0, "1", 0.0, 1.0, "share of the first stretch there when SMA springs were put on", scale=1.0),
     )
     shape = ("toe_tension", "hooked")
     richer = ("stretch",)  # of a toe; alone it is the plain law
