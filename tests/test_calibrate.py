@@ -240,8 +240,8 @@ def test_the_derivative_of_strong_friction_is_that_of_full_solves() -> None:
 
 @pytest.mark.parametrize("across", [0.0, 5e-3])
 def test_the_derivative_of_a_slight_asymmetry_is_that_of_full_solves(across: float) -> None:
-    """Its hinges turn with it: at e = 0.005 by 0.006 rad a nudge, which one Newton step leaves 8 % of; with nudges ten times as long
-    it was 80 %."""
+    """Its hinges turn with it: at e = 0.005 by 0.006 rad a nudge, which one Newton step leaves 8 % wrong; with nudges ten times as
+    long it was 80 %."""
     whole = read(models_folder() / "continuum/samples/friday")
     prepared, trials = prepare(whole, ROBOT), [0, 1]
     objective = Objective(prepared, trials, _white(prepared, trials), 1)

@@ -25,6 +25,7 @@ class World:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.size, self.unseen, self.quick, self.verdict, self.rigs = SIZE, 0.1, 0.1, "unexplained", None
+        self.beyond_accuracy = SIZE
         self.strained: tuple[str, ...] = ()
         self.score, self.predicted = 0.0, True  # of the sets that are not in force; how the best was chosen
         self.runners: list[Any] = []
@@ -77,7 +78,9 @@ class World:
 
     def said(self) -> Description:
         final = self.model()
-        signs = SimpleNamespace(line=(31.0, 0.5), strained=self.strained, unseen=self.unseen, quick=self.quick)
+        signs = SimpleNamespace(
+            line=(31.0, 0.5), strained=self.strained, unseen=self.unseen, quick=self.quick, after=self.beyond_accuracy
+        )
         judged: Any = SimpleNamespace(
             verdict=self.verdict, final=final, rigs=self.rigs, signs=signs, runners_up=self.runners, doubtful=self.doubtful
         )
@@ -97,6 +100,9 @@ def test_what_is_explained_leaves_noise_and_its_doubts(verdict: str, monkeypatch
     world.verdict, world.doubts = verdict, [SimpleNamespace(effect="a", rival="b")]
     found = world.said()
     assert found.words == "What is left looks like noise (smooth part 0.70 sigma). a or b."
+    world.beyond_accuracy = 0.2
+    own = "0.70 sigma, 0.20 beyond what the robot's description is good for"
+    assert world.said().words == f"What is left looks like noise (smooth part {own}). a or b."
     assert found.notices == ("unlikely", "repeats", "leaps of [3]", "far")
     assert (found.strongest, found.worst_channel) == ((("T1", 0.5), ("T2", 0.1)), "worst of (2, 2)")
     assert found.components == {"static": 1.0}

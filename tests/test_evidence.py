@@ -167,6 +167,23 @@ def test_what_goes_with_the_pose_is_not_beyond_it() -> None:
     assert EVIDENCE.beyond_pose((pose + z).ravel()) == pytest.approx(np.sqrt(left / count), rel=1e-3)
 
 
+def test_a_description_answers_for_functions_of_the_pose_up_to_its_accuracy(residual: np.ndarray) -> None:
+    found = EVIDENCE.discrepancy(residual)
+    of_pose = EVIDENCE.phi.component == COMPONENTS.index("static")
+    for j in range(M):  # the share of it in the Gaussian's mean, written out
+        r, C = EVIDENCE.present[:, j], covariance(found.variance, j)
+        phi = EVIDENCE.phi.matrix[r][:, of_pose] * np.sqrt(found.variance[EVIDENCE.member[j], COMPONENTS.index("static")])
+        np.testing.assert_allclose(found.static[r, j], phi @ phi.T @ np.linalg.solve(C, residual[r, j]), atol=1e-8)
+        assert not found.static[~r, j].any()
+    size = np.sqrt(np.mean(found.static**2, axis=0))
+    assert np.all(size[:3] > 0.3)  # the marker's channels have some, or nothing is shown
+    for share in (0.0, 0.4, 1.0):
+        left = np.sqrt(np.mean((found.mean - share * found.static) ** 2))
+        assert found.beyond(share * size) == pytest.approx(left)
+    assert found.beyond(np.full(M, 100.0)) == pytest.approx(np.sqrt(np.mean((found.mean - found.static) ** 2)))
+    assert found.beyond(np.zeros(M)) == pytest.approx(found.size)
+
+
 def test_a_discrepancy_is_named_by_what_carries_most(residual: np.ndarray) -> None:
     found = EVIDENCE.discrepancy(residual)
     told = EVIDENCE.strongest(found, 3)

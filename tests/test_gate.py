@@ -29,7 +29,7 @@ class World:
         self.plain_history = 0.0  # what of that depends on more than the pose
         self.study: Any = SimpleNamespace(
             objective=SimpleNamespace(n=N), progress=lambda words: None, fall=lambda a, b: a.z**2 - b.z**2,
-            evidence=SimpleNamespace(beyond_pose=self.beyond_pose), plain=lambda fit: fit.plain,
+            evidence=SimpleNamespace(beyond_pose=self.beyond_pose), plain=lambda fit: fit.plain, accuracy=0.0,
         )  # fmt: skip
         self.harmful: set[str] = set()
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
@@ -49,9 +49,9 @@ class World:
         felt = N * sum(a for e, a in missing.items() if e in self.sensed)
         plain = np.sqrt([N * (100.0 + sum(a * abs(a) for e, a in self.plainly.items() if e not in effects))])
         fit = SimpleNamespace(z=np.sqrt([square - felt, felt]), effects=tuple(sorted(effects)), fitted=lambda e: {}, plain=plain)
-        size = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
+        size_of = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
         laws = tuple((e, "toe" if e == "ropes" else "") for e in sorted(effects))
-        size = SimpleNamespace(size=size)
+        size = SimpleNamespace(beyond=lambda accuracy: size_of - accuracy)
         return SimpleNamespace(effects=tuple(sorted(effects)), laws=laws, fit=fit, score=-square, discrepancy=size)
 
     def left_out(self, effects: tuple[str, ...]) -> Any:

@@ -73,7 +73,9 @@ def weighed(effects: tuple[str, ...], score: float, cost: float = 0.0, size: flo
     """A set of effects as the search leaves it: `cost` of its fit, `size` (sigma) of the smooth error left."""
     z = np.zeros((4, 1))
     fit = SimpleNamespace(fitted=lambda e: {e: 1.0}, cost=cost, z=z, effects=effects, evaluation=SimpleNamespace(raw=[z]))
-    return SimpleNamespace(effects=effects, score=score, fit=fit, discrepancy=SimpleNamespace(size=size, mean=z))
+    return SimpleNamespace(
+        effects=effects, score=score, fit=fit, discrepancy=SimpleNamespace(size=size, beyond=lambda a: size - a, mean=z)
+    )
 
 
 @pytest.fixture
@@ -104,7 +106,7 @@ def judged(
         small=tuple(SimpleNamespace(effect=e) for e in small),
         contribution=lambda study, e: sizes.get(e, 0.0),
     )
-    study = SimpleNamespace(progress=lambda words: None, bench=None, trials=[0])
+    study = SimpleNamespace(progress=lambda words: None, bench=None, trials=[0], accuracy=0.25)
     return judge(study, SimpleNamespace(base=base, all=ranked), gated, BARS)  # type: ignore[arg-type]
 
 
@@ -232,7 +234,7 @@ def test_what_no_known_effect_does_is_strange(sign: str, size: float, strange: b
     monkeypatch.setattr(stage, "Spectrum", SimpleNamespace(of=lambda *_: SimpleNamespace(peak=lambda z: (3.0, 0.2))))
     bench = SimpleNamespace(measured=[np.zeros((4, 1))])
     noise = SimpleNamespace(whitener=SimpleNamespace(noise=SimpleNamespace(sigma=1.0)))
-    study: Any = SimpleNamespace(bench=bench, trials=[0], objective=noise)
+    study: Any = SimpleNamespace(bench=bench, trials=[0], objective=noise, accuracy=0.01)
     signs = look(study, weighed(BASE, 0.0, size=size), weighed(FRICTION, 0.0, size=size), BARS, SimpleNamespace(structure=0.3))
-    assert (signs.before, signs.after, signs.unseen, signs.line, signs.quick) == (size, size, 0.3, (3.0, 0.2), 0.7)
+    assert (signs.before, signs.after, signs.unseen, signs.line, signs.quick) == (size, size - 0.01, 0.3, (3.0, 0.2), 0.7)
     assert (signs.halved, signs.strange, bool(signs.strained)) == (True, strange, sign == "strained")

@@ -46,7 +46,7 @@ def few(plan: Bench, n: int) -> Bench:
 def left(mean: np.ndarray, main: str = "memory") -> Discrepancy:
     """A smooth error whose component `main` is 0.5 sigma over all channels, the others 0.1."""
     variance = np.array([[0.25 if c == main else 0.01 for c in COMPONENTS]])
-    return Discrepancy(0.0, mean, variance, np.zeros((1, 1)))
+    return Discrepancy(0.0, mean, 0.0 * mean, variance, np.zeros((1, 1)))
 
 
 def growing(plan: Bench) -> np.ndarray:

@@ -27,6 +27,8 @@ PREDICTED = (
     "smooth error costs no more than a small one, other sets come before it, which the probabilities show"
 )
 
+TOLD = 0.05  # sigma of a smooth part, from which on it is said that it is the description's own fault
+
 
 @dataclass(frozen=True)
 class Description:
@@ -44,7 +46,7 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
     final = judged.final
     strongest = tuple(study.evidence.strongest(final.discrepancy))
     if judged.verdict in ("noise", "explained"):
-        words = f"What is left looks like noise (smooth part {final.discrepancy.size:.2f} sigma)."
+        words = f"What is left looks like noise (smooth part {_parts(final.discrepancy.size, judged.signs.after)})."
     else:
         words = _left(study, found, judged, bars, strongest[0][0])
         words += "" if gated.doubts else _hint(study, found, judged)  # what is in doubt explains more, and is said below
@@ -67,6 +69,11 @@ def describe(study: Study, found: Search, gated: Gated, judged: Judgement, bars:
         *far,
     )
     return Description(words, components(final.discrepancy), strongest, worst_channel(study.bench, z), notices)
+
+
+def _parts(size: float, beyond: float) -> str:
+    within = f", {beyond:.2f} beyond what the robot's description is good for" if size - beyond > TOLD else ""
+    return f"{size:.2f} sigma{within}"
 
 
 def _left(study: Study, found: Search, judged: Judgement, bars: Thresholds, strongest: str) -> str:

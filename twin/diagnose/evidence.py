@@ -17,6 +17,7 @@ from twin.diagnose.thresholds import HIGHEST, LOWEST, MEMORY, NOTHING, ROUNDS, S
 from twin.effects import Drive
 
 COMPONENTS = ("static", "direction", "rate", "memory", "slow", "trial")
+STATIC = COMPONENTS.index("static")
 IN_WORDS = {
     "static": "the pose (pull and payload)",
     "direction": "the direction of pull",
@@ -113,12 +114,13 @@ def _lagged(time: np.ndarray, u: np.ndarray, tau: float) -> np.ndarray:
 class Discrepancy:
     """The smooth error left in a residual.
 
-    `gain` = 2 (log N(z; 0, I + Phi D Phi') - log N(z; 0, I)); `mean` (n, m) its posterior mean in sigmas; `variance`
-    (n_group, n_component); `coefficients` (p, m).
+    `gain` = 2 (log N(z; 0, I + Phi D Phi') - log N(z; 0, I)); `mean` (n, m) its posterior mean in sigmas, `static` (n, m) what of
+    that is a function of the pose; `variance` (n_group, n_component); `coefficients` (p, m).
     """
 
     gain: float
     mean: np.ndarray
+    static: np.ndarray
     variance: np.ndarray
     coefficients: np.ndarray
 
@@ -126,6 +128,13 @@ class Discrepancy:
     def size(self) -> float:
         """Root-mean-square of the posterior mean, in sigmas."""
         return float(np.sqrt(np.mean(self.mean**2)))
+
+    def beyond(self, accuracy: np.ndarray) -> float:
+        """The same without what a description that is good for `accuracy` (m,) sigmas (RMS) gets wrong of each channel: functions
+        of the pose, up to that."""
+        static = np.sqrt(np.mean(self.static**2, axis=0))
+        share = np.minimum(1.0, accuracy / np.maximum(static, np.finfo(float).tiny))
+        return float(np.sqrt(np.mean((self.mean - share * self.static) ** 2)))
 
 
 class Evidence:
@@ -172,7 +181,8 @@ class Evidence:
         inner = np.eye(len(component)) + np.sqrt(D)[:, :, None] * self.gram * np.sqrt(D)[:, None, :]
         coefficients = np.einsum("mpq,mq->mp", np.linalg.inv(self.gram + _diagonal(1.0 / D))[self.kind], b)
         gain = float(np.einsum("mp,mp->", b, coefficients) - np.linalg.slogdet(inner)[1][self.kind].sum())
-        return Discrepancy(gain, (self.phi.matrix @ coefficients.T) * self.present, variance, coefficients.T)
+        mean, of_pose = (self.phi.matrix[:, of] @ coefficients.T[of] * self.present for of in (slice(None), component == STATIC))
+        return Discrepancy(gain, mean, of_pose, variance, coefficients.T)
 
     def whiten(self, discrepancy: Discrepancy, X: np.ndarray) -> np.ndarray:
         """(I + Phi D Phi')^-1 X for columns X (n * m, k)."""

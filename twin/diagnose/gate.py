@@ -100,7 +100,7 @@ def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[st
     moved = {e: np.sqrt(np.maximum(0.0, study.fall(w.fit, best.fit)) / study.objective.n) for e, w in without.items()}
     if np.any((moved[least] >= bars.material) & (moved[least] >= FORM * np.max(list(moved.values()), axis=0))):
         return False
-    sizes = [(w.discrepancy.size, left_out(study, w.fit).structure) for w in (best, without[least])]
+    sizes = [(w.discrepancy.beyond(study.accuracy), left_out(study, w.fit).structure) for w in (best, without[least])]
     return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))
 
 

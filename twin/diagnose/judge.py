@@ -78,7 +78,11 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     said = "unexplained" if apart else verdict(bool(added), signs, bars)
     if said in ("noise", "unexplained") and best is not base:
         signs = replace(
-            signs, after=base.discrepancy.size, unseen=left_out(study, base.fit).structure, quick=quick(study, base), strained=()
+            signs,
+            after=base.discrepancy.beyond(study.accuracy),
+            unseen=left_out(study, base.fit).structure,
+            quick=quick(study, base),
+            strained=(),
         )
         best, added = base, ()
     claims = _claims(study, found, gated, best, added, signs, bars)
@@ -94,7 +98,7 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
 def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds, beyond: LeftOut) -> Signs:
     """The signs of the calibrated `base` and of the `best` set, and what it leaves of trials left out."""
     bench, trials = study.bench, study.trials
-    after = best.discrepancy.size
+    after = best.discrepancy.beyond(study.accuracy)
     rest = best.discrepancy.mean * study.objective.whitener.noise.sigma  # SI
     predicted = [bench.measured[k] - r for k, r in zip(trials, best.fit.evaluation.raw, strict=True)]
     bent = after > bars.left and bool(misbent(bench, trials, rest, predicted))

@@ -38,8 +38,8 @@ class LeftOut:
 
     @cached_property
     def structure(self) -> float:
-        """Its smooth part, sigmas."""
-        return self.study.evidence.discrepancy(self.z).size
+        """Its smooth part, sigmas, but for what the robot's description is not good for."""
+        return self.study.evidence.discrepancy(self.z).beyond(self.study.accuracy)
 
     def worse(self, than: LeftOut) -> bool:
         """In all channels together, each in its own noise, or in the headline's alone.

@@ -11,6 +11,7 @@ from twin.bench import Bench
 from twin.calibrate import Fit, Objective
 from twin.diagnose.budget import Budget
 from twin.diagnose.evidence import Evidence
+from twin.evaluate import ACCURATE
 
 Progress = Callable[[str], None]
 
@@ -46,6 +47,12 @@ class Study:
         of = [o.group for o in self.bench.outputs]
         z = (before.z**2 - after.z**2).reshape(-1, len(of)).sum(axis=0)
         return np.array([z[[o == g for o in of]].sum() for g in dict.fromkeys(of)])
+
+    @property
+    def accuracy(self) -> np.ndarray:
+        """What the robot's description is good for (m,), sigmas of each output that it is declared for; zero for the others."""
+        stated = np.array([self.bench.robot.accuracy if o.group in ACCURATE else 0.0 for o in self.bench.outputs])
+        return stated / self.objective.whitener.noise.sigma
 
     @property
     def bench(self) -> Bench:

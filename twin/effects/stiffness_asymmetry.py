@@ -5,9 +5,8 @@ from __future__ import annotations
 from twin.effects.effect import Effect
 from twin.quantities import Parameter
 
-
-# Hinges stand in the principal planes, which a change of e by d turns by up to d / 2e: a derivative by one Newton step from the shape
-# in the planes before follows that while it is small. Of one at e = 0.005 a nudge of 0.02 SCALE takes 8 %, with ten times as much 80 %.
+# Hinges stand in the principal planes, which a change d of e turns by up to d / 2e. A derivative by one Newton step from the shape
+# in the planes before follows that while it is small: at e = 0.005 it errs by 8 %, with a SCALE ten times as large by 80 %.
 SCALE = 3e-3
 
 
