@@ -106,7 +106,9 @@ def judged(
         small=tuple(SimpleNamespace(effect=e) for e in small),
         contribution=lambda study, e: sizes.get(e, 0.0),
     )
-    study = SimpleNamespace(progress=lambda words: None, bench=None, trials=[0], accuracy=0.25)
+    study = SimpleNamespace(
+        progress=lambda words: None, bench=None, trials=[0], accuracy=0.25, unheard=lambda fit: 9.0 * ("creep" in fit.effects)
+    )
     return judge(study, SimpleNamespace(base=base, all=ranked), gated, BARS)  # type: ignore[arg-type]
 
 
@@ -166,6 +168,10 @@ def test_what_is_left_makes_claims_less_sure_by_its_share(staged: dict[str, Any]
 def test_sets_as_good_as_the_claimed_are_ambiguous_unless_they_only_add_or_drop(staged: dict[str, Any]) -> None:
     near, far, more = weighed(CREEP, -9.0), weighed(DELAY, -13.0), weighed(BOTH, -1.0)
     assert judged(weighed(FRICTION, 0.0), near, far, more).ambiguous == (CREEP,)  # within ACCEPT = 12
+    # Creep has tendons slack that friction has taut, in rows where readings add 9 to |z|^2: 6 of chance, twice.
+    for score, told in ((-23.9, (CREEP,)), (-24.1, ())):
+        assert judged(weighed(FRICTION, 0.0), weighed(CREEP, score), far).ambiguous == told
+        assert judged(weighed(CREEP, 0.0), weighed(FRICTION, score)).ambiguous == tuple(FRICTION for _ in told)
     assert judged(weighed(BOTH, 0.0), weighed(FRICTION, -1.0), weighed(DELAY, -2.0)).ambiguous == (DELAY,)
 
 
@@ -178,7 +184,8 @@ def test_a_second_robot_is_seen_only_where_no_effects_explain_as_much(staged: di
     staged["rigs"] = SimpleNamespace(fall=1000.0)
     found = judged(best)
     assert (found.verdict, found.claims, found.final.effects, found.rigs) == ("unexplained", (), BASE, staged["rigs"])
-    assert (found.signs.after, found.signs.unseen, found.signs.quick) == (2.0, 0.07, 0.2)  # those of the robot as it stays
+    # Those of the robot as it stays; its description answers for 0.25 of what is left.
+    assert (found.signs.after, found.signs.unseen, found.signs.quick) == (1.75, 0.07, 0.2)
 
 
 def test_no_second_robot_is_seen_where_one_of_two_effects_explains_as_much(staged: dict[str, Any]) -> None:
