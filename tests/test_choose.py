@@ -16,7 +16,7 @@ from twin.diagnose.thresholds import FAR
 from twin.diagnose.weigh import better
 from twin.errors import SolveError
 
-STUDY = cast(Any, None)
+STUDY = cast(Any, SimpleNamespace(accuracy=0.0))
 
 
 def weighed(
@@ -27,8 +27,8 @@ def weighed(
     headline = unseen if headline is None else headline
     beyond = errors(unseen, headline) if far is None else errors(far, far)
     fit = SimpleNamespace(model=model, unseen=unseen, headline=headline, far=beyond)
-    laws = tuple((e, form) for e in effects)
-    return SimpleNamespace(effects=effects, laws=laws, score=score, discrepancy=SimpleNamespace(size=size), fit=fit)
+    laws, left = tuple((e, form) for e in effects), SimpleNamespace(beyond=lambda accuracy: size - accuracy)
+    return SimpleNamespace(effects=effects, laws=laws, score=score, discrepancy=left, fit=fit)
 
 
 def errors(rms: float, headline: float) -> Any:
@@ -121,7 +121,7 @@ def test_beside_a_pair_nothing_more_is_sought(monkeypatch: pytest.MonkeyPatch, e
     monkeypatch.setattr(stage, "_converged", lambda study, rough: rough)
     asked: list[Any] = []
     monkeypatch.setattr(stage, "beside", lambda study, core, found, bars: asked.append(core) or core)
-    study: Any = SimpleNamespace(budget=SimpleNamespace(allows=lambda what: True))
+    study: Any = SimpleNamespace(accuracy=0.0, budget=SimpleNamespace(allows=lambda what: True))
     assert choose(study, searched(weighed(score=0.0, size=6.0, unseen=4.0), core), Thresholds()).best is core
     assert bool(asked) is sought
 
@@ -136,7 +136,7 @@ def test_what_is_gone_on_with_for_what_it_predicts_is_fitted_to_the_end(monkeypa
     monkeypatch.setattr(stage, "fit", lambda objective, model, **how: kept.append(how) or "to the end")
     monkeypatch.setattr(stage, "weigh", lambda study, fitted: done)
     monkeypatch.setattr(stage, "beside", lambda study, core, found, bars: both if core is done else None)
-    study: Any = SimpleNamespace(objective=None, budget=SimpleNamespace(allows=lambda what: time_left))
+    study: Any = SimpleNamespace(accuracy=0.0, objective=None, budget=SimpleNamespace(allows=lambda what: time_left))
     found = choose(study, searched(base, rough), Thresholds())
     assert kept == [{"near": "there", "refresh": True}]
     assert found.base is base
@@ -164,7 +164,7 @@ def test_beside_the_core_stays_what_has_evidence_and_predicts(
     monkeypatch.setattr(stage, "dictionary", lambda objective, fit: "patterns" if fit is core.fit else None)
     monkeypatch.setattr(stage, "solves", lambda study, twin: stands or "play" not in twin.effects)
     monkeypatch.setattr(stage, "_converged", lambda study, rough: rough)
-    study: Any = SimpleNamespace(objective=None, progress=lambda words: None)
+    study: Any = SimpleNamespace(accuracy=0.0, objective=None, progress=lambda words: None)
     assert beside(study, core, searched(base, core), Thresholds(accept=12.0)) is (more if taken else core)
 
 

@@ -74,7 +74,10 @@ def weighed(effects: tuple[str, ...], score: float, cost: float = 0.0, size: flo
     z = np.zeros((4, 1))
     fit = SimpleNamespace(fitted=lambda e: {e: 1.0}, cost=cost, z=z, effects=effects, evaluation=SimpleNamespace(raw=[z]))
     return SimpleNamespace(
-        effects=effects, score=score, fit=fit, discrepancy=SimpleNamespace(size=size, beyond=lambda a: size - a, mean=z)
+        effects=effects,
+        score=score,
+        fit=fit,
+        discrepancy=SimpleNamespace(size=size, beyond=lambda a: size - a, rest=lambda a: z, mean=z),
     )
 
 
@@ -242,6 +245,7 @@ def test_what_no_known_effect_does_is_strange(sign: str, size: float, strange: b
     bench = SimpleNamespace(measured=[np.zeros((4, 1))])
     noise = SimpleNamespace(whitener=SimpleNamespace(noise=SimpleNamespace(sigma=1.0)))
     study: Any = SimpleNamespace(bench=bench, trials=[0], objective=noise, accuracy=0.01)
-    signs = look(study, weighed(BASE, 0.0, size=size), weighed(FRICTION, 0.0, size=size), BARS, SimpleNamespace(structure=0.3))
+    unseen: Any = SimpleNamespace(structure=0.3)
+    signs = look(study, weighed(BASE, 0.0, size=size), weighed(FRICTION, 0.0, size=size), BARS, unseen)
     assert (signs.before, signs.after, signs.unseen, signs.line, signs.quick) == (size, size - 0.01, 0.3, (3.0, 0.2), 0.7)
     assert (signs.halved, signs.strange, bool(signs.strained)) == (True, strange, sign == "strained")

@@ -25,7 +25,7 @@ def choose(study: Study, found: Search, bars: Thresholds) -> Search:
     small or large: its names are worth little. What an effect predicts does not depend on that.
     """
     best = predicting(study, found, bars.accept)
-    if _smaller(found.base, best):
+    if _smaller(study, found.base, best):
         return Search(found.base, best, found.all)
     core = most_predictive(study, found)
     if core is None:
@@ -86,7 +86,7 @@ def _converged(study: Study, rough: Weighed) -> Weighed:
 
 def halved(study: Study, base: Weighed, best: Weighed) -> bool:
     """Whether effects halve the smooth error; or the squared error on what was not fitted, of all outputs and of the headline."""
-    return _smaller(base, best) or _half(unseen(study, best), unseen(study, base))
+    return _smaller(study, base, best) or _half(unseen(study, best), unseen(study, base))
 
 
 def _half(after: Unseen, before: Unseen) -> bool:
@@ -97,8 +97,8 @@ def _quarter(after: Unseen, before: Unseen) -> bool:
     return after.square <= BESIDE * before.square
 
 
-def _smaller(base: Weighed, best: Weighed) -> bool:
-    return best.discrepancy.size <= HALF * base.discrepancy.size
+def _smaller(study: Study, base: Weighed, best: Weighed) -> bool:
+    return best.discrepancy.beyond(study.accuracy) <= HALF * base.discrepancy.beyond(study.accuracy)
 
 
 def solves(study: Study, twin: Twin) -> bool:

@@ -129,12 +129,15 @@ class Discrepancy:
         """Root-mean-square of the posterior mean, in sigmas."""
         return float(np.sqrt(np.mean(self.mean**2)))
 
-    def beyond(self, accuracy: np.ndarray) -> float:
-        """The same without what a description that is good for `accuracy` (m,) sigmas (RMS) gets wrong of each channel: functions
-        of the pose, up to that."""
+    def rest(self, accuracy: np.ndarray) -> np.ndarray:
+        """The mean (n, m) without what a description that is good for `accuracy` (m,) sigmas (RMS) gets wrong of each channel:
+        functions of the pose, up to that."""
         static = np.sqrt(np.mean(self.static**2, axis=0))
-        share = np.minimum(1.0, accuracy / np.maximum(static, np.finfo(float).tiny))
-        return float(np.sqrt(np.mean((self.mean - share * self.static) ** 2)))
+        return self.mean - np.minimum(1.0, accuracy / np.maximum(static, np.finfo(float).tiny)) * self.static
+
+    def beyond(self, accuracy: np.ndarray) -> float:
+        """Root-mean-square of that, in sigmas."""
+        return float(np.sqrt(np.mean(self.rest(accuracy) ** 2)))
 
 
 class Evidence:

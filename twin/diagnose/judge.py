@@ -99,7 +99,7 @@ def look(study: Study, base: Weighed, best: Weighed, bars: Thresholds, beyond: L
     """The signs of the calibrated `base` and of the `best` set, and what it leaves of trials left out."""
     bench, trials = study.bench, study.trials
     after = best.discrepancy.beyond(study.accuracy)
-    rest = best.discrepancy.mean * study.objective.whitener.noise.sigma  # SI
+    rest = best.discrepancy.rest(study.accuracy) * study.objective.whitener.noise.sigma  # SI
     predicted = [bench.measured[k] - r for k, r in zip(trials, best.fit.evaluation.raw, strict=True)]
     bent = after > bars.left and bool(misbent(bench, trials, rest, predicted))
     limits = tuple(strained(best.fit))
