@@ -19,15 +19,13 @@ from twin.diagnose.quick import words as chatter
 from twin.diagnose.repeatability import repeatability
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import MUCH
+from twin.diagnose.thresholds import MUCH, TOLD
 from twin.diagnose.words import components, doubtful, mixed, nearest, since, structure, undecided, unlike, worst_channel
 
 PREDICTED = (
     "what is claimed was chosen for what it predicts of trials and halves of the session left out; by evidence, to which a large "
     "smooth error costs no more than a small one, other sets come before it, which the probabilities show"
 )
-
-TOLD = 0.05  # sigma of a smooth part, from which on it is said that it is the description's own fault
 
 
 @dataclass(frozen=True)

@@ -295,6 +295,7 @@ TEMPER = _row(
     "TEMPER", 20.0, "score a factor e", "the likelihood takes the laws' form for exact, which makes raw odds absurd; calibrated "
     "so that claims at 0.9 are right nine times of ten", BENCHMARK,
 )  # fmt: skip
+TOLD = _row("TOLD", 0.05, "sigma", "of a smooth part that is the description's own: less is not worth a word", "judgement")
 RUNNERS = _row("RUNNERS", 6, "effects", "runners-up a reader looks at", "judgement")
 
 # ---- rigs --------------------------------------------------------------------------------------------------------------------
