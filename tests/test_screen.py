@@ -12,6 +12,7 @@ import pytest
 from twin.diagnose import screen as stage
 from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import screen
+from twin.diagnose.study import Study
 
 
 def screened(monkeypatch: pytest.MonkeyPatch, accuracy: float, *outputs: tuple[str, float]) -> tuple[Any, dict[str, Any]]:
@@ -19,8 +20,11 @@ def screened(monkeypatch: pytest.MonkeyPatch, accuracy: float, *outputs: tuple[s
     asked: dict[str, Any] = {}
     bench = SimpleNamespace(outputs=[SimpleNamespace(group=g) for g, _ in outputs], robot=SimpleNamespace(accuracy=accuracy))
     noise = SimpleNamespace(sigma=np.array([s for _, s in outputs]))
-    objective = SimpleNamespace(whitener=SimpleNamespace(noise=noise))
-    study: Any = SimpleNamespace(objective=objective, bench=bench, progress=lambda words: asked.setdefault("said", words))
+    objective: Any = SimpleNamespace(whitener=SimpleNamespace(noise=noise), bench=bench)
+    evidence: Any = None
+    study = Study(objective, evidence, progress=lambda words: asked.setdefault("said", words))
+    stated = [accuracy / s if g == "marker" else 0.0 for g, s in outputs]
+    np.testing.assert_allclose(study.accuracy, stated)
     base: Any = SimpleNamespace(fit="fit")
 
     def null(study: Any, fit: str, patterns: str, seed: int) -> Thresholds:

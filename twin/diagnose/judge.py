@@ -28,7 +28,8 @@ from twin.diagnose.words import change
 @dataclass(frozen=True)
 class Signs:
     """What a verdict is read from: the smooth error (sigma) of the calibrated robot and with the effects, and of these on trials
-    left out; the strongest line left (z-score, Hz); what is left beside it all that is no noise either (`quick`, sigma).
+    left out, the last two but for what the description gets wrong of a pose (`Discrepancy.rest`); the strongest line left (z-score,
+    Hz); what is left beside it all that is no noise either (`quick`, sigma).
 
     `halved`: the effects take half of the error. `strange`: what is left sits at one place of the body, the calibrated error began
     at once, as that of no known effect does, or a law is at its limit (`strained`, in words).

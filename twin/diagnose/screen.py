@@ -11,7 +11,6 @@ from twin.diagnose.null import Thresholds, thresholds
 from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.study import Study
 from twin.diagnose.weigh import Weighed
-from twin.evaluate import ACCURATE
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,6 @@ def screen(study: Study, base: Weighed, seed: int) -> Screening:
 
 
 def _accuracy(study: Study) -> float:
-    """The twin's own accuracy in sigmas of the outputs it is declared for."""
-    noise, outputs = study.objective.whitener.noise, study.bench.outputs
-    sigma = np.array([s for s, o in zip(noise.sigma, outputs, strict=True) if o.group in ACCURATE])
-    return study.bench.robot.accuracy / float(np.mean(sigma)) if sigma.size else 0.0
+    """The twin's own accuracy over the mean sigma of the outputs it is declared for."""
+    stated = study.accuracy[study.accuracy > 0.0]
+    return 1.0 / float(np.mean(1.0 / stated)) if stated.size else 0.0
