@@ -10,6 +10,7 @@ line through the resident sizes after each round but the first.
 from __future__ import annotations
 
 import argparse
+import math
 import resource
 import time
 from pathlib import Path
@@ -57,7 +58,7 @@ class Walk:
         while time.monotonic() < until and most > 0:
             seen, reward, terminated, truncated, info = self.env.step(self.env.action_space.sample())
             self.steps, most = self.steps + 1, most - 1
-            if not (np.isfinite(seen).all() and np.isfinite(reward)):
+            if not (np.isfinite(seen).all() and math.isfinite(float(reward))):
                 raise FloatingPointError(
                     f"{self.env}: step {self.steps} of episode {self.episodes} is not finite: {seen}, {reward}"
                 )

@@ -87,7 +87,8 @@ def draw_cable_tool(folder: Path) -> None:
     recording, _ = cable_tool.read(folder)
     found = diagnose(runs(recording)[0], Twin.of(load("cable_tool")), Settings(jobs=1))
     predicted = found.twin.predict(recording)
-    ratio = np.polyfit(*(np.concatenate([t.values[f"joint_{j}_angle"] for t in recording.trials]) for j in (1, 2)), 1)
+    drum, jaw = (np.concatenate([t.values[f"joint_{j}_angle"] for t in recording.trials]) for j in (1, 2))
+    ratio = np.polyfit(drum, jaw, 1)
     figure, axes = plt.subplots(1, 4, figsize=(9.0, 2.8), sharey=True, layout="constrained")
     for axis, percent in zip(axes, cable_tool.LOADS, strict=True):
         name = f"load{percent}_0.5Hz.csv"

@@ -36,7 +36,8 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
     began = time.perf_counter()
     found = diagnose(fitted, Twin.of(load("cable_tool")), Settings(jobs=1))
     took = time.perf_counter() - began
-    linear = np.polyfit(*(np.concatenate([t.values[f"joint_{j}_angle"] for t in fitted.trials]) for j in (1, 2)), 1)
+    drum, jaw = (np.concatenate([t.values[f"joint_{j}_angle"] for t in fitted.trials]) for j in (1, 2))
+    linear = np.polyfit(drum, jaw, 1)
     off = [np.polyval(linear, t.values["joint_1_angle"]) - t.values["joint_2_angle"] for t in tested.trials]
     straight = float(np.rad2deg(np.sqrt(np.mean(np.concatenate(off) ** 2))))
     calibrated, after = (evaluate(twin, tested)["rmse"] for twin in (found.calibrated, found.twin))

@@ -5,17 +5,21 @@ from __future__ import annotations
 import io
 import struct
 import zipfile
+from collections.abc import Callable
 from random import Random
 
 import numpy as np
 
 from tools.mutated_files.sources import clouds
 
+Arrays = dict[str, np.ndarray]
+Change = Callable[[Arrays, str, Random], Arrays]
+
 
 def mutated_clouds(random: Random) -> bytes:
     if random.random() < 0.15:
         return _claiming(random)
-    arrays: dict[str, np.ndarray] = dict(clouds())
+    arrays: Arrays = dict(clouds())
     name = random.choice(list(arrays))
     if random.random() < 0.6:
         arrays = random.choice(CHANGES)(arrays, name, random)
@@ -30,11 +34,11 @@ def mutated_clouds(random: Random) -> bytes:
     return bytes(data)
 
 
-def _changed(value: object) -> object:
-    return lambda arrays, name, random: {**arrays, name: np.asarray(value(arrays[name]))}  # type: ignore[operator]
+def _changed(value: Callable[[np.ndarray], object]) -> Change:
+    return lambda arrays, name, random: {**arrays, name: np.asarray(value(arrays[name]))}
 
 
-CHANGES = (
+CHANGES: tuple[Change, ...] = (
     _changed(lambda a: a[:-1]),
     _changed(lambda a: a[::-1]),
     _changed(lambda a: a * -1),

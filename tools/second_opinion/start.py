@@ -49,7 +49,7 @@ class Calibrated:
     def screened(self, at: Fit) -> list[Candidate]:
         """Effects not in force whose pattern lowers |z|^2 by more than p log n to first order, at their best start, best first."""
         n_group = len(self.evidence.groups)
-        none = Discrepancy(0.0, np.zeros(0), np.full((n_group, len(COMPONENTS)), 1e-8), np.zeros((0, 0)))
+        none = Discrepancy(0.0, np.zeros(0), np.zeros(0), np.full((n_group, len(COMPONENTS)), 1e-8), np.zeros((0, 0)))
         best: dict[str, Candidate] = {}
         for candidate in rank(self.objective, self.evidence, at, none, dictionary(self.objective, at), top=len(catalogue())):
             best.setdefault(candidate.effect, candidate)
