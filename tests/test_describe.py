@@ -167,6 +167,12 @@ def test_of_two_bends_the_larger_is_the_place_if_its_jumps_have_twice_the_square
     assert where(plan, *bent(plan, (2, 0.01), (5, 0.0073))) == ""
 
 
+def test_chords_between_points_of_a_skin_tell_no_place(plan: Bench) -> None:
+    skin = replace(plan, robot=load("finger"))
+    assert misbent(skin, *bent(plan, (4, 0.01))) is None
+    assert where(skin, *bent(plan, (4, 0.01))) == ""
+
+
 def test_rows_in_which_a_marker_is_missing_have_no_say_in_the_place(plan: Bench) -> None:
     trials, off, rest = bent(plan, (4, 0.01))
     measured = [y.copy() for y in plan.measured]
