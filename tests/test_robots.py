@@ -14,13 +14,13 @@ from twin.calibrate import Model
 from twin.effects import Loads, Route, catalogue
 from twin.equilibrium import Equilibrium
 from twin.errors import DataError, UnknownNameError
-from twin.hinges import hinge_pairs
+from twin.hinges import HingeChain, hinge_pairs
 from twin.robots import available, load
 from twin.robots.robot import models_folder
 from twin.twin import Twin
 
 robots = pytest.mark.parametrize("name", available())
-backbones = pytest.mark.parametrize("name", [n for n in available() if "backbone" in load(n).build().parts])
+backbones = pytest.mark.parametrize("name", [n for n in available() if isinstance(load(n).build(), HingeChain)])
 TOML = (models_folder() / "continuum/robot.toml").read_text("utf-8")
 
 

@@ -71,10 +71,10 @@ class Body:
 
     `drives`: for each of its drives the ports it may be driven through, `stepped` those that its dynamics take. `senses`: what it
     can show, by channel. `loads`: inputs that load it, by channel, and which of `Loads` each is. `parts`: what an effect may need
-    to act on: "weight", "elasticity" (one stiffness for all of it), "backbone" (hinges that may rest bent), "markers", "load
-    cells", "strain sensors", "antagonists", "rope" (tendons that may bed in); and what it offers to change: "planes" of bending and
-    stiffness along its "length" (`bend_unequally`, `grade`), "holes" (`reroute`), a "surface" that may touch, "viscosity" that may
-    creep; "skin", whose patches it compares with clouds (`Problem.seen`). `antagonists` as in `Signals`; `frame` is that of the
+    to act on: "weight", "elasticity" (one stiffness for all of it), "markers", "load cells", "strain sensors", "antagonists",
+    "rope" (tendons that may bed in); and what it offers to change: "planes" of bending and stiffness along its "length"
+    (`bend_unequally`, `grade`), its "rest shape" (`precurve`), "holes" (`reroute`), a "surface" that may touch, "viscosity" that
+    may creep; "skin", whose patches it compares with clouds (`Problem.seen`). `antagonists` as in `Signals`; `frame` is that of the
     markers; `tendons` are the sites each tendon passes, base to tip, and `markers` those that are seen.
     """
 

@@ -69,6 +69,13 @@ class HingeChain(Body):
                 joint.stiffness = joint.stiffness * factor
                 joint.damping = joint.damping * factor
 
+    def precurve(self, about_x: float, about_y: float, slope: float) -> None:
+        """Hinges that rest bent by the curvature (1/m) of the piece of backbone they stand for, times 1 + slope (s/L - 1/2)."""
+        for at in self.joints:
+            share = 1.0 + slope * (at.arclength - 0.5)
+            for name, curvature in ((at.bend_x, about_x), (at.bend_y, about_y)):
+                self.spec.joint(name).springref += share * curvature * at.length
+
     def reroute(self, tendon: int, angle: float, further: float) -> None:
         """Move all holes of a tendon (from 0) about the backbone by `angle` (rad) and away from it by `further` (m)."""
         for name in self.tendons[tendon]:

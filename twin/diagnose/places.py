@@ -58,8 +58,8 @@ def misbent(bench: Bench, trials: Sequence[int], off: np.ndarray, predicted: Seq
 
     `off` (n, m) is the smooth part of its error, `predicted` (n_k, m) where it should be, both SI. A chord t from marker to marker,
     the base the first, turns by w = t x (change of `off` along it) / |t|^2. Bending that is wrong between two markers makes w jump
-    at both, whatever the rest of the body does to make up for it. That holds of markers on a backbone: between points of a skin, here
-    and there around it, a chord turns with the section too, and the shorter it is the more by their noise.
+    at both, whatever the rest of the body does to make up for it. That holds of markers on a backbone: between points of a skin,
+    here and there around it, a chord turns with the section too, and the shorter it is the more by their noise.
     """
     whole = {name: c for name, c in _markers(bench).items() if len(c) == 3}
     if len(whole) < 4 or family(bench.robot.family).chain is None:

@@ -12,11 +12,12 @@ class BackbonePrecurvature(Effect):
     """A rest curvature u* = (about_x, about_y) in the body frame: m = EI (u - u*); with `slope` it changes along the body as
     u* (1 + slope (s/L - 1/2)), s the distance from the base.
 
-    Each hinge's spring rests at u* h, h the piece of backbone the hinge stands for. Positive about_y bends the tip towards +x.
+    Each hinge's spring rests at u* h, h the piece of backbone the hinge stands for; in silicone fibres along z are without stress
+    1 + u_x* y - u_y* x times as long. Positive about_y bends the tip towards +x.
     Where SMA springs pull, it counts how they were put on: all as long while the body stood bent (`mounted` 1) or straight (0).
 
     Source: Kirchhoff rod with a curved reference (Rucker and Webster 2011). A coiled NiTi wire straightened by hand keeps
-    curvature radii of 0.2-5 m.
+    curvature radii of 0.2-5 m. Silicone that has taken a set: F = F_e G (Rodriguez, Hoger and McCulloch 1994).
 
     >>> BackbonePrecurvature(about_x=0.5)["about_x"]
     0.5
@@ -26,12 +27,12 @@ class BackbonePrecurvature(Effect):
     parameters = (
         Parameter("about_x", 0.0, "1/m", -8.0, 8.0, "rest curvature about x; wire from a spool", scale=0.1),
         Parameter("about_y", 0.0, "1/m", -8.0, 8.0, "rest curvature about y", scale=0.1),
-        Parameter("slope", 0.0, "1", -2.0, 2.0, "relative change of the rest curvature from base to tip", scale=0.2),
+        Parameter("slope", 0.0, "1", -4.0, 4.0, "relative change of the rest curvature from base to tip", scale=0.2),
         Parameter("mounted", 0.0, "1", 0.0, 1.0, "share of the rest bend the body had when its springs were put on", scale=1.0),
     )
     shape = ("slope", "mounted")
     richer = ("slope",)
-    needs = frozenset({"backbone"})
+    needs = frozenset({"rest shape"})
     moves_with = "nothing: it is there at zero tension, and fades as load grows"
 
     @classmethod
@@ -45,7 +46,4 @@ class BackbonePrecurvature(Effect):
         return Route(mounted=self["mounted"])
 
     def edit(self, body) -> None:
-        for at in body.joints:
-            share = 1.0 + self["slope"] * (at.arclength - 0.5)
-            for name, curvature in ((at.bend_x, self["about_x"]), (at.bend_y, self["about_y"])):
-                body.spec.joint(name).springref += share * curvature * at.length
+        body.precurve(self["about_x"], self["about_y"], self["slope"])

@@ -91,7 +91,7 @@ def _named(
             {
                 "weight",
                 "elasticity",
-                "backbone",
+                "rest shape",
                 "markers",
                 "load cells",
                 "planes",

@@ -43,6 +43,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
                 "strain sensors",
                 "planes",
                 "length",
+                "rest shape",
                 "holes",
                 "surface",
                 "viscosity",
@@ -72,6 +73,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
         damping=values["silicone.damping"],
         shear=np.ones(cells.shape),
         bulk=np.ones(shape.cells),
+        fibre=np.ones(cells.shape),
     )
 
 

@@ -20,7 +20,8 @@ class SoftBody(Body):
     `paths` (t, p, 3) and `cord_paths` (s, p, 3) m: points that tendons and cords run straight between, at rest; `seen` (m, 3) m:
     markers at rest. All in the finger's own frame, which is turned about z by `turn` (rad) against the base frame. A tendon's last
     point pulls at the silicone from `anchor` (m) to the tip. `shear` (c, q) and `bulk` (c,) are the moduli over those of the
-    described silicone, of E `youngs_modulus` (Pa), nu `poisson`, `density` (kg/m^3) and Rayleigh's coefficient `damping` (s).
+    described silicone, of E `youngs_modulus` (Pa), nu `poisson`, `density` (kg/m^3) and Rayleigh's coefficient `damping` (s);
+    `fibre` (c, q) is how long fibres along z are without stress, over what is drawn.
     """
 
     cone: Cone
@@ -37,6 +38,7 @@ class SoftBody(Body):
     damping: float
     shear: np.ndarray
     bulk: np.ndarray
+    fibre: np.ndarray
 
     @property
     def lattice(self) -> Lattice:
@@ -63,6 +65,13 @@ class SoftBody(Body):
         z = (self.lattice.quadrature[0][..., 2] - self.cone.clamp) / (self.cone.length - self.cone.clamp)
         self.shear[:] *= np.maximum(1.0 + slope * (z - 0.5), 0.05)
         self.bulk[:] *= np.maximum(1.0 + slope * (z.mean(axis=1) - 0.5), 0.05)
+
+    def precurve(self, about_x: float, about_y: float, slope: float) -> None:
+        """Bent without stress: curvatures (1/m) times 1 + slope (s - 1/2), s the height from clamp to tip. Bent about y the fibres
+        at +x are shorter, the tip is towards +x."""
+        x, y, z = np.moveaxis(self.lattice.quadrature[0], -1, 0)
+        s = (z - self.cone.clamp) / (self.cone.length - self.cone.clamp)
+        self.fibre[:] *= np.maximum(1.0 + (1.0 + slope * (s - 0.5)) * (about_x * y - about_y * x), 0.5)
 
     def reroute(self, tendon: int, angle: float, further: float) -> None:
         """Move a tendon (from 0) about the axis by `angle` (rad) and away from it by `further` (m)."""

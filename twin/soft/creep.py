@@ -25,7 +25,7 @@ def relax_for(u, cells, amplitude, time, dt, taken):
     ne, nq = cells.weight.shape
     F, C, J = np.empty((nq, 9)), np.empty((nq, 9)), np.empty(nq)
     for e in range(ne):
-        deformation(u, cells.members[e], cells.gradient[e], F, C, J)
+        deformation(u, cells.members[e], cells.gradient[e], cells.drawn[e], F, C, J)
         for q in range(nq):
             x, c = F[q], C[q]
             m0 = cells.shear[e, q] * J[q] ** (-2.0 / 3.0)

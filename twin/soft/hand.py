@@ -43,6 +43,10 @@ class HandBody(Body):
         for finger in self.fingers:
             finger.grade(slope)
 
+    def precurve(self, about_x: float, about_y: float, slope: float) -> None:
+        for finger in self.fingers:
+            finger.precurve(about_x, about_y, slope)
+
     def reroute(self, tendon: int, angle: float, further: float) -> None:
         k, own = divmod(tendon, len(self.fingers[0].paths))
         self.fingers[k].reroute(own, angle, further)

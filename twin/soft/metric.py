@@ -46,8 +46,8 @@ def _at_rest(parts: Parts) -> np.ndarray:
     for e in range(len(cells.members)):
         one = slice(e, e + 1)
         alone = Cells(
-            np.arange(NODES)[None], np.arange(3 * NODES)[None], cells.gradient[one], cells.weight[one], cells.basis[one],
-            cells.inverse[one], cells.shear[one], cells.bulk[one],
+            np.arange(NODES)[None], np.arange(3 * NODES)[None], cells.gradient[one], cells.drawn[one], cells.weight[one],
+            cells.basis[one], cells.inverse[one], cells.shear[one], cells.bulk[one],
         )  # fmt: skip
         tangent = Tangent(np.empty((3 * NODES, 3 * NODES)), np.zeros((1, 4, 3 * NODES)), np.zeros((1, 4)))
         stiffness(np.zeros((NODES, 3)), alone, np.empty((0, 0, 6)), tangent)

@@ -16,7 +16,10 @@ def parts_of(body: SoftBody) -> Parts:
     """The body as the compiled solve takes it."""
     grid = body.lattice
     gradient, local = grid.gradients
-    weight = grid.quadrature[1]
+    weight, drawn = grid.quadrature[1] * body.fibre, 1.0 / body.fibre
+    if (drawn != 1.0).any():
+        gradient = gradient.copy()
+        gradient[..., 2::3] *= drawn[:, None]
     basis = np.concatenate([np.ones((*local.shape[:2], 1)), local], axis=-1)
     inverse = np.linalg.inv(np.einsum("eqa,eq,eqb->eab", basis, weight, basis))
     E, nu = body.youngs_modulus, body.poisson
@@ -27,7 +30,7 @@ def parts_of(body: SoftBody) -> Parts:
         weights[t, -1] = grid.spread(body.paths[t, -1], body.anchor)
     skin = skin_points(body.cone)
     return Parts(
-        Cells(grid.members, grid.unknowns, gradient, weight, basis, inverse, shear, bulk),
+        Cells(grid.members, grid.unknowns, gradient, drawn, weight, basis, inverse, shear, bulk),
         Cables(np.ascontiguousarray(body.paths), weights),
         Skin(skin, grid.weights(skin), np.full(len(skin), 1.0 / AROUND)),
         ACROSS**2,

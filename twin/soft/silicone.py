@@ -3,7 +3,8 @@
     W = mu/2 (J^(-2/3) tr F'F - 3) + K/2 (theta - 1)^2,          mu = E / (2 (1 + nu)),  K = E / (3 (1 - 2 nu))
 
 theta is J projected, in each cell, on {1, x, y, z}: with J itself such a coarse cell locks, with one constant a cell it bends far
-too easily. What creep has taken from the stress, H (second Piola-Kirchhoff), is subtracted: P = dW/dF - F H.
+too easily. What creep has taken from the stress, H (second Piola-Kirchhoff), is subtracted: P = dW/dF - F H. F is taken from the
+state without stress, in which fibres along z may be longer or shorter than drawn, by g: F = (1 + du/dX) diag(1, 1, 1/g).
 
 Source: Simo, Taylor and Pister (1985), variational methods for the volume constraint in finite deformation elasto-plasticity.
 """
@@ -22,13 +23,14 @@ PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # of a symmetric tenso
 
 
 class Cells(NamedTuple):
-    """What the silicone's forces need of a lattice: nodes (c, 27) and unknowns (c, 81) of each cell, derivatives (c, 27, 3 q) 1/m,
-    weights (c, q) m^3, local coordinates with a one before them (c, q, 4), the inverse (c, 4, 4) of their products, and the moduli
-    mu (c, q) and K (c,) Pa."""
+    """What the silicone's forces need of a lattice: nodes (c, 27) and unknowns (c, 81) of each cell, derivatives (c, 27, 3 q) 1/m
+    by places without stress, 1/g (c, q), weights (c, q) m^3, local coordinates with a one before them (c, q, 4), the inverse
+    (c, 4, 4) of their products, and the moduli mu (c, q) and K (c,) Pa."""
 
     members: np.ndarray
     unknowns: np.ndarray
     gradient: np.ndarray
+    drawn: np.ndarray
     weight: np.ndarray
     basis: np.ndarray
     inverse: np.ndarray
@@ -45,7 +47,7 @@ class Tangent(NamedTuple):
 
 
 @inner
-def deformation(u, members, gradient, F, C, J):
+def deformation(u, members, gradient, drawn, F, C, J):
     """F and its cofactors (q, 9), J (q,) of one cell under nodal displacements u (n_node, 3). Returns the least J."""
     nq = J.size
     moved = np.empty((3, 27))
@@ -59,7 +61,7 @@ def deformation(u, members, gradient, F, C, J):
         for i in range(3):
             for j in range(3):
                 x[3 * i + j] = G[i, 3 * q + j]
-            x[4 * i] += 1.0
+            x[4 * i] += drawn[q] if i == 2 else 1.0
         for i in range(3):
             for j in range(3):
                 a, b, m, n = 3 * NEXT[i], 3 * AFTER[i], NEXT[j], AFTER[j]
@@ -91,7 +93,7 @@ def forces(u, cells, H, f, p):
     f[:] = 0.0
     least = 1e9
     for e in range(ne):
-        least = min(least, deformation(u, cells.members[e], cells.gradient[e], F, C, J))
+        least = min(least, deformation(u, cells.members[e], cells.gradient[e], cells.drawn[e], F, C, J))
         if least < LEAST:
             return least
         pressures(cells, e, J, p[e])
@@ -149,7 +151,7 @@ def stiffness(u, cells, H, tangent):
     K[:] = 0.0
     least = 1e9
     for e in range(ne):
-        least = min(least, deformation(u, cells.members[e], cells.gradient[e], F, C, J))
+        least = min(least, deformation(u, cells.members[e], cells.gradient[e], cells.drawn[e], F, C, J))
         if least < LEAST:
             return least
         D = cells.gradient[e]

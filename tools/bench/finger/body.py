@@ -35,6 +35,7 @@ class Body:
     slope: np.ndarray  # (m, q, 27, 3) 1/mm, by the undeformed position
     volume: np.ndarray  # (m, q) mm^3
     linear: np.ndarray  # (m, q, 4) what the pressure is made of: 1 and the local coordinates
+    unformed: np.ndarray  # (m, q, 3, 3) from what is drawn back to what has no stress; 1, or the inverse of what `form` was given
 
     @classmethod
     def of(cls, mesh: Mesh, modulus: float, poisson: float = 0.49) -> Body:
@@ -46,7 +47,8 @@ class Body:
         volume = weight * np.linalg.det(jacobian)
         linear = np.broadcast_to(np.column_stack([np.ones(len(local)), local]), (*volume.shape, 4))
         ones = np.ones(volume.shape)
-        return cls(mesh, modulus / 2 / (1 + poisson) * ones, modulus / 3 / (1 - 2 * poisson) * ones, values, slope, volume, linear)
+        shear, bulk = modulus / 2 / (1 + poisson) * ones, modulus / 3 / (1 - 2 * poisson) * ones
+        return cls(mesh, shear, bulk, values, slope, volume, linear, np.broadcast_to(I3, (*volume.shape, 3, 3)))
 
     @property
     def points(self) -> np.ndarray:
@@ -65,7 +67,12 @@ class Body:
 
     def gradient(self, u: np.ndarray) -> np.ndarray:
         """Deformation gradient (m, q, 3, 3) of nodal displacements (n, 3)."""
-        return I3 + np.matmul(np.swapaxes(u[self.mesh.cells], 1, 2)[:, None], self.slope)
+        return self.unformed + np.matmul(np.swapaxes(u[self.mesh.cells], 1, 2)[:, None], self.slope)
+
+    def form(self, shape: np.ndarray) -> None:
+        """Without stress the body is drawn by the gradients `shape` (m, q, 3, 3), those of a map, from what the mesh is."""
+        self.unformed = np.linalg.inv(shape)
+        self.slope, self.volume = self.slope @ self.unformed, self.volume * np.linalg.det(shape)
 
     def isochoric(self, F: np.ndarray) -> np.ndarray:
         """Second Piola-Kirchhoff stress of the distortion, elastic (m, q, 3, 3) MPa."""
