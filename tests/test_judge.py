@@ -42,6 +42,21 @@ def test_the_verdict_follows_its_signs(added: bool, changed: dict[str, Any], sai
     assert verdict(added, replace(CLEAN, **changed), BARS) == said
 
 
+@pytest.mark.parametrize(
+    ("accuracy", "after", "said"),
+    [
+        (0.0, 0.13, "partly_explained"),  # above 0.12
+        (0.2, 0.19, "explained"),
+        (0.2, 0.21, "partly_explained"),
+        (0.5, 0.29, "explained"),
+        (0.5, 0.31, "partly_explained"),  # no description is that bad
+    ],
+)
+def test_what_the_description_may_leave_beside_a_right_law_is_no_sign_against_it(accuracy: float, after: float, said: str) -> None:
+    signs = replace(CLEAN, before=0.8, after=after)  # each `after` is more than 15 % of 0.8
+    assert verdict(True, signs, Thresholds(accuracy=accuracy)) == said
+
+
 def sets(**scores: float) -> Any:
     made = [SimpleNamespace(effects=tuple(n.split("__")) if n != "none" else (), score=s) for n, s in scores.items()]
     return SimpleNamespace(all=tuple(made))

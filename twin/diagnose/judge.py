@@ -124,7 +124,7 @@ def verdict(added: bool, signs: Signs, bars: Thresholds) -> str:
     much = max(s.after, s.unseen, s.quick) > max(MUCH, bars.left) or s.line[0] > bars.line
     if not added:
         return "unexplained" if much or s.line[0] > bars.faint or s.after > max(ALONE, bars.left) else "noise"
-    if not much and not (s.after > bars.left and s.after > SHARE * s.before):
+    if not much and not (s.after > bars.slight and s.after > SHARE * s.before):
         return "partly_explained" if s.strange else "explained"
     return "partly_explained" if s.halved else "unexplained"
 
@@ -154,7 +154,7 @@ def _claims(
 ) -> tuple[Claim, ...]:
     """The largest first."""
     # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
-    sure = max(0.0, 1.0 - signs.after / signs.before) if signs.after > bars.left else 1.0
+    sure = max(0.0, 1.0 - signs.after / signs.before) if signs.after > bars.slight else 1.0
     sure = min(sure, EVEN) if signs.strained else sure
     small = {s.effect for s in gated.small}
     claims = [

@@ -21,7 +21,7 @@ from twin.diagnose.evidence import Spectrum
 from twin.diagnose.patterns import Dictionary
 from twin.diagnose.ranking import projected
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import ACCEPT, DRAWS, FAINT, GUMBEL_99, LEFT, LINE, MATERIAL
+from twin.diagnose.thresholds import ACCEPT, ALONE, DRAWS, FAINT, GUMBEL_99, LEFT, LINE, MATERIAL
 from twin.information import solve
 
 
@@ -43,6 +43,11 @@ class Thresholds:
     def visible(self) -> float:
         """The least contribution (sigma) worth claiming of what the pose alone decides."""
         return max(self.material, self.accuracy)
+
+    @property
+    def slight(self) -> float:
+        """Structure (sigma) that a description of this accuracy may leave beside right laws, as it may where none is found."""
+        return max(self.left, min(ALONE, self.accuracy))
 
     @property
     def faint(self) -> float:
