@@ -30,6 +30,7 @@ class World:
         self.study: Any = SimpleNamespace(
             objective=SimpleNamespace(n=N), progress=lambda words: None, fall=lambda a, b: a.z**2 - b.z**2,
             evidence=SimpleNamespace(beyond_pose=self.beyond_pose), plain=lambda fit: fit.plain, accuracy=0.0,
+            excused=np.full(2, np.inf),
         )  # fmt: skip
         self.harmful: set[str] = set()
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
@@ -95,6 +96,19 @@ def test_the_bar_is_the_twins_accuracy_where_that_is_higher(monkeypatch: pytest.
     found = World(monkeypatch, friction=0.5).gated("friction", accuracy=0.6)
     assert found.best.effects == ()
     assert found.without == {}
+
+
+@pytest.mark.parametrize(
+    ("moves", "excused", "sensed", "kept"),
+    [(0.5, 0.4, True, True), (0.5, 0.6, True, False), (0.5, 0.4, False, False), (0.12, 0.1, True, False)],
+)
+def test_or_where_the_sensors_alone_move_by_more_than_theirs(
+    monkeypatch: pytest.MonkeyPatch, moves: float, excused: float, sensed: bool, kept: bool
+) -> None:
+    """A gain of 0.5 sigma over all outputs, all of it in sensors whose own inaccuracy makes `excused`; but never below 0.13."""
+    world = World(monkeypatch, gain=moves)
+    world.sensed, world.study.excused = {"gain"} if sensed else set(), np.array([np.inf, excused**2 * N])
+    assert world.gated("gain", accuracy=0.6).best.effects == (("gain",) if kept else ())
 
 
 @pytest.mark.parametrize(("history", "kept"), [(0.12, False), (0.14, True)])

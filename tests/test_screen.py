@@ -18,7 +18,9 @@ from twin.diagnose.study import Study
 def screened(monkeypatch: pytest.MonkeyPatch, accuracy: float, *outputs: tuple[str, float]) -> tuple[Any, dict[str, Any]]:
     """Of a robot of this accuracy whose outputs (group, sigma) are compared."""
     asked: dict[str, Any] = {}
-    bench = SimpleNamespace(outputs=[SimpleNamespace(group=g) for g, _ in outputs], robot=SimpleNamespace(accuracy=accuracy))
+    bench = SimpleNamespace(
+        outputs=[SimpleNamespace(group=g) for g, _ in outputs], robot=SimpleNamespace(accuracy=accuracy, parameters=())
+    )
     noise = SimpleNamespace(sigma=np.array([s for _, s in outputs]))
     objective: Any = SimpleNamespace(whitener=SimpleNamespace(noise=noise), bench=bench)
     evidence: Any = None

@@ -70,7 +70,8 @@ def main() -> None:
         took = 1e3 * (time.perf_counter() - began)
         off = np.linalg.norm(line - true.centreline, axis=1)
         way = float(np.linalg.norm(true.tip - [0.0, 0.0, 100.0]))
-        rows.append((off[-1], off.mean(), 100 * np.abs(strain - true.strain).max() / FULL, 100 * off[-1] / way, ms, side.any()))
+        wrong = strain - true.strain
+        rows.append((off[-1], off.mean(), 100 * np.abs(wrong).max() / FULL, 100 * off[-1] / way, ms, side.any(), (wrong**2).mean()))
         shown = np.round(1e3 * command if kind is Drive.DISPLACEMENT else command, 2)
         print(
             f"{k:3d} E {E / 1e3:.0f} kPa {kind} {shown} side {np.round(side, 3)} g {gravity[2]:.1f}: tip way {way:.1f} mm, off "
@@ -80,7 +81,7 @@ def main() -> None:
     table = np.array(rows, float)
     free, loaded = table[table[:, 5] == 0], table[table[:, 5] == 1]
     print(f"tendons: tip {free[:, 0].mean():.2f} / {free[:, 0].max():.2f} mm (mean / max), centreline {free[:, 1].mean():.2f} mm")
-    print(f"strain {free[:, 2].mean():.2f} / {free[:, 2].max():.2f} % of {FULL}")
+    print(f"strain {free[:, 2].mean():.2f} / {free[:, 2].max():.2f} % of {FULL}; RMS {np.sqrt(free[:, 6].mean()):.1e}")
     if len(loaded):
         print(f"side loads: tip {loaded[:, 3].mean():.1f} / {loaded[:, 3].max():.1f} % of its way")
     print(f"{np.median(table[:, 4]):.1f} ms a warm solve (median)")

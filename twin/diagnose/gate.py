@@ -81,10 +81,12 @@ def contribution(study: Study, best: Weighed, without: Weighed) -> float:
 
 
 def _immaterial(study: Study, bars: Thresholds, best: Weighed, without: Weighed) -> bool:
-    """Whether an effect moves too little, and too little of that depends on more than the pose; nor shows in the outputs as they
-    are. White residuals allow each row what its inputs' readings may err by. An error of that size which comes back at every
-    row, a delay's, is small there: but not in the outputs, and they can be told it."""
-    if contribution(study, best, without) >= bars.visible:
+    """Whether an effect moves too little, in all outputs together and in each group that an accuracy is declared for, and too
+    little of that depends on more than the pose; nor shows in the outputs as they are. White residuals allow each row what its
+    inputs' readings may err by. An error of that size which comes back at every row, a delay's, is small there: but not in the
+    outputs, and they can be told it."""
+    moved = contribution(study, best, without)
+    if moved >= bars.visible or (moved >= bars.material and bool(np.any(study.fall(without.fit, best.fit) > study.excused))):
         return False
     if study.evidence.beyond_pose(without.fit.z - best.fit.z) >= bars.material:
         return False

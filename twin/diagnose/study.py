@@ -12,6 +12,7 @@ from twin.calibrate import Fit, Objective
 from twin.diagnose.budget import Budget
 from twin.diagnose.evidence import Evidence
 from twin.evaluate import ACCURATE
+from twin.quantities import each
 
 Progress = Callable[[str], None]
 
@@ -51,8 +52,20 @@ class Study:
     @property
     def accuracy(self) -> np.ndarray:
         """What the robot's description is good for (m,), sigmas of each output that it is declared for; zero for the others."""
-        stated = np.array([self.bench.robot.accuracy if o.group in ACCURATE else 0.0 for o in self.bench.outputs])
+        robot, outputs = self.bench.robot, self.bench.outputs
+        stated = np.array([robot.accuracy if o.group in ACCURATE else 0.0 for o in outputs])
+        values = {p.name: p.value for p in robot.parameters}
+        if (strain := values.get("sensors.accuracy", 0.0)) > 0.0:  # dR = 2 R0 d(strain), kappa being about 1
+            rest = each(values, "sensors.resistance", int(str(robot.structure["sensors"])))
+            stated += [2.0 * rest[o.index] * strain if o.group == "sensor" else 0.0 for o in outputs]
         return stated / self.objective.whitener.noise.sigma
+
+    @property
+    def excused(self) -> np.ndarray:
+        """(n_group,) of |z|^2 that what the description gets wrong can take of each group; without end where none is declared."""
+        of = np.array([o.group for o in self.bench.outputs])
+        each_output = self.evidence.present.sum(axis=0) * self.accuracy**2
+        return np.array([total if (total := each_output[of == g].sum()) > 0.0 else np.inf for g in dict.fromkeys(of)])
 
     @property
     def bench(self) -> Bench:

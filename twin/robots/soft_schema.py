@@ -92,6 +92,7 @@ ROWS = (
     Row("sensors.resistance", "ohm", "ohm", "R0 of each cord, at no strain", 1e-2, 1e8, ("sensor",)),
     Row("sensors.stretch", "1", "1", "kappa of each cord when stretched: R = R0 (1 + kappa strain)^2", 0.05, 20.0, ("sensor",)),
     Row("sensors.compression", "1", "1", "kappa of each cord when compressed", 0.05, 20.0, ("sensor",)),
+    Row("sensors.accuracy", "1", "1", "what the cords' strains are believed to be good for, as `accuracy`", 0.0, 0.1, default=0.0),
     Row(
         "mounting.angle",
         "rad",
