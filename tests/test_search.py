@@ -16,12 +16,7 @@ from twin.diagnose.search import _material, search
 from twin.quantities import Parameter
 
 STUDY: Any = SimpleNamespace(
-    objective=SimpleNamespace(n=10_000),
-    evidence=None,
-    progress=lambda words: None,
-    fall=lambda a, b: np.zeros(1),
-    budget=Budget(),
-    excused=np.array([np.inf]),
+    objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1), budget=Budget()
 )
 
 
@@ -177,18 +172,11 @@ def test_where_no_further_effect_pays_the_search_ends(monkeypatch: pytest.Monkey
 
 
 def test_a_candidate_must_promise_what_would_be_material() -> None:
-    """|z|^2 of bar^2 n, or of 15 % (an amplitude) of what the set explains in the group in which it explains least; a group of
-    which less is excused needs no more than that, and never less than what is material without."""
-    fit, none = SimpleNamespace(fit=None), np.inf
-    for fall, excused, least in (
-        ([4e5, 9e5], none, 0.15**2 * 4e5), ([1e4, 9e5], none, 0.5**2 * 1e4), ([-5.0, 9e5], none, 0.5**2 * 1e4),
-        ([-5.0, 9e5], 0.3**2 * 1e4, 0.3**2 * 1e4), ([-5.0, 9e5], 0.1**2 * 1e4, 0.2**2 * 1e4),
-        ([-5.0, 9e5], 0.6**2 * 1e4, 0.5**2 * 1e4),
-    ):  # fmt: skip
-        study: Any = SimpleNamespace(
-            objective=SimpleNamespace(n=10_000), fall=lambda a, b, fall=fall: np.array(fall), excused=np.array([none, excused])
-        )
-        assert _material(study, fit, fit, Thresholds(material=0.2, accuracy=0.5)) == pytest.approx(least)  # type: ignore[arg-type]
+    """|z|^2 of bar^2 n, or of 15 % (an amplitude) of what the set explains in the group in which it explains least."""
+    fit = SimpleNamespace(fit=None)
+    for fall, least in (([4e5, 9e5], 0.15**2 * 4e5), ([1e4, 9e5], 0.5**2 * 1e4), ([-5.0, 9e5], 0.5**2 * 1e4)):
+        study: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), fall=lambda a, b, fall=fall: np.array(fall))
+        assert _material(study, fit, fit, 0.5) == pytest.approx(least)  # type: ignore[arg-type]
 
 
 def test_every_set_weighed_is_listed_best_first(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,7 +60,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
 def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
     """Into `fresh`: `member` with each of the effects whose pattern promises most."""
     for candidate in rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks):
-        if candidate.gain < PROMISE * max(bars.accept, _material(study, base, member, bars)):
+        if candidate.gain < PROMISE * max(bars.accept, _material(study, base, member, bars.visible)):
             continue
         name = " + ".join((*member.effects, candidate.effect))
         if not study.budget.allows(name):
@@ -72,12 +72,11 @@ def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars
             fresh[found.laws] = found
 
 
-def _material(study: Study, base: Weighed, member: Weighed, bars: Thresholds) -> float:
-    """The fall of |z|^2 below which an effect added to `member` would be immaterial: in the group of outputs in which least is
-    excused by the description's accuracy, and in that in which `member` explains least, where its laws' faults show least."""
+def _material(study: Study, base: Weighed, member: Weighed, bar: float) -> float:
+    """The fall of |z|^2 below which an effect added to `member` would be immaterial: in the group of outputs in which `member`
+    explains least, where its laws' faults show least."""
     explained = max(0.0, float(study.fall(base.fit, member.fit).min()))
-    least, n = float(study.excused.min()), study.objective.n
-    return max(min(bars.visible**2 * n, max(bars.material**2 * n, least)), FORM**2 * explained)
+    return max(bar**2 * study.objective.n, FORM**2 * explained)
 
 
 def exchanged(study: Study, best: Weighed, known: Known) -> Weighed:
