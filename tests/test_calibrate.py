@@ -217,7 +217,7 @@ def test_a_law_at_the_end_of_its_range_is_said(case: tuple[int, Recording, Fit])
     assert strained(wider) == []
     said = strained(ended(wider, "slope"))
     assert len(said) == 1
-    assert said[0].startswith("backbone precurvature: slope came out at the end of its range (2)")
+    assert said[0].startswith("backbone precurvature: slope came out at the end of its range (4)")
     assert strained(ended(found, "backbone.youngs_modulus")) == []  # the robot's own parameters have a notice of their own
     assert any("backbone.youngs_modulus" in words for words in unlikely(ended(found, "backbone.youngs_modulus")))
 
