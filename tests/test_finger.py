@@ -130,8 +130,10 @@ def test_silicone_bent_without_stress_stands_on_its_arc() -> None:
     one, k = body(), np.array([-1.2, 1.0])
     one.precurve(*k, 0.0)
     path = solve(one, np.zeros(4), TENSION, np.zeros(3))
-    turn = lambda z: Rotation.from_rotvec((z - 0.01) * np.append(k, 0.0))  # noqa: E731
     z, w = np.polynomial.legendre.leggauss(12)
+
+    def turn(height: float) -> Rotation:
+        return Rotation.from_rotvec((height - 0.01) * np.append(k, 0.0))
 
     def stands(point: np.ndarray) -> np.ndarray:
         half = 0.5 * (point[2] - 0.01)
