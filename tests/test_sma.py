@@ -254,6 +254,27 @@ def test_where_a_single_step_is_lost_the_neighbours_own_shape_stays() -> None:
     assert np.isfinite(found.q).all()
 
 
+@pytest.mark.parametrize("more", [1e-3, 4e-3])
+@pytest.mark.parametrize("after", [0.85, 0.9])
+def test_a_neighbour_is_to_first_order_what_it_is_in_full(after: float, more: float) -> None:
+    """Springs that lose a little more heat: less current, or the end of their heat, lets them rest within their loops, each where its
+    own past has it. What a sample loses there, all that follow multiply."""
+    time = np.arange(0.0, 160.0, 1.0)
+    current = np.where(time < 80.0, 0.9, after)[:, None] * np.array([1.0, 0.9, 0.95])
+
+    def problem(factor: float) -> Problem:
+        spring = named("sma_cooling")({"factor": factor}, 3).spring(springs())
+        return Problem(time, current, SIDEWAYS, Route(), HEATED, heating=Heating(np.full(len(time), ROOM), spring))
+
+    kept = robot().solve(replace(problem(1.0), keep=True))
+    full = robot().solve(problem(1.0 + more))
+    once = robot().solve(replace(problem(1.0 + more), near=kept, once=True))
+    moved = np.abs(full.tension - kept.tension).max()
+    assert moved > 1e-3  # N: it is seen
+    # of the second order: a share of the change that is some share `more` of it; neighbours' pieces left it 0.2 to 20 of the change
+    assert np.abs(once.tension - full.tension).max() < max(more, 2e-3) * moved
+
+
 @pytest.mark.parametrize("bedding", [0.0, 5e-4])
 def test_springs_pull_in_what_tendons_of_a_toe_give_way(bedding: float) -> None:
     """A spring's elongation is the path's and the stiff tendon's share of it: the springs by themselves, given elongations so

@@ -21,6 +21,8 @@ from twin.equilibrium.newton import CONTRACTION, GROWTH, LONGEST_STEP, allowed, 
 
 CLOSED = 0.2  # m/rad: a gap below this times the solver's tolerance counts as none (2e-8 m: some 1e-5 N)
 STEPS = 40
+PIECES = 8  # of springs' laws, tried before a first-order step ends on the last
+SAME = 1e-3  # of a stretch: pieces of a spring's law differ by more
 SMALLEST = 1e-3  # of a jump
 WARY = 2e-4  # m: a part of it by a post, before which the robot may be caught; its tip moves by some 3 mm
 
@@ -283,21 +285,48 @@ def hold(at, state, factors, held, tol):
 
 @inner
 def hold_once(at, state, factors, held):
-    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent.
+    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent, each spring on the piece of
+    its law where the step ends: the neighbour's, beside which it has another past, may be another one.
 
-    Returns 1 and commits the slip, or 0 where shape and tensions are lost.
+    Returns 1 and commits the slip, or 0 where shape and tensions are lost. The path of a taut spring is the step's own, to first
+    order as its tension is: they are where its law goes on from, and what a bent path has more, once a sample, would add up.
     """
-    r, none = np.empty(state.q.size), np.empty((0, 0))
+    r0, r, none = np.empty(state.q.size), np.empty(state.q.size), np.empty((0, 0))
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
     place(at, state.q)
-    bowing = balance(at, state, z, s, r, none)
+    bowing = balance(at, state, z, s, r0, none)
+    q0, T0, own = state.q.copy(), state.T.copy(), s.copy()
     linearise(held, s, state.T)
-    longest = advance(at, state, factors, held, z, s, r)
-    if not 0.0 <= longest < LONGEST_STEP:
-        return 0
+    for _ in range(PIECES):
+        assign(state.q, q0)
+        assign(state.T, T0)
+        assign(r, r0)
+        longest = advance(at, state, factors, held, z, s, r)
+        if not 0.0 <= longest < LONGEST_STEP:
+            return 0
+        if not elsewhere(held, state.T, own):
+            break
     place(at, state.q)
     commit(at, state, bowing)
+    for t in range(state.T.size):
+        if held.by_spring[t] and state.T[t] > 0.0:
+            state.s[t, 0] = own[t, 0]
     return 1
+
+
+@inner
+def elsewhere(held, tension, s):
+    """Whether a taut spring, at the path that its linear piece has at its tension, is on another piece; s[t, 0] are these paths, and
+    the springs are linearised there."""
+    was, other = held.stretch.copy(), False
+    for t in range(tension.size):
+        if held.by_spring[t] and tension[t] > 0.0:
+            s[t, 0] = held.free[t] + held.bedded[t] + held.stretch[t] * tension[t]
+    linearise(held, s, tension)
+    for t in range(tension.size):
+        if held.by_spring[t] and tension[t] > 0.0:
+            other = other or abs(held.stretch[t] - was[t]) > SAME * was[t]
+    return other
 
 
 @inner
