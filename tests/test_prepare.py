@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twin.bench import ROOM, Bench, prepare
+from twin.bench import ROOM, Bench, of_the_room, prepare
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
@@ -68,6 +68,22 @@ def test_the_rooms_temperature_is_logged_else_declared_else_that_of_rooms() -> N
     np.testing.assert_allclose(bench.inputs[0].temperature, [300.0, 301.0, 303.0, 304.0], rtol=0, atol=1e-12)
     np.testing.assert_array_equal(bench.inputs[1].temperature, ROOM)
     np.testing.assert_array_equal(bench.inputs[2].temperature, 290.0)
+
+
+@pytest.mark.parametrize("room", ["warms", "is let in"])
+def test_a_thermometers_noise_is_not_the_rooms(room: str) -> None:
+    """0.1 K of white noise: of a room that warms evenly a line of two numbers would keep sqrt(2 / 150) of it, and a curve that goes
+    by the data up to four times that; where a door opens nothing is gained, and up to half a step is lost beside it, within the
+    means' two rows and a spline's three pieces."""
+    time, rng = np.arange(0.0, 60.0, 0.4), np.random.default_rng(4)
+    true = 296.0 + (0.01 * time if room == "warms" else -4.0 * (time > 30.0))
+    found = of_the_room(time, true + rng.normal(0.0, 0.1, time.size))
+    off = np.abs(found - true)
+    assert np.sqrt(np.mean(off**2)) < (0.045 if room == "warms" else 0.2)
+    assert (off > (0.15 if room == "warms" else 0.35)).sum() <= (0 if room == "warms" else 6)
+    assert off.max() < 2.0
+    still = np.full(150, 296.15)
+    assert of_the_room(time, still) is still
 
 
 def test_loads_are_the_trials_else_the_sets_else_the_robots() -> None:
