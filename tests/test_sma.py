@@ -257,8 +257,8 @@ def test_where_a_single_step_is_lost_the_neighbours_own_shape_stays() -> None:
 @pytest.mark.parametrize("more", [1e-3, 4e-3])
 @pytest.mark.parametrize("after", [0.85, 0.9])
 def test_a_neighbour_is_to_first_order_what_it_is_in_full(after: float, more: float) -> None:
-    """Springs that lose a little more heat: less current, or the end of their heat, lets them rest within their loops, each where its
-    own past has it. What a sample loses there, all that follow multiply."""
+    """Springs that lose a little more heat: less current, or the end of their heat, lets them rest within their loops, each where
+    its own past has it. What a sample loses there, all that follow multiply."""
     time = np.arange(0.0, 160.0, 1.0)
     current = np.where(time < 80.0, 0.9, after)[:, None] * np.array([1.0, 0.9, 0.95])
 

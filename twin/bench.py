@@ -255,10 +255,10 @@ def _temperature(recording: Recording, trial: Trial) -> np.ndarray:
 
 
 def of_the_room(time: np.ndarray, reading: np.ndarray) -> np.ndarray:
-    """A room's temperature (n,) K behind its thermometer's noise, which no body follows: 0.1 K from row to row are 0.06 mm at the tip
-    of a robot that softens by 1 % a kelvin. The smoothing spline that generalised cross-validation picks (Craven and Wahba, Numer.
-    Math. 1979) through the means of at most `ROOMY` parts, so that a door that opens stays one; of fewer than `LOGGED` rows the
-    reading."""
+    """A room's temperature (n,) K behind its thermometer's noise, which no body follows: 0.1 K from row to row are 0.06 mm at the
+    tip of a robot that softens by 1 % a kelvin. The smoothing spline that generalised cross-validation picks (Craven and Wahba,
+    Numer. Math. 1979) through the means of at most `ROOMY` parts, so that a door that opens stays one; of fewer than `LOGGED` rows
+    the reading."""
     if len(time) < LOGGED or np.ptp(reading) == 0.0:
         return reading
     parts = np.array_split(np.stack([time, reading]), min(len(time), ROOMY), axis=1)

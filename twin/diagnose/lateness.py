@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -156,6 +157,7 @@ def _best(trials: list[Given], form: Form, start: np.ndarray) -> tuple[float, tu
             return np.inf
         return -sum(likelihood(g, delay, lag, inertia) for g in trials)
 
+    found: Any
     if len(start) == 1:
         found = minimize_scalar(cost, bounds=(0.0, 3.0 * start[0]), method="bounded", options={"xatol": 1e-3 * start[0]})
         x = np.array([found.x])

@@ -10,7 +10,7 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.ranking import rank
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, HOPELESS, PROMISE, WIDTH
+from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WIDTH
 from twin.diagnose.weigh import Laws, Weighed, better, extended, fuller, refit_without
 from twin.effects import Start, catalogue
 
@@ -39,10 +39,11 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
         for member in ahead:
             lacks = patterns.beside(member.effects)
             # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
-            # effects that promise anything by the base's; the others' are the base's.
+            # effects that promise something by the base's; the others' are the base's.
             if member is beam[0] and member is not base:
+                least = STALE * _asked(study, base, member, bars)
                 promise = rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
-                lacks = dictionary(study.objective, member.fit, {c.effect for c in promise})
+                lacks = dictionary(study.objective, member.fit, {c.effect for c in promise if c.gain >= least})
             study.progress(f"effects, {level} at once")
             extend(study, base, member, lacks, bars, fresh)
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
@@ -60,7 +61,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
 def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
     """Into `fresh`: `member` with each of the effects whose pattern promises most."""
     for candidate in rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks):
-        if candidate.gain < PROMISE * max(bars.accept, _material(study, base, member, bars.visible)):
+        if candidate.gain < _asked(study, base, member, bars):
             continue
         name = " + ".join((*member.effects, candidate.effect))
         if not study.budget.allows(name):
@@ -70,6 +71,11 @@ def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars
         found = extended(study, member, candidate.effect, candidate.start, beat)
         if found is not None and (found.laws not in fresh or better(found, fresh[found.laws])):
             fresh[found.laws] = found
+
+
+def _asked(study: Study, base: Weighed, member: Weighed, bars: Thresholds) -> float:
+    """The gain an effect's pattern must promise beside `member` to be fitted there."""
+    return PROMISE * max(bars.accept, _material(study, base, member, bars.visible))
 
 
 def _material(study: Study, base: Weighed, member: Weighed, bar: float) -> float:

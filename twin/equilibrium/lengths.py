@@ -285,8 +285,8 @@ def hold(at, state, factors, held, tol):
 
 @inner
 def hold_once(at, state, factors, held):
-    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent, each spring on the piece of
-    its law where the step ends: the neighbour's, beside which it has another past, may be another one.
+    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent, each spring on the piece
+    of its law where the step ends: the neighbour's, beside which it has another past, may be another one.
 
     Returns 1 and commits the slip, or 0 where shape and tensions are lost. The path of a taut spring is the step's own, to first
     order as its tension is: they are where its law goes on from, and what a bent path has more, once a sample, would add up.
@@ -316,8 +316,8 @@ def hold_once(at, state, factors, held):
 
 @inner
 def elsewhere(held, tension, s):
-    """Whether a taut spring, at the path that its linear piece has at its tension, is on another piece; s[t, 0] are these paths, and
-    the springs are linearised there."""
+    """Whether a taut spring, at the path that its linear piece has at its tension, is on another piece; s[t, 0] are these paths,
+    and the springs are linearised there."""
     was, other = held.stretch.copy(), False
     for t in range(tension.size):
         if held.by_spring[t] and tension[t] > 0.0:
