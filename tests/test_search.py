@@ -92,6 +92,23 @@ def test_patterns_are_taken_anew_of_what_promises_anything_alone(monkeypatch: py
     assert world.anew[0] == {"creep"}
 
 
+@pytest.mark.parametrize(("share", "anew"), [(0.24, {"creep"}), (0.26, {"creep", "tilt"})])
+def test_patterns_are_taken_anew_of_what_promises_a_quarter_of_what_a_refit_asks(
+    monkeypatch: pytest.MonkeyPatch, share: float, anew: set[str]
+) -> None:
+    """A refit asks a quarter of what counts, so that a sixteenth of it, by the base's pattern, is looked at again."""
+    world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "tilt": 1.0})
+
+    def rank(objective: Any, evidence: Any, fit: Any, *others: Any, **named: Any) -> list[Any]:
+        gains = {"friction": 1e6, "creep": 1e6, "tilt": share * 0.25 * Thresholds().accept}
+        return [SimpleNamespace(effect=e, start=None, gain=g) for e, g in gains.items() if e not in fit.effects]
+
+    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100)})  # so that evidence is the bar
+    monkeypatch.setattr(stage, "rank", rank)
+    world.found(few)
+    assert world.anew[0] == anew
+
+
 @pytest.mark.parametrize(("carried", "best"), [(90.0, ("camera", "curvature")), (70.0, ("bias", "camera"))])
 def test_an_effect_that_was_better_alone_is_tried_in_the_company_that_carried_another(
     monkeypatch: pytest.MonkeyPatch, carried: float, best: tuple[str, ...]
