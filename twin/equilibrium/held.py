@@ -14,6 +14,15 @@ from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, 
 from twin.springs.heat import heated
 
 FINE = 1e-7  # rad, where tensions are sought: a rough shape has no sharp ones
+# And where springs go on from them: what a guess is let off at a sample, 16 uN with `FINE`, adds up over all that follow; on a body
+# that softens slowly they did not move at all.
+FINEST = 1e-9
+
+
+@part
+def fine(held, tol):
+    """The tolerance of a step, no rougher than what holds the tendons allows."""
+    return min(tol, FINEST if some(held.by_spring) else FINE)
 
 
 @part
@@ -21,7 +30,7 @@ def sought(now, tol):
     """A step of the start: the shape whose tendons have the lengths and temperatures wanted; remembered. Returns its status."""
     state, held = now.state, now.held
     assign(now.last, state.q)
-    status = reach(now.at, state, now.factors, held, now.last, now.sought, min(tol, FINE), now.at.law.wall[9] > 0.0)
+    status = reach(now.at, state, now.factors, held, now.last, now.sought, fine(held, tol), now.at.law.wall[9] > 0.0)
     remember(held, state.s, state.T)
     return status
 
@@ -124,7 +133,7 @@ def settled(now, near, how, i):
             stay(now.at, now.state)
             status = 1
     else:
-        status = reach(now.at, now.state, now.factors, now.held, now.last, now.sought, min(how.tol, FINE), wary(now, near))
+        status = reach(now.at, now.state, now.factors, now.held, now.last, now.sought, fine(now.held, how.tol), wary(now, near))
     if status == 0:
         assign(now.state.q, now.last)
     return status
