@@ -218,7 +218,7 @@ PROMISE = _row(
 STALE = _row(
     "STALE", 0.25, "of what a pattern must promise", "what one of the base's must promise beside other effects to be taken "
     "anew there",
-    "judgement: of 66 that then promised enough, on 14 days, one had promised less (0.02 for 2.6, beside a best of 75)",
+    "judgement: of some 96 that then promised enough, on 14 days, one had promised less (0.04 for 2.6, beside a best of 75)",
 )  # fmt: skip
 ROUGHLY = _row(
     "ROUGHLY", 2e-4, "of the cost", "the last step's fall at which a refit is weighed; what is left is second order in it",
