@@ -466,6 +466,24 @@ def test_a_linear_bench_on_which_two_numbers_are_all_but_alike_is_fitted_to_the_
     assert 0.1 > rough.cost > 4.0 * found.cost
 
 
+@pytest.mark.parametrize(("worth", "tried"), [(0.0, 8), (0.5, 5), (0.9, 4)])
+def test_a_step_that_failed_is_shortened_only_as_long_as_it_may_be_worth_it(worth: float, tried: int) -> None:
+    """With damping m a step is 1 / (1 + m) of the whole and foretells 1 - (m / (1 + m))^2 of its fall, here 1. As m goes up tenfold
+    from 1e-4 this is 0.99 at 0.1, 0.75 at 1, 0.17 at 10, and 2e-3 at 1000, the last."""
+
+    class Stuck(Linear):
+        steps = 0
+
+        def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+            self.steps += near is not None
+            return super().within(most, model, near) if near is None else None
+
+    bench = Stuck(np.ones((1, 1)), np.ones(1))
+    found = fit(bench, Model(Twin.of(ROBOT), FREE[2:3]), tolerance=0.0, worth=worth)
+    assert bench.steps == tried
+    assert found.cost == 1.0
+
+
 def test_derivatives_of_a_neighbour_serve_as_well() -> None:
     """Of a linear bench they are its own: those given are kept, those that lack are taken."""
     rng = np.random.default_rng(3)

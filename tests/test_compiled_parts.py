@@ -26,7 +26,7 @@ def test_factors_solve_what_numpy_solves(n: int) -> None:
     LU, b = A.copy(), rng.normal(size=n)
     x = b.copy()
     assert plain(linear.factorise)(LU)
-    np.testing.assert_allclose((np.tril(LU, -1) + np.eye(n)) @ np.triu(LU), A, atol=1e-12 * n)
+    np.testing.assert_allclose((np.tril(LU, -1) + np.eye(n)) @ np.triu(LU), A.T, atol=1e-12 * n)
     plain(linear.substitute)(LU, x)
     np.testing.assert_allclose(A @ x, b, atol=1e-12 * n)
 

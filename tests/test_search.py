@@ -35,6 +35,7 @@ class World:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, worth: dict[str, float], together: dict[str, float] | None = None) -> None:
         self.worth, self.together = worth, together or {}
+        self.square: dict[int, float] = {}  # |z|^2 by the number of effects, where it counts
         self.refitted: list[tuple[str, ...]] = []
         self.anew: list[set[str]] = []
         monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: self.anew.append(among))
@@ -51,7 +52,8 @@ class World:
         self.refitted.append(effects)
         twin = SimpleNamespace(effects=[SimpleNamespace(id=e, values={}) for e in effects])
         free = tuple(Free(e, Parameter("amount", 0.0, "1", 0.0, 1.0, "by hand")) for e in effects)
-        fit = SimpleNamespace(effects=effects, z=np.zeros(1), model=SimpleNamespace(free=free, twin=twin), cost=-score)
+        z, model = np.full(1, self.square.get(len(effects), 0.0) ** 0.5), SimpleNamespace(free=free, twin=twin)
+        fit = SimpleNamespace(effects=effects, z=z, model=model, cost=-score)
         return told(effects, score, fit, "")
 
     def extended(self, study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
@@ -70,6 +72,16 @@ class World:
 def test_three_effects_are_found_together(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "drift": 200.0, "tilt": -5.0})
     assert world.found().best.effects == ("creep", "drift", "friction")
+
+
+@pytest.mark.parametrize(("left", "third"), [(0.68, False), (0.65, True)])
+def test_where_two_effects_leave_two_thirds_no_third_is_sought(monkeypatch: pytest.MonkeyPatch, left: float, third: bool) -> None:
+    """Of three right ones, found the largest first, the last takes a third at most."""
+    world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "drift": 200.0})
+    noise = 10_000.0
+    world.square = {0: noise + 1e6, 1: noise + 0.8e6, 2: noise + left * 1e6, 3: noise}
+    assert len(world.found().best.effects) == (3 if third else 2)
+    assert (("creep", "drift", "friction") in world.refitted) == third
 
 
 @pytest.mark.parametrize(("share", "tried"), [(0.24, False), (0.26, True)])

@@ -334,17 +334,20 @@ def fit(
         x = at.model.vector()
         H = columns.T @ columns + np.diag(weight)
         g = columns.T @ at.z + weight * (x - prior)
-        better = None
+        better, whole, enough = None, damping, max(tolerance * now, worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
+            foretold = -float(2.0 * g @ d + d @ H @ d)
+            if damping > whole and foretold < enough:  # a step that failed is not shortened until it is worth nothing
+                break
             better = _improved(objective, at, x + d, now - believed(x + d))
             damping *= 1.0 if better else 10.0
         if better is None:
             break
         fall, at, now = now - cost(better), better, cost(better)
-        if fall > TRUSTED * -(2.0 * g @ d + d @ H @ d):
+        if fall > TRUSTED * foretold:
             damping = max(0.1 * damping, 1e-6)
-        if fall < max(tolerance * now, worth) or now - left * fall > beat:
+        if fall < enough or now - left * fall > beat:
             break
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))

@@ -9,7 +9,7 @@ from threading import Lock
 
 from twin.body import Body, Solver
 
-KEPT = 8  # at once; a backbone's take 1 to 3 MB each
+KEPT = 32  # at once, more than a model has neighbours, who are asked for in turn; a backbone's take 1 to 3 MB each
 
 Made = tuple[Body, Solver]
 _idle: OrderedDict[Hashable, list[Made]] = OrderedDict()  # least lately used first

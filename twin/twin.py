@@ -19,6 +19,7 @@ from twin.measurements.channels import MADE
 from twin.quantities import Values
 from twin.robots import Robot, family, load
 from twin.solvers import lent
+from twin.springs.spring import Spring
 
 READINGS = 30.0  # of a drive (`Drive.reading`): a smaller range of commands moves a robot too little to excite it
 
@@ -66,7 +67,11 @@ class Twin:
 
     def heating(self, ambient: np.ndarray) -> Heating:
         """Its SMA springs in surroundings at `ambient` (n,) K. Raises DataError where the robot describes none."""
-        return Heating(ambient, self.laws.spring(self.robot.springs(self.robot.n_tendon, self.values)))
+        return Heating(ambient, self.springs())
+
+    def springs(self) -> Spring:
+        """Its SMA springs under its laws. Raises DataError where the robot describes none."""
+        return self.laws.spring(self.robot.springs(self.robot.n_tendon, self.values))
 
     def predict(self, recording: Recording, *, dynamic: bool | None = None) -> Recording:
         """The recording's outputs as the twin sees them, on its trials' samples and inputs, with `source` saying so.
@@ -171,6 +176,7 @@ def _run(
     creep = twin.laws.creep
     run = range(max(wanted) + 1) if creep.amplitude else wanted
     delayed = np.zeros((len(creep.amplitude), solver.n_slow))
+    springs = twin.springs() if Drive.CURRENT in bench.drives else None
     rested = 0.0
     for k in run:
         inputs = bench.inputs[k]
@@ -178,22 +184,23 @@ def _run(
         delayed *= np.exp(-pause / np.array(creep.time))[:, None] if creep.amplitude else 1.0
         rested = float(inputs.clock[-1])
         close = way.near[k].path if k in way.near else None
-        yield k, _trial(twin, body, solver, inputs, delayed, close, way)
+        yield k, _trial(twin, body, solver, inputs, springs, delayed, close, way)
 
 
 def alone(twin: Twin, inputs: Inputs) -> Trace:
     """One trial by statics, by itself: nothing came before it. Raises as `simulate`."""
     creep = twin.laws.creep
     with twin.statics() as (body, solver):
-        return _trial(twin, body, solver, inputs, np.zeros((len(creep.amplitude), solver.n_slow)), None, Way())
+        springs = twin.springs() if Drive.CURRENT in inputs.drives else None
+        return _trial(twin, body, solver, inputs, springs, np.zeros((len(creep.amplitude), solver.n_slow)), None, Way())
 
 
 def _trial(
-    twin: Twin, body: Body, solver: Solver, inputs: Inputs, delayed: np.ndarray, near: Path | None, way: Way
+    twin: Twin, body: Body, solver: Solver, inputs: Inputs, springs: Spring | None, delayed: np.ndarray, near: Path | None, way: Way
 ) -> Trace:  # fmt: skip
     laws = twin.laws
     driven = laws.drive(laws.command(inputs.signals.with_(antagonists=body.antagonists)))
-    heating = twin.heating(inputs.temperature) if Drive.CURRENT in inputs.drives else None
+    heating = None if springs is None else Heating(inputs.temperature, springs)
     problem = Problem(
         inputs.time, driven.command, laws.surround(inputs.loads), laws.route, inputs.drives, laws.creep, delayed,
         laws.stiffness(inputs.temperature, inputs.clock), heating, near, way.keep, way.once, way.tolerance, inputs.seen,

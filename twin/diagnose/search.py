@@ -10,7 +10,7 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.ranking import rank
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import BEHIND, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WIDTH
+from twin.diagnose.thresholds import BEHIND, DEEPER, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WIDTH
 from twin.diagnose.weigh import Laws, Weighed, better, extended, fuller, refit_without
 from twin.effects import Start, catalogue
 
@@ -50,7 +50,7 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
         fresh = {k: fuller(study, w, bars.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
-        if not beam or beam[0].score < best_before + bars.accept:
+        if not beam or beam[0].score < best_before + bars.accept or (level > 1 and _leaves(study, base, beam[0]) > DEEPER):
             break
     best = max(known.values(), key=lambda w: w.score - bars.accept * len(w.effects))
     best = exchanged(study, best, known)
@@ -71,6 +71,12 @@ def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars
         found = extended(study, member, candidate.effect, candidate.start, beat)
         if found is not None and (found.laws not in fresh or better(found, fresh[found.laws])):
             fresh[found.laws] = found
+
+
+def _leaves(study: Study, base: Weighed, member: Weighed) -> float:
+    """The share of the base's |z|^2 above the noise that a set leaves."""
+    noise = float(study.objective.n)
+    return (float(member.fit.z @ member.fit.z) - noise) / max(float(base.fit.z @ base.fit.z) - noise, 1.0)
 
 
 def _asked(study: Study, base: Weighed, member: Weighed, bars: Thresholds) -> float:

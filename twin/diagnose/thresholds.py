@@ -204,6 +204,10 @@ BEHIND = _row(
     "BEHIND", 400.0, "2 ln odds", "a model so far behind the best never led after another effect", "judgement"
 )  # fmt: skip
 DEEPEST = _row("DEEPEST", 3, "effects", "at once; four together are hardly ever told apart", "judgement")
+DEEPER = _row(
+    "DEEPER", 2.0 / 3.0, "of the base's |z|^2 above the noise", "where the best two leave more no third is sought",
+    "derivation: of three right ones, found the largest first, the third takes a third at most where they do not bend alike",
+)  # fmt: skip
 FORM = _row(
     "FORM", 0.15, "of the largest contribution", "a smaller effect may be what the large one's law gets wrong", BENCHMARK
 )  # fmt: skip

@@ -11,7 +11,7 @@ holder.py   what holds a tendon, a motor or a spring
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import mujoco
@@ -33,10 +33,11 @@ __all__ = ["ChainPath", "Equilibrium"]
 @dataclass(frozen=True, kw_only=True)
 class ChainPath(Path):
     """The equilibria of a chain, with slip states and distal tendon lengths (n_tendon, n_piece) at the end. `others` holds the
-    temperature (n, n_tendon) K of its springs."""
+    temperature (n, n_tendon) K of its springs, `yielding` (n, n_tendon, nv) rad/N how joints answer to held tendons, or nothing."""
 
     slip: np.ndarray
     distal: np.ndarray
+    yielding: np.ndarray = field(default_factory=lambda: np.empty((0, 0, 0)), repr=False)
 
 
 class Equilibrium:
@@ -180,8 +181,11 @@ class Equilibrium:
         delayed = np.zeros((amplitude.size, nv)) if problem.delayed is None else problem.delayed
         nd = self.chain.hole.shape[1] - 1
         state = State(np.zeros(nt), np.empty(nv), np.zeros((nt, nd)), np.zeros((nt, nd)))
+        driving = self.driving(problem)
+        holds, kept = bool(np.any(driving.by_length | driving.by_spring)), n if problem.keep else 0
         found = Found(
-            LU=np.empty((n, nv, nv) if problem.keep else (0, nv, nv)),
+            LU=np.empty((kept, nv, nv)),
+            yielding=np.empty((kept if holds else 0, nt, nv)),
             q=np.empty((n, nv)),
             tension=np.empty((n, nt)),
             markers=np.empty((n, self.chain.marker.size, 3)),
@@ -189,13 +193,13 @@ class Equilibrium:
             temperature=np.empty((n, nt)),
             status=np.empty(n, np.int64),
         )
-        driving = self.driving(problem)
-        run = held.run if np.any(driving.by_length | driving.by_spring) else pulled.run
-        started = run(
+        started = (held.run if holds else pulled.run)(
             self.statics(problem),
             driving,
             Slow(amplitude, np.array(creep.time, float), delayed),
-            Near(np.empty((0, nv)), np.empty((0, nt)), found.LU[:0]) if near is None else Near(near.q, near.tension, near.LU),
+            Near(near.q, near.tension, near.LU, near.yielding)
+            if isinstance(near, ChainPath)
+            else Near(np.empty((0, nv)), np.empty((0, nt)), found.LU[:0], found.yielding[:0]),
             How(float(problem.tolerance), problem.keep, problem.once),
             state,
             found,
@@ -203,6 +207,7 @@ class Equilibrium:
         return ChainPath(
             tension=found.tension, path=found.path, markers=found.markers, status=found.status, q=found.q,
             others={"temperature": found.temperature}, started=int(started), LU=found.LU, slip=state.z, distal=state.s,
+            yielding=found.yielding,
         )  # fmt: skip
 
 

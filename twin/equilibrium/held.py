@@ -10,7 +10,7 @@ from __future__ import annotations
 from twin.compiled import assign, jit, part
 from twin.equilibrium.holder import remember
 from twin.equilibrium.lengths import hold_once, move, reach, stay, tangent
-from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, some, wary, weigh
+from twin.equilibrium.trial import RAMP, at_rest, borrow, guess, record, relax, soften, some, wary, weigh
 from twin.springs.heat import heated
 
 FINE = 1e-7  # rad, where tensions are sought: a rough shape has no sharp ones
@@ -86,6 +86,7 @@ def begin(now, driving, near, tol):
         started = weigh_on_springs(now, driving, tol)
     elif remembers:
         started = weigh(now, tol)
+        now.factors.fresh[0] = False  # no length is in that tangent
     for t in range(now.state.T.size):
         now.held.which[t] = driving.by_length[t] or driving.by_spring[t]
         others = others or not driving.by_spring[t]
@@ -126,13 +127,17 @@ def settled(now, near, how, i):
     """
     if how.once and near.q.size > 0 and not now.at.law.mu > 0.0 and not some(now.held.play > 0.0):
         move(now.held, now.sought, now.sought, 1.0)
-        status = hold_once(now.at, now.state, now.factors, now.held)
+        status = hold_once(now.at, now.state, now.factors.held_by, now.held, near.LU[i], near.yielding[i])
         if status == 0:
             assign(now.state.q, near.q[i])
             first_tensions(now, near, i)
             stay(now.at, now.state)
             status = 1
     else:
+        borrow(now, near, i)
+        if near.q.size:
+            for t in range(now.state.T.size):
+                assign(now.factors.yielding[t], near.yielding[i, t])
         status = reach(now.at, now.state, now.factors, now.held, now.last, now.sought, fine(now.held, how.tol), wary(now, near))
     if status == 0:
         assign(now.state.q, now.last)
@@ -140,11 +145,13 @@ def settled(now, near, how, i):
 
 
 @part
-def keep_tangent(now, LU):
-    """The present tangent's factors to LU; where it has none, those last used."""
-    if not tangent(now.at, now.state, now.held.which, LU, now.factors.held_by):
+def keep_tangent(now, LU, yielding):
+    """The present tangent's factors to LU, where it has none those last used; and how tendons yield."""
+    if not tangent(now.at, now.state, now.held.which, LU, now.factors.held_by, yielding):
         for k in range(now.last.size):
             assign(LU[k], now.factors.LU[k])
+        for t in range(now.state.T.size):
+            assign(yielding[t], now.factors.yielding[t])
 
 
 @jit
@@ -163,7 +170,7 @@ def run(plain, driving, slow, near, how, state, found):
         first_tensions(now, near, i)
         found.status[i] = settled(now, near, how, i)
         if how.keep:
-            keep_tangent(now, found.LU[i])
+            keep_tangent(now, found.LU[i], found.yielding[i])
         remember(now.held, state.s, state.T)
         assign(now.last, state.q)
         record(now, i, found)

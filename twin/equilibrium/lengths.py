@@ -88,13 +88,14 @@ def tauten(C, gap, T, by_length, dT):
 
 
 @inner
-def tangent(at, state, by_length, LU, held_by):
-    """Factors of J + PULL sum B_i A_i' over the taut tendons of `by_length`, which `held_by` (n_tendon,) then names.
+def tangent(at, state, by_length, LU, held_by, yielding):
+    """Factors of P = J + PULL sum B_i A_i' over the taut tendons of `by_length`, which `held_by` (n_tendon,) then names, and
+    `yielding` (n_tendon, nv) rad/N, P^-1 B.
 
-    J alone need not be positive: a shape that gives way under constant tension may be held by the lengths. Returns whether this is.
+    J alone need not be positive: a shape that gives way under constant tension may be held by the lengths. Returns whether P is.
     """
     nt, nv = state.T.size, state.q.size
-    r, A, B = np.empty(nv), np.empty((nt, nv)), np.empty((nt, nv))
+    r, A, B = np.empty(nv), np.empty((nt, nv)), yielding
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
     place(at, state.q)
     balance(at, state, z, s, r, LU)
@@ -105,7 +106,11 @@ def tangent(at, state, by_length, LU, held_by):
             for i in range(nv):
                 for j in range(nv):
                     LU[i, j] += PULL * B[t, i] * A[t, j]
-    return factorise(LU)
+    if not factorise(LU):
+        return False
+    for t in range(nt):
+        substitute(LU, B[t])
+    return True
 
 
 class Sought(NamedTuple):
@@ -172,32 +177,39 @@ def advance(at, state, factors, held, z, s, r):
 
     Returns the longest change of a hinge (rad), negative where the lengths have no solution.
     """
-    tension, q, LU, held_by = state.T, state.q, factors.LU, factors.held_by
-    nt, nv = tension.size, q.size
-    A, B, C, gap, dT = np.empty((nt, nv)), np.empty((nt, nv)), np.empty((nt, nt)), np.empty(nt), np.empty(nt)
+    A, B = np.empty(factors.yielding.shape), np.empty(factors.yielding.shape)
     pulls(at, z, A, B)
+    substitute(factors.LU, r)
+    return step(at, state, factors.held_by, held, A, factors.yielding, s, r)
+
+
+@inner
+def step(at, state, held_by, held, A, yielding, s, turn):
+    """As `advance`, from what the `tangent` P makes of the balance, turn (nv,) = P^-1 r, and of tensions, `yielding`: neither
+    changes with the piece of its law that a spring is on."""
+    tension, q = state.T, state.q
+    nt, nv = tension.size, q.size
+    C, gap, dT, turn, D = np.empty((nt, nt)), np.empty(nt), np.empty(nt), turn.copy(), yielding.copy()
     for t in range(nt):
         gap[t] = lack(held, t, s[t, 0], tension)
         if held_by[t]:
             for i in range(nv):
-                r[i] += PULL * gap[t] * B[t, i]
-    substitute(LU, r)
+                turn[i] += PULL * gap[t] * yielding[t, i]
     for t in range(nt):
-        gap[t] -= dot_n(A[t], r)
-    D = B.copy()
+        gap[t] -= dot_n(A[t], turn)
     for j in range(nt):
         for i in range(nt):
             if held_by[i]:
+                share = PULL * longer(held, i, j)
                 for k in range(nv):
-                    D[j, k] -= PULL * longer(held, i, j) * B[i, k]
-        substitute(LU, D[j])
+                    D[j, k] -= share * yielding[i, k]
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + longer(held, i, j)
     if not tauten(C, gap, tension, held.which, dT):
         return -1.0
     longest = 0.0
     for i in range(nv):
-        step = r[i]
+        step = turn[i]
         for t in range(nt):
             step += dT[t] * D[t, i]
         q[i] -= step
@@ -264,7 +276,7 @@ def hold(at, state, factors, held, tol):
             continue
         chord = fresh[0] and size <= CONTRACTION * before
         if not chord:
-            fresh[0] = tangent(at, state, held.which, factors.LU, factors.held_by)
+            fresh[0] = tangent(at, state, held.which, factors.LU, factors.held_by, factors.yielding)
             if not fresh[0]:
                 return 0
         before, step = size, 1.0
@@ -284,24 +296,25 @@ def hold(at, state, factors, held, tol):
 
 
 @inner
-def hold_once(at, state, factors, held):
-    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent, each spring on the piece
-    of its law where the step ends: the neighbour's, beside which it has another past, may be another one.
+def hold_once(at, state, held_by, held, LU, yielding):
+    """One Newton step on shape and tensions from a neighbouring solution with the factors of its tangent and its `yielding`, each
+    spring on the piece of its law where the step ends: the neighbour's, beside which it has another past, may be another one.
 
     Returns 1 and commits the slip, or 0 where shape and tensions are lost. The path of a taut spring is the step's own, to first
     order as its tension is: they are where its law goes on from, and what a bent path has more, once a sample, would add up.
     """
-    r0, r, none = np.empty(state.q.size), np.empty(state.q.size), np.empty((0, 0))
+    r, none, A, B = np.empty(state.q.size), np.empty((0, 0)), np.empty(yielding.shape), np.empty(yielding.shape)
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
     place(at, state.q)
-    bowing = balance(at, state, z, s, r0, none)
+    bowing = balance(at, state, z, s, r, none)
+    pulls(at, z, A, B)
+    substitute(LU, r)
     q0, T0, own = state.q.copy(), state.T.copy(), s.copy()
     linearise(held, s, state.T)
     for _ in range(PIECES):
         assign(state.q, q0)
         assign(state.T, T0)
-        assign(r, r0)
-        longest = advance(at, state, factors, held, z, s, r)
+        longest = step(at, state, held_by, held, A, yielding, s, r)
         if not 0.0 <= longest < LONGEST_STEP:
             return 0
         if not elsewhere(held, state.T, own):

@@ -1,4 +1,7 @@
-"""Dense factorisation without pivoting, four pivots at a time: on a symmetric matrix a pivot <= 0 means "not a minimum"."""
+"""Dense factorisation without pivoting, four pivots at a time: on a symmetric matrix a pivot <= 0 means "not a minimum".
+
+The transpose is factorised, A' = L U, so that solving A x = b, U' L' x = b, goes along rows of what is kept.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,11 @@ BLOCK = 4  # pivots eliminated together, so that each row of the rest is read on
 
 @inner
 def factorise(A):
-    """A -> L U in place (unit lower L). Returns False at the first pivot that is not positive."""
+    """A' -> L U in place (unit lower L). Returns False at the first pivot that is not positive."""
     n = A.shape[0]
+    for i in range(n):
+        for j in range(i):
+            A[i, j], A[j, i] = A[j, i], A[i, j]
     for k in range(0, n, BLOCK):
         end = min(k + BLOCK, n)
         for p in range(k, end):
@@ -32,12 +38,29 @@ def factorise(A):
 
 @inner
 def substitute(LU, b):
-    """b -> (L U)^-1 b in place."""
+    """b -> A^-1 b in place, LU the factors of A': four unknowns, then what they take from all that are left."""
     n = b.size
-    for i in range(n):
-        for j in range(i):
-            b[i] -= LU[i, j] * b[j]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            b[i] -= LU[i, j] * b[j]
-        b[i] /= LU[i, i]
+    whole = n - n % BLOCK
+    for k in range(0, whole, BLOCK):
+        w = b[k] / LU[k, k]
+        x = (b[k + 1] - LU[k, k + 1] * w) / LU[k + 1, k + 1]
+        y = (b[k + 2] - LU[k, k + 2] * w - LU[k + 1, k + 2] * x) / LU[k + 2, k + 2]
+        z = (b[k + 3] - LU[k, k + 3] * w - LU[k + 1, k + 3] * x - LU[k + 2, k + 3] * y) / LU[k + 3, k + 3]
+        b[k], b[k + 1], b[k + 2], b[k + 3] = w, x, y, z
+        for i in range(k + BLOCK, n):
+            b[i] -= LU[k, i] * w + LU[k + 1, i] * x + LU[k + 2, i] * y + LU[k + 3, i] * z
+    for j in range(whole, n):
+        b[j] /= LU[j, j]
+        for i in range(j + 1, n):
+            b[i] -= LU[j, i] * b[j]
+    for j in range(n - 1, whole - 1, -1):
+        for i in range(j):
+            b[i] -= LU[j, i] * b[j]
+    for k in range(whole - BLOCK, -1, -BLOCK):
+        z = b[k + 3]
+        y = b[k + 2] - LU[k + 3, k + 2] * z
+        x = b[k + 1] - LU[k + 3, k + 1] * z - LU[k + 2, k + 1] * y
+        w = b[k] - LU[k + 3, k] * z - LU[k + 2, k] * y - LU[k + 1, k] * x
+        b[k], b[k + 1], b[k + 2] = w, x, y
+        for i in range(k):
+            b[i] -= LU[k, i] * w + LU[k + 1, i] * x + LU[k + 2, i] * y + LU[k + 3, i] * z

@@ -39,12 +39,13 @@ class Factors(NamedTuple):
     LU: np.ndarray  # (nv, nv)
     fresh: np.ndarray  # (1,) whether LU holds a usable factorisation
     held_by: np.ndarray  # (n_tendon,) tendons whose lengths are in LU (lengths.py)
+    yielding: np.ndarray  # (n_tendon, nv) rad/N, what tendons held at lengths turn the joints by against LU
 
 
 @jit
 def no_factors(nv, nt):
     """Room for them; none is fresh."""
-    return Factors(np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt, np.bool_))
+    return Factors(np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt, np.bool_), np.empty((nt, nv)))
 
 
 class Flow(NamedTuple):

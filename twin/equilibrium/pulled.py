@@ -10,7 +10,7 @@ from __future__ import annotations
 from twin.compiled import assign, jit, part
 from twin.equilibrium.move import onward
 from twin.equilibrium.newton import is_minimum, step_once
-from twin.equilibrium.trial import RAMP, at_rest, guess, record, relax, soften, wary, weigh
+from twin.equilibrium.trial import RAMP, at_rest, borrow, guess, record, relax, soften, wary, weigh
 
 RAMP_TOLERANCE = 1e-6  # rad
 
@@ -42,14 +42,15 @@ def begin(now, driving, near, tol):
 
 
 @part
-def settled(now, near, how):
+def settled(now, near, how, i):
     """The equilibrium of the present sample. Returns its status; the shape stays the last one where there is none.
 
     Friction wants it in full: slip carries what a single step leaves on to all samples that follow.
     """
     if how.once and near.q.size > 0 and not now.at.law.mu > 0.0:
-        status = step_once(now.at, now.state, now.factors.LU)
+        status = step_once(now.at, now.state, near.LU[i])
     else:
+        borrow(now, near, i)
         status = onward(now.at, now.state, now.factors, now.T1, now.last, how.tol, wary(now, near))
     if status == 0:
         assign(now.state.q, now.last)
@@ -78,7 +79,7 @@ def run(plain, driving, slow, near, how, state, found):
         guess(now, near, i)
         soften(now, driving, i, 1.0)
         tensions(now, driving, i, 1.0, 1.0)
-        found.status[i] = settled(now, near, how)
+        found.status[i] = settled(now, near, how, i)
         if how.keep:
             keep_tangent(now, found.LU[i])
         assign(now.last, state.q)

@@ -51,6 +51,7 @@ class Near(NamedTuple):
     q: np.ndarray  # (n, nv)
     T: np.ndarray  # (n, n_tendon)
     LU: np.ndarray  # (n, nv, nv)
+    yielding: np.ndarray  # (n, n_tendon, nv) rad/N, where tendons are held
 
 
 class How(NamedTuple):
@@ -66,6 +67,7 @@ class Found(NamedTuple):
     """The equilibria, one a sample."""
 
     LU: np.ndarray  # (n, nv, nv), or empty
+    yielding: np.ndarray  # (n, n_tendon, nv), or empty
     q: np.ndarray  # (n, nv)
     tension: np.ndarray  # (n, n_tendon) at the base, N
     markers: np.ndarray  # (n, n_marker, 3) m
@@ -200,16 +202,22 @@ def wary(now, near):
 @part
 def guess(now, near, i):
     """A first shape for sample i: a neighbour's, else extrapolated from the two before."""
-    q, factors, further = now.state.q, now.factors, 0.0 if wary(now, near) else 1.0
+    q, further = now.state.q, 0.0 if wary(now, near) else 1.0
     if near.q.size:
         assign(q, near.q[i])
-        for k in range(q.size):
-            assign(factors.LU[k], near.LU[i, k])
-        factors.fresh[0] = True
     else:
         for k in range(q.size):
             q[k] = now.last[k] + further * (now.last[k] - now.second[k])
     assign(now.second, now.last)
+
+
+@part
+def borrow(now, near, i):
+    """A neighbour's tangent at sample i, to solve with, if there is one."""
+    if near.q.size:
+        for k in range(now.last.size):
+            assign(now.factors.LU[k], near.LU[i, k])
+        now.factors.fresh[0] = True
 
 
 @part
