@@ -153,11 +153,12 @@ class Lines:
         assert (trials, len(bench.measured[0])) == ([0], len(bench.inputs[0].time))
         assert not whitener.noise.drive.any()
 
-    def evaluate(self, model: Any) -> Any:
+    def evaluate(self, model: Any, near: Any = None) -> Any:
         if self.name in self.lost:
             raise SolveError("lost")
+        assert near == (None if model.rival else "the rival's")
         of_rival = np.ones(8)
-        return SimpleNamespace(z=of_rival + (0.0 if model.rival else self.d[self.name]))
+        return SimpleNamespace(z=of_rival + (0.0 if model.rival else self.d[self.name]), traces="the rival's")
 
     def jacobian(self, at: Any, which: range) -> np.ndarray:
         assert (at.z == 1.0).all()

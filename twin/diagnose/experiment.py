@@ -111,7 +111,7 @@ def next_experiment(bench: Bench, noise: Noise, a: Fit, b: Fit, jobs: int) -> Ex
         objective = Objective(imagined, [0], whitener, jobs)
         try:
             at = objective.evaluate(b.model)
-            return words, inputs, objective, at, objective.evaluate(a.model).z - at.z
+            return words, inputs, objective, at, objective.evaluate(a.model, at.traces).z - at.z
         except SolveError:
             return None
 

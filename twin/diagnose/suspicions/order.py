@@ -17,8 +17,11 @@ BUILT = ("sensor",)  # readings whose level and gain every built robot has its o
 
 
 def tendons(case: Case) -> Iterator[Suspicion]:
-    """Two driving channels exchanged, or all of them counted from another one."""
-    n = case.bench.n_tendon
+    """Two driving channels exchanged, or all of them counted from another one; not where the robot as described bends as measured,
+    for one that bends another way is off by as much as it bends."""
+    n, columns = case.bench.n_tendon, case.columns(case.group)
+    if case.error(columns, case.as_is(), case.few()) < FITS * case.motion(columns):
+        return
     pairs = [_swap(n, i, j) for i, j in itertools.combinations(range(n), 2)]
     ways = [*pairs, *(np.roll(np.arange(n), s) for s in range(1, n) if n > 2)]
     names = [c.name for c in case.bench.drivers]
