@@ -85,12 +85,17 @@ def test_a_delay_shifts_tensions_and_displacements_alike() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_cell_drifts_by_its_rate_and_ever_less_where_it_warms_up(sign: float) -> None:
-    """rate t; and rate tau (1 - exp(-t / tau)) with tau of half an hour, after half an hour and two; ever faster with -tau."""
+    """rate t; and rate tau (1 - exp(-t / tau)) with tau of half an hour, after half an hour and two; ever faster with -tau. Of a
+    strain sensor the same of its resistance."""
     seen = some_signals(n=2).with_(clock=np.array([1800.0, 7200.0]))
+    cords = seen.with_(others={"sensor": np.full((2, 3), 1000.0)})
 
     def wander(levelling: float) -> np.ndarray:
-        drift = law("load_cell_drift", rate_1=sign * 1e-4, rate_3=sign * 5e-5, levelling=levelling)
-        return sign * (drift.sense(seen).tension - seen.tension)
+        rates = {"rate_1": sign * 1e-4, "rate_3": sign * 5e-5}
+        zero = sign * (law("load_cell_drift", **rates, levelling=levelling).sense(seen).tension - seen.tension)
+        settled = law("sensor_drift", **rates, levelling=levelling).sense(cords).others["sensor"] / 1000.0
+        np.testing.assert_allclose(sign * (settled - 1.0), zero, rtol=1e-9, atol=1e-12)
+        return zero
 
     np.testing.assert_allclose(wander(0.0), [[0.18, 0.0, 0.09], [0.72, 0.0, 0.36]], rtol=1e-12, atol=1e-15)
     left = np.exp([-1.0, -4.0])
@@ -541,7 +546,12 @@ def test_springs_may_cool_as_fast_as_in_a_fans_wind_and_no_faster() -> None:
 def test_what_may_have_either_sign_may_be_as_large_either_way() -> None:
     """A day seen in a mirror, or counted the other way, is a day as well. Not so a draught, which carries off more heat, hardly
     less, a hysteresis, which is narrowed to none at most, and a warm-up, which may end within minutes; nothing runs away so."""
-    one_way = {("sma_cooling", "forced"), ("sma_hysteresis", "width"), ("load_cell_drift", "levelling")}
+    one_way = {
+        ("sma_cooling", "forced"),
+        ("sma_hysteresis", "width"),
+        ("load_cell_drift", "levelling"),
+        ("sensor_drift", "levelling"),
+    }
     for name, effect in catalogue().items():
         for p in effect.declared(3):
             if p.low < 0.0 < p.high and p.value == 0.0 and (name, p.name) not in one_way:
@@ -568,6 +578,9 @@ def test_fits_start_at_every_guess_and_at_each_tendon_alone_and_all() -> None:
         assert dict(plain.values) == dict.fromkeys(plain.free, 2e-5)
         assert dict(levelled.values) == {**dict.fromkeys(plain.free, pytest.approx(6e-5)), "levelling": pytest.approx(1e-3)}
     assert [s.free for s in named("load_cell_drift").starts([], 3)] == rates  # of no session it is not said how it ends
+    assert [(s.free, s.values.get("levelling")) for s in named("sensor_drift").starts(still, 3)] == [
+        (s.free, s.values.get("levelling")) for s in drifts
+    ]
     creep = list(named("backbone_creep").starts([], 3))
     assert [dict(s.values)["time"] for s in creep] == [3.0, 15.0, 80.0]
     assert {s.free for s in creep} == {("amplitude", "time")}  # the second retardation time only where the first is in force

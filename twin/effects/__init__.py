@@ -31,12 +31,15 @@ __all__ = [
 ]
 
 
+NO_LAWS = ("effect", "levelling")  # what laws share
+
+
 @cache
 def catalogue() -> dict[str, type[Effect]]:
     """All laws by identifier."""
     laws = {}
     for module in pkgutil.iter_modules(__path__):
-        if module.name == "effect":
+        if module.name in NO_LAWS:
             continue
         members = vars(importlib.import_module(f"{__name__}.{module.name}")).values()
         laws[module.name] = next(m for m in members if isinstance(m, type) and issubclass(m, Effect) and m is not Effect)

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.effects.effect import Effect, Signals, Start
+from twin.effects.levelling import levelled, levelled_starts
 from twin.quantities import Parameter
 
 SOFTEST = 0.05  # of the stiffness at first: what is left of a body that is all but broken
-LEVELLED = 3.0  # times over which a session's change may have levelled off by its end
 
 
 class BackboneAgeing(Effect):
@@ -47,13 +47,7 @@ class BackboneAgeing(Effect):
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """All through the session alike, and levelled off by its end."""
-        yield Start({"rate": 1e-5}, ("rate",))
-        session = max(float(s.clock.max(initial=0.0)) for s in predicted)
-        if session > 0.0:
-            levelling = min(LEVELLED / session, cls.parameters[1].high)
-            yield Start({"rate": 1e-5 * LEVELLED, "levelling": levelling}, ("rate", "levelling"))
+        yield from levelled_starts(iter((Start({"rate": 1e-5}, ("rate",)),)), predicted, cls.parameters[1].high)
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
-        levelling = self["levelling"]
-        aged = -np.expm1(-levelling * clock) / levelling if levelling > 0.0 else clock
-        return np.maximum(SOFTEST, 1.0 - self["rate"] * aged)
+        return np.maximum(SOFTEST, 1.0 - self["rate"] * levelled(clock, self["levelling"]))

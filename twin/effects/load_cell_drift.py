@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.effects.effect import Effect, Signals, Start
+from twin.effects.levelling import levelled, levelled_starts
 from twin.quantities import Parameter
-
-LEVELLED = 3.0  # times over which a warm-up may have levelled off by the session's end
 
 
 class LoadCellDrift(Effect):
@@ -49,13 +48,7 @@ class LoadCellDrift(Effect):
     @classmethod
     def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
         """Each cell alone and all, all through the session alike, then levelled off by its end."""
-        yield from super().starts(predicted, n_tendon)
-        session = max((float(s.clock.max(initial=0.0)) for s in predicted), default=0.0)
-        if session > 0.0:
-            levelling = min(LEVELLED / session, cls.parameters[0].high)
-            for plain in super().starts(predicted, n_tendon):
-                rates = {name: LEVELLED * rate for name, rate in plain.values.items()}
-                yield Start({**rates, "levelling": levelling}, (*plain.free, "levelling"))
+        yield from levelled_starts(super().starts(predicted, n_tendon), predicted, cls.parameters[0].high)
 
     def sense(self, true: Signals) -> Signals:
         return true.with_(tension=true.tension + self.wander(true.clock))
@@ -65,5 +58,4 @@ class LoadCellDrift(Effect):
 
     def wander(self, clock: np.ndarray) -> np.ndarray:
         """The zero (N), shape (n, n_tendon), at `clock` (n,) s."""
-        t, levelling = np.asarray(clock, float)[:, None], self["levelling"]
-        return self.each("rate") * (-np.expm1(-levelling * t) / levelling if levelling else t)
+        return self.each("rate") * levelled(clock, self["levelling"])[:, None]

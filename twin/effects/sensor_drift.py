@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from twin.effects.effect import Effect, Signals
+from collections.abc import Iterator
+
+from twin.effects.effect import Effect, Signals, Start
+from twin.effects.levelling import levelled, levelled_starts
 from twin.quantities import Parameter
 
 
 class SensorDrift(Effect):
-    """Resistance of sensor i = R_i (1 + rate_i t), t the time since the first trial.
+    """Resistance of sensor i = R_i (1 + rate_i (1 - exp(-levelling t)) / levelling), t the time since the first trial: at first by
+    its rate, and ever less where the cords settle; ever more where levelling is negative, else R_i (1 + rate_i t).
 
-    Source: first-order Taylor expansion of a slow drift. Conductive rubber: up to 8.3 % in 1,000 cycles of 14 h (KineSoft, Yoo et
-    al. 2025, arXiv 2503.01078); fresh cords by per cents in minutes.
+    Source: conductive rubber up to 8.3 % in 1,000 cycles of 14 h (KineSoft, Yoo et al. 2025, arXiv 2503.01078); fresh cords by per
+    cents in minutes, and ever less as their filler settles (cords of one batch alike). A bend the other way is second-order Taylor
+    expansion.
 
     >>> import numpy as np
     >>> z = np.zeros
@@ -20,12 +25,21 @@ class SensorDrift(Effect):
     """
 
     id = "sensor_drift"
+    parameters = (
+        Parameter("levelling", 0.0, "1/s", -3e-4, 2e-2, "cords that settle in minutes to an hour; or ever faster", scale=1e-4),
+    )
     per_tendon = (Parameter("rate", 0.0, "1/s", -1e-3, 1e-3, "per cents in minutes to per cents in days", std=5e-5, scale=2e-6),)
+    shape = ("levelling",)
     needs = frozenset({"strain sensors"})
     moves_with = "the time of day"
+
+    @classmethod
+    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
+        """Each cord alone and all, all through the session alike, then levelled off by its end."""
+        yield from levelled_starts(super().starts(predicted, n_tendon), predicted, cls.parameters[0].high)
 
     def sense(self, true: Signals) -> Signals:
         if "sensor" not in true.others:
             return true
-        drifted = true.others["sensor"] * (1.0 + self.each("rate") * true.clock[:, None])
+        drifted = true.others["sensor"] * (1.0 + self.each("rate") * levelled(true.clock, self["levelling"])[:, None])
         return true.with_(others={**true.others, "sensor": drifted})
