@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 from tools.bench.rod import NoEquilibrium, Rod, follow
 from tools.bench.rod import solve as rod_solve
 from twin.body import DIRECT, NOT_FOUND, Problem
-from twin.effects import Loads, Push, Route, catalogue
-from twin.equilibrium import Equilibrium, pulled
+from twin.effects import Loads, Push, Route, Signals, catalogue
+from twin.equilibrium import ChainPath, Equilibrium, pulled
 from twin.robots import load
+from twin.twin import Twin
 
 G = 9.81
 LENGTH = 0.12
@@ -247,3 +249,59 @@ def test_the_loop_is_compiled_once_whatever_the_order_of_commands_in_memory() ->
     other = solver.solve(Problem(np.arange(6.0), np.asfortranarray(rows), Loads(robot.gravity)))
     assert len(pulled.run.signatures) == compiled
     assert np.array_equal(one.q, other.q)
+
+
+# ---- what is seen of a shape that is known ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["continuum", "three_cable", "tentacle"])
+def test_where_markers_sit_changes_no_shape_and_all_else_that_is_uncertain_does(name: str) -> None:
+    """Shapes of a neighbour that differs in its markers or their frame alone are taken over, and seen as a full solve sees them (to
+    its 1e-4 mm); every other number a fit may move asks for shapes of its own."""
+    robot = load(name)
+    twin, n = Twin.of(robot), robot.n_tendon
+    pull = np.linspace(0.0, 1.0, 6)[:, None] * np.linspace(1.0, 0.2, n)
+    problem = Problem(np.arange(6.0), pull, Loads(HANGING), keep=True)
+    start = solved(twin, problem)
+    for p in robot.nuisance:
+        moved = replace(twin, values={p.name: p.value + 0.5 * p.step})
+        beside = solved(moved, replace(problem, near=start))
+        assert (beside.q is start.q) == p.name.startswith(("markers.", "frame.")), p.name
+        np.testing.assert_allclose(beside.markers, solved(moved, problem).markers, atol=1e-7)
+
+
+def test_every_law_of_bodies_loads_and_tendons_asks_for_shapes_of_its_own() -> None:
+    """With what it does at its first start. Laws of commands need nothing for it, and what only reports shall not ask."""
+    twin, predicted, tried = Twin.of("continuum"), some_pull(6), []
+    warm, clock = np.linspace(296.0, 300.0, 6), 100.0 * np.arange(6.0)
+    for name, law in catalogue().items():
+        begin = next((s for s in law.starts([predicted], 3) if law.needs <= twin.body().parts), None)
+        if begin is None or (effect := law(begin.values, 3)).acts_in("drive", "command") or not effect.physical:
+            continue
+        tried.append(name)
+        start, own = (acting(replace(twin, effects=effects), warm, clock) for effects in ((), (effect,)))
+        near = solved(twin, start)
+        assert solved(twin, replace(start, near=near)).q is near.q, name
+        assert solved(replace(twin, effects=(effect,)), replace(own, near=near)).q is not near.q, name
+    assert {"stiffness_gradient", "base_tilt", "tendon_friction", "backbone_ageing", "backbone_creep"} <= set(tried)
+
+
+def acting(twin: Twin, temperature: np.ndarray, clock: np.ndarray) -> Problem:
+    """Three tendons pulled by a newton, sideways, under the twin's laws."""
+    laws, n = twin.laws, len(clock)
+    return Problem(
+        np.arange(float(n)), np.ones((n, 3)), laws.surround(Loads(SIDEWAYS)), laws.route, creep=laws.creep,
+        stiffness=laws.stiffness(temperature, clock), keep=True,
+    )  # fmt: skip
+
+
+def some_pull(n: int) -> Signals:
+    time = 100.0 * np.arange(float(n))
+    return Signals(time, time, np.ones((n, 3)), np.zeros((n, 3)), np.zeros((n, 9, 3)), np.linspace(296.0, 300.0, n))
+
+
+def solved(twin: Twin, problem: Problem) -> ChainPath:
+    with twin.statics() as (_, statics):
+        path = statics.solve(problem)
+    assert isinstance(path, ChainPath)
+    return path

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiled import assign, inner, part
+from twin.compiled import assign, inner, jit, part
 from twin.effects.backbone_creep import retard
 from twin.equilibrium.chain import Law, Load, State, Statics, balance, settle
 from twin.equilibrium.elastic import bendings
@@ -220,12 +220,26 @@ def borrow(now, near, i):
         now.factors.fresh[0] = True
 
 
+@inner
+def look(chain, markers):
+    """The markers (n_marker, 3) m where the chain is placed."""
+    for k in range(chain.marker.size):
+        assign(markers[k], chain.site[chain.marker[k]])
+
+
+@jit
+def seen(at, q, markers):
+    """The markers (n, n_marker, 3) m of shapes q (n, nv)."""
+    for i in range(q.shape[0]):
+        place(at, q[i])
+        look(at.chain, markers[i])
+
+
 @part
 def record(now, i, found):
-    state, chain = now.state, now.at.chain
+    state = now.state
     assign(found.q[i], state.q)
-    for k in range(chain.marker.size):
-        assign(found.markers[i, k], chain.site[chain.marker[k]])
+    look(now.at.chain, found.markers[i])
     for t in range(state.T.size):
         found.path[i, t] = state.s[t, 0]
         found.tension[i, t] = state.T[t] / now.held.factor[0]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem
+from twin.body import DIRECT, NOT_FOUND, TOLERANCE, Path, Problem, fingerprint
 from twin.effects import Drive, Loads
 from twin.effects.contact import seen_from
 from twin.errors import SolveError
@@ -180,10 +179,7 @@ class Trial:
             cells.shear, cells.bulk, cells.gradient, self.parts.cables.weights, self.force, self.wall, self.scale, self.held,
             self.problem.command, np.array([route.mu, route.presliding, route.stretch]),
         )  # fmt: skip
-        found = hashlib.blake2b(digest_size=16)
-        for array in numbers:
-            found.update(np.ascontiguousarray(array).tobytes())
-        return found.digest()
+        return fingerprint(*numbers)
 
     def run(self) -> None:
         """At rest under its loads, then all samples in order, up to the first that has no equilibrium."""
