@@ -33,9 +33,11 @@ class World:
             excused=np.full(2, np.inf),
         )  # fmt: skip
         self.harmful: set[str] = set()
+        self.thrown: set[str] = set()  # of these: by a step to first order alone
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
         monkeypatch.setattr(stage, "left_out", lambda study, fit: self.left_out(fit.effects))
+        monkeypatch.setattr(stage, "proven", lambda study, fit, known: self.left_out(tuple({*fit.effects} - self.thrown)))
         monkeypatch.setattr(stage, "extended", lambda study, rest, rival, start: self.of(*rest.effects, rival))
 
     def beyond_pose(self, z: np.ndarray) -> float:
@@ -165,6 +167,15 @@ def test_of_several_the_one_that_predicts_worse_goes_and_a_single_one_stays(monk
     assert found.small == ()
     world.harmful = {"friction"}
     assert world.gated("friction").best.effects == ("friction",)  # the judge has the word
+
+
+def test_what_a_step_to_first_order_throws_is_judged_by_fits_in_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An obstacle that two trials show: with one of them left out a step goes anywhere, a fit to the rest does not."""
+    world = World(monkeypatch, contact=1.0, friction=0.5)
+    world.harmful, world.thrown = {"contact", "friction"}, {"contact"}
+    assert world.gated("contact", "friction").best.effects == ("contact",)
+    world.thrown = {"contact", "friction"}
+    assert world.gated("contact", "friction").best.effects == ("contact", "friction")
 
 
 def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:

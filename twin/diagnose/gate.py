@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.diagnose.lateness import LATE, tells_laws
-from twin.diagnose.left_out import left_out
+from twin.diagnose.left_out import left_out, proven
 from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Screening
 from twin.diagnose.search import Search
@@ -64,7 +64,7 @@ def gate(study: Study, found: Search, screening: Screening) -> Gated:
             small.append(Small(least, best, moved[least]))
             best = without[least]
             continue
-        harmful = [e for e in moved if len(moved) > 1 and left_out(study, best.fit).worse(left_out(study, without[e].fit))]
+        harmful = [e for e in moved if len(moved) > 1 and _harms(study, best, without[e])]
         if harmful:
             best = without[min(harmful, key=lambda e: moved[e])]
             continue
@@ -104,6 +104,12 @@ def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[st
         return False
     sizes = [(w.discrepancy.beyond(study.accuracy), left_out(study, w.fit).structure) for w in (best, without[least])]
     return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))
+
+
+def _harms(study: Study, best: Weighed, without: Weighed) -> bool:
+    """Whether trials left out are predicted better without an effect; where a step to first order throws one, by fits in truth."""
+    own, other = left_out(study, best.fit), left_out(study, without.fit)
+    return own.worse(other) and proven(study, best.fit, own).worse(proven(study, without.fit, other))
 
 
 def _doubt(study: Study, found: Search, screening: Screening, best: Weighed, without: dict[str, Weighed]) -> Doubt | None:
