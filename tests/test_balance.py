@@ -144,7 +144,7 @@ def test_the_tangent_is_the_slope_of_the_residual(mu: float, wall: np.ndarray) -
 
 @pytest.mark.parametrize("mu", [0.0, 0.2])
 def test_what_a_solution_keeps_is_its_tangents_factors(mu: float) -> None:
-    """With them a neighbour is solved in one step, and the derivatives of a fit are made."""
+    """Of the transpose. With them a neighbour is solved in one step, and the derivatives of a fit are made."""
     e, route = Equilibrium(edited()), Route(mu, 4e-4)
     t, T = swept((0, 0, 0), (3, 1, 0), (2, 2, 0), each=3)
     loads = Loads(SIDEWAYS, 0.02)
@@ -153,7 +153,7 @@ def test_what_a_solution_keeps_is_its_tangents_factors(mu: float) -> None:
         there = e.solve(Problem(t[: i + 1], T[: i + 1], loads, route, tolerance=1e-10))  # the slip at this row's end
         J = residual(e, path.q[i], np.zeros(48), T[i], loads, route, there.slip, there.distal, tangent=True)[1]
         LU = (np.tril(path.LU[i], -1) + np.eye(48)) @ np.triu(path.LU[i])
-        np.testing.assert_allclose(LU, J, rtol=0, atol=1e-6)  # N m/rad of up to 0.3: as the tangent against its differences
+        np.testing.assert_allclose(LU.T, J, rtol=0, atol=1e-6)  # N m/rad of up to 0.3: as the tangent against its differences
 
 
 @pytest.mark.parametrize("drive", [Drive.TENSION, Drive.DISPLACEMENT], ids=["tension", "length"])
