@@ -54,7 +54,7 @@ class World:
         fit = SimpleNamespace(z=np.sqrt([square - felt, felt]), effects=tuple(sorted(effects)), fitted=lambda e: {}, plain=plain)
         size_of = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
         laws = tuple((e, "toe" if e == "ropes" else "") for e in sorted(effects))
-        size = SimpleNamespace(beyond=lambda accuracy: size_of - accuracy)
+        size = SimpleNamespace(beyond=lambda accuracy: size_of - accuracy, size=size_of)
         return SimpleNamespace(effects=tuple(sorted(effects)), laws=laws, fit=fit, score=-square, discrepancy=size)
 
     def left_out(self, effects: tuple[str, ...]) -> Any:
@@ -176,6 +176,8 @@ def test_what_a_step_to_first_order_throws_is_judged_by_fits_in_truth(monkeypatc
     assert world.gated("contact", "friction").best.effects == ("contact",)
     world.thrown = {"contact", "friction"}
     assert world.gated("contact", "friction").best.effects == ("contact", "friction")
+    world.rest = {("contact", "friction"): (1.0, 1.0)}  # a set that leaves a sigma of those fitted is not tried at such cost
+    assert len(world.gated("contact", "friction").best.effects) == 1
 
 
 def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:

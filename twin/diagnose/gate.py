@@ -12,7 +12,7 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.screen import Screening
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import CLEAR, FORM, HALF
+from twin.diagnose.thresholds import CLEAR, FORM, HALF, MUCH
 from twin.diagnose.weigh import Weighed, extended, refit_without
 
 
@@ -64,7 +64,7 @@ def gate(study: Study, found: Search, screening: Screening) -> Gated:
             small.append(Small(least, best, moved[least]))
             best = without[least]
             continue
-        harmful = [e for e in moved if len(moved) > 1 and _harms(study, best, without[e])]
+        harmful = [e for e in moved if len(moved) > 1 and _harms(study, screening.bars, best, without[e])]
         if harmful:
             best = without[min(harmful, key=lambda e: moved[e])]
             continue
@@ -106,10 +106,13 @@ def _may_be_form(study: Study, bars: Thresholds, best: Weighed, without: dict[st
     return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))
 
 
-def _harms(study: Study, best: Weighed, without: Weighed) -> bool:
-    """Whether trials left out are predicted better without an effect; where a step to first order throws one, by fits in truth."""
+def _harms(study: Study, bars: Thresholds, best: Weighed, without: Weighed) -> bool:
+    """Whether trials left out are predicted better without an effect; of a set that leaves noise alone of those fitted, where a
+    step to first order throws one that is left out, by fits in truth."""
     own, other = left_out(study, best.fit), left_out(study, without.fit)
-    return own.worse(other) and proven(study, best.fit, own).worse(proven(study, without.fit, other))
+    if not own.worse(other) or best.discrepancy.size > max(MUCH, bars.left):
+        return own.worse(other)
+    return proven(study, best.fit, own).worse(proven(study, without.fit, other))
 
 
 def _doubt(study: Study, found: Search, screening: Screening, best: Weighed, without: dict[str, Weighed]) -> Doubt | None:
