@@ -8,12 +8,12 @@ of the outputs in sigmas per prior standard deviation of each nuisance parameter
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from tools.bench.bench import Log, as_described, run
+from tools.bench.bench import Log, as_described, logged_inputs, run
 from tools.bench.design import Day
 from tools.bench.effects import Effect
 from tools.bench.rod import NoEquilibrium, Rod
@@ -43,11 +43,16 @@ def _nuisances(rod: Rod) -> list[tuple[Rod, float]]:
 
 @dataclass(frozen=True)
 class Scale:
-    """Measures effects on a thinned day: every third trial carries the same mixture of motions."""
+    """Measures effects on a thinned day: every third trial carries the same mixture of motions.
+
+    Solved once: how outputs move, for all effects seen in the same; the robot without effects, for all that leave the inputs alone.
+    """
 
     rod: Rod
     day: Day
     noise: Noise
+    _moved: dict[str, np.ndarray] = field(default_factory=dict)
+    _described: dict[bytes, list[Log]] = field(default_factory=dict)
 
     def thinned(self) -> Day:
         return replace(self.day, trials=self.day.trials[::3])
@@ -58,16 +63,25 @@ class Scale:
 
     def moves(self, seen_in: str) -> np.ndarray:
         """Change (n, p) of the output, in sigmas, per prior deviation of each nuisance parameter."""
+        if seen_in not in self._moved:
+            day = self.thinned()
+            at = stack(run(self.rod, [], day), seen_in)
+            moved = [(stack(run(rod, [], day), seen_in) - at) / part for rod, part in _nuisances(self.rod)]
+            self._moved[seen_in] = np.stack(moved, axis=1) / self.sigma(seen_in)
+        return self._moved[seen_in]
+
+    def described(self, logs: Sequence[Log]) -> list[Log]:
+        """What the robot without effects would log, driven by the logged inputs."""
         day = self.thinned()
-        at = stack(run(self.rod, [], day), seen_in)
-        moved = [(stack(run(rod, [], day), seen_in) - at) / part for rod, part in _nuisances(self.rod)]
-        return np.stack(moved, axis=1) / self.sigma(seen_in)
+        inputs = b"".join(drive.tobytes() for drive in logged_inputs(logs, day))
+        if inputs not in self._described:
+            self._described[inputs] = as_described(self.rod, logs, day)
+        return self._described[inputs]
 
     def amplitude(self, effects: Sequence[Effect], seen_in: str, moves: np.ndarray) -> float:
         """RMS residual over sigma after the linear refit."""
-        day = self.thinned()
-        logs = run(self.rod, effects, day)
-        residual = stack(logs, seen_in) - stack(as_described(self.rod, logs, day), seen_in)
+        logs = run(self.rod, effects, self.thinned())
+        residual = stack(logs, seen_in) - stack(self.described(logs), seen_in)
         residual /= self.sigma(seen_in)
         refit = lsq_linear(moves, residual, bounds=(-PLAUSIBLE, PLAUSIBLE)).x
         return float(np.sqrt(np.mean((residual - moves @ refit) ** 2)))

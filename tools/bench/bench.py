@@ -162,10 +162,13 @@ def _milestones(time: np.ndarray, drive: np.ndarray, stride: float) -> np.ndarra
     return np.array(marks)
 
 
+def logged_inputs(logs: Sequence[Log], day: Day) -> list[np.ndarray]:
+    """What the log says that drove each trial (n, T): currents, displacements or tensions."""
+    return [log.current if day.by_current else log.displacement if day.by_length else np.maximum(log.tension, 0.0) for log in logs]
+
+
 def as_described(rod: Rod, logs: Sequence[Log], day: Day) -> list[Log]:
     """What the same built robot would log without any effect, driven by the logged inputs."""
-    inputs = [
-        log.current if day.by_current else log.displacement if day.by_length else np.maximum(log.tension, 0.0) for log in logs
-    ]
-    trials = tuple(replace(log.trial, fine=log.trial.time, command=c) for log, c in zip(logs, inputs, strict=True))
+    inputs = zip(logs, logged_inputs(logs, day), strict=True)
+    trials = tuple(replace(log.trial, fine=log.trial.time, command=c) for log, c in inputs)
     return run(rod, [], replace(day, trials=trials))

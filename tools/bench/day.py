@@ -42,10 +42,10 @@ def make_set(
     rod = built(robot, spread=MISMATCH[mismatch])
     day = bench_day(design, motions)
     noise = Noise.draw(instruments, coloured)
-    found = []
+    found, scale = [], Scale(rod, day, noise)
     for name in effects:
         progress(f"scaling {name}")
-        found.append(scaled(known[name].draw(laws), amplitude, Scale(rod, day, noise)))
+        found.append(scaled(known[name].draw(laws), amplitude, scale))
     day = replace(day, trials=(*day.trials, *more))
     chosen = [effect for effect, _ in found]
     unnamed = [replace(known[n].draw(laws), strength=s) for n, s in UNNAMED.items()] if mismatch == "rough" else []
