@@ -6,10 +6,11 @@ import re
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from twin.bench import Bench, prepare
 from twin.measurements import Channel, Recording, Trial
-from twin.residual import SYNC, Noise, Whitener, estimate_noise, repeats
+from twin.residual import SILENT, SYNC, Noise, Whitener, estimate_noise, repeats
 from twin.robots import load
 
 ROBOT = load("continuum")
@@ -235,6 +236,19 @@ def test_a_false_law_that_silences_a_tendon_does_not_win_by_it() -> None:
     assert heard == pytest.approx(n * 10.44 / 11.44)
     assert won > 0.8 * n
     assert abs(won - heard) < 3.0 * np.sqrt(2.0 * n)
+
+
+def test_the_noise_that_slack_cuts_off_is_the_share_of_readings_that_it_silences() -> None:
+    """Var max(0, x + e), e ~ N(0, 1), is (x^2 + 1) P + x p - (x P + p)^2, P and p the normal law's at x: what it lacks of 1 is
+    P(x + e < 0.4) to 0.03, where counting the slack alone, P(x + e < 0), lacks 0.16 of it at the boundary."""
+    x = np.linspace(-4.0, 4.0, 81)
+    P, p = norm.cdf(x), norm.pdf(x)
+    cut = 1.0 - ((x**2 + 1.0) * P + x * p - (x * P + p) ** 2)
+    np.testing.assert_allclose(norm.cdf(SILENT - x), cut, atol=0.03)
+    assert np.abs(norm.cdf(-x) - cut).max() > 0.15
+    e = np.random.default_rng(11).normal(size=400_000)  # the closed form, to four standard errors of a variance
+    for at in (-1.0, 0.0, 1.0):
+        assert 1.0 - np.var(np.maximum(0.0, at + e)) == pytest.approx(np.interp(at, x, cut), abs=4.0 * np.sqrt(2.0 / e.size))
 
 
 def test_noise_with_a_long_memory_is_taken_for_nine_tenths() -> None:

@@ -9,7 +9,8 @@ samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-
 
 A tendon that a law makes slack does not feel its reading's noise, and |z|^2 falls by it though the law need not be true: the robot
 has never felt it. `Whitener.heard` is what that noise adds where the tendon is taut, so that laws can be compared without it
-(the corrected score of errors in variables, Nakamura, Biometrika 77, 1990).
+(the corrected score of errors in variables, Nakamura, Biometrika 77, 1990). A tendon that a law leaves x noises above slack feels
+max(0, x + e): of the noise's square 1 - Var max(0, x + e) is lost, which is the share of readings under `SILENT`, to 0.03.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from twin.effects import Drive
 
 DECLARED = "as declared"
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
+SILENT = 0.4  # noises of a reading above slack: as many are below as noise's square is cut off there
 LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
 OUTLYING = 1e-6  # probability: rows that noise makes less often are not noise
 SAME = (

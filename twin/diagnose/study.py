@@ -11,8 +11,10 @@ from twin.bench import Bench
 from twin.calibrate import Fit, Objective
 from twin.diagnose.budget import Budget
 from twin.diagnose.evidence import Evidence
+from twin.effects import Drive
 from twin.evaluate import ACCURATE
 from twin.quantities import each
+from twin.residual import SILENT
 
 Progress = Callable[[str], None]
 
@@ -38,10 +40,12 @@ class Study:
         return np.concatenate([np.nan_to_num(r / self.objective.whitener.noise.sigma).ravel() for r in fit.evaluation.raw])
 
     def unheard(self, fit: Fit) -> float:
-        """What the fitted trials' |z|^2 lacks of the readings' noise because the law lets tendons fall slack (`Whitener.heard`)."""
-        traces = fit.evaluation.traces
-        slack = (traces[k].true.tension <= 0.0 for k in self.trials)
-        return float(sum(h[s].sum() for h, s in zip(self.objective.whitener.heard, slack, strict=True)))
+        """What the fitted trials' |z|^2 lacks of the readings' noise because the law lets tendons fall slack (`Whitener.heard`),
+        or so near it that noise is cut off there (`SILENT`)."""
+        traces, whitener = fit.evaluation.traces, self.objective.whitener
+        near = np.where(self.bench.driven_by(Drive.TENSION), SILENT * whitener.noise.drive, 0.0)
+        slack = (traces[k].true.tension <= near for k in self.trials)
+        return float(sum(h[s].sum() for h, s in zip(whitener.heard, slack, strict=True)))
 
     def fall(self, before: Fit, after: Fit) -> np.ndarray:
         """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""
