@@ -242,8 +242,9 @@ class Spectrum:
     def peak(self, rest: np.ndarray) -> tuple[float, float]:
         """The strongest line of what is left when the smooth error is removed: (z-score, frequency in Hz).
 
-        Periodograms of all trials and channels (n, m) are added; white noise gives each grid point a chi-square with
-        2 (trials x channels) degrees of freedom.
+        Periodograms of all trials and channels (n, m) are added; noise gives each grid point its continuum's level times a
+        chi-square of 2 (trials x channels) degrees of freedom over their number. The continuum need not be flat: noise that
+        remembers otherwise than by the row before (coloured and white together, say) is not made white, and is no line.
         """
         if self.grid.size < 4:
             return 0.0, 0.0
@@ -256,6 +257,21 @@ class Spectrum:
             x = x[:, used] - x[:, used].mean(axis=0)
             power += (np.abs(wave @ x.astype(np.float32)) ** 2 / (n * x.var(axis=0) + 1e-12)).sum(axis=1)
             count += int(used.sum())
-        score = (power - np.median(power)) / np.sqrt(max(count, 1))
+        if count == 0:
+            return 0.0, 0.0
+        score = np.sqrt(count) * (power / self._continuum(power) - 1.0)
         best = int(np.argmax(score))
         return float(score[best]), float(self.grid[best])
+
+    def _continuum(self, power: np.ndarray) -> np.ndarray:
+        """What lines stand out of (n_f,): log power as a parabola of log frequency, of fewer than 16 frequencies a line, of fewer
+        than 8 a constant; three robust deviations above it is a line and left out."""
+        x = np.log(self.grid / self.grid[0])
+        basis, log = np.vander(x, min(3, 1 + x.size // 8)), np.log(power)
+        below = np.ones(x.size, dtype=bool)
+        for _ in range(ROUNDS):
+            rest = log - basis @ np.linalg.lstsq(basis[below], log[below], rcond=None)[0]
+            before, below = below, rest < 3.0 * 1.4826 * np.median(np.abs(rest[below]))
+            if np.array_equal(below, before):
+                break
+        return np.exp(log - rest)
