@@ -11,6 +11,7 @@ from twin.bench import Bench
 from twin.calibrate import Fit, Objective
 from twin.diagnose.budget import Budget
 from twin.diagnose.evidence import Evidence
+from twin.diagnose.passed import passed
 from twin.effects import Drive
 from twin.evaluate import ACCURATE
 from twin.quantities import each
@@ -40,12 +41,16 @@ class Study:
         return np.concatenate([np.nan_to_num(r / self.objective.whitener.noise.sigma).ravel() for r in fit.evaluation.raw])
 
     def unheard(self, fit: Fit) -> float:
-        """What the fitted trials' |z|^2 lacks of the readings' noise because the law lets tendons fall slack (`Whitener.heard`),
-        or so near it that noise is cut off there (`SILENT`)."""
-        traces, whitener = fit.evaluation.traces, self.objective.whitener
-        near = np.where(self.bench.driven_by(Drive.TENSION), SILENT * whitener.noise.drive, 0.0)
-        slack = (traces[k].true.tension <= near for k in self.trials)
-        return float(sum(h[s].sum() for h, s in zip(whitener.heard, slack, strict=True)))
+        """What the fitted trials' |z|^2 lacks of the readings' noise (`Whitener.heard`): the law averages it away (`passed`), or
+        lets tendons fall slack, or so near it that noise is cut off there (`SILENT`)."""
+        traces, whitener, bench = fit.evaluation.traces, self.objective.whitener, self.bench
+        drive = whitener.noise.drive
+        near = np.where(bench.driven_by(Drive.TENSION), SILENT * drive, 0.0)
+        lacking = 0.0
+        for k, heard in zip(self.trials, whitener.heard, strict=True):
+            felt = np.where(traces[k].true.tension <= near, 0.0, passed(fit.model.twin, bench.inputs[k], drive))
+            lacking += float((heard * (1.0 - felt)).sum())
+        return lacking
 
     def fall(self, before: Fit, after: Fit) -> np.ndarray:
         """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""
