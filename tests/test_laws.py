@@ -404,15 +404,20 @@ def test_a_drive_gives_less_beyond_its_limit() -> None:
 
 
 def test_play_is_an_operator_with_a_width_of_its_own_a_drive() -> None:
-    """Pulled 1 mm and paid out again in steps of 0.1 mm, gap 0.2 mm (0.3 mm in the second), swap half the gap, slack 0.05 mm."""
+    """Pulled 1 mm and paid out again in steps of 0.1 mm, gap 0.2 mm (0.3 mm in the second), slack 0.05 mm, swap half the mean gap,
+    so that in each the tendon stands still until the gap is crossed."""
     u = 1e-3 * np.concatenate([np.linspace(0, 1, 11), np.linspace(0.9, 0, 10)])[:, None] * np.ones(3)
     t = np.arange(21.0)
-    play = law("tendon_backlash", gap=2e-4, swap=1e-4, slack=5e-5, gap_2=1e-4)
+    play = law("tendon_backlash", gap=2e-4, swap=0.7e-3 / 6.0, slack=5e-5, gap_2=1e-4)
     signals = Signals(t, t, 0 * u, u, np.zeros((21, 0, 3)), t, (Drive.DISPLACEMENT,) * 3)
     moved = play.drive(signals).displacement
     for j, half in ((0, 1e-4), (1, 1.5e-4), (2, 1e-4)):
-        side = np.clip(np.arange(11.0), 0, 1), np.clip(1.0 - np.arange(1.0, 11.0), -1, 1)
-        np.testing.assert_allclose(moved[:, j], u[:, j] - 5e-5 - half * np.concatenate(side), atol=1e-15)
+        at, stands = 0.0, []
+        for pulled in u[:, j]:
+            at = min(max(at, pulled - half), pulled + half)  # dragged along by one side of the gap or the other
+            stands.append(at)
+        np.testing.assert_allclose(moved[:, j], np.array(stands) - 5e-5, atol=1e-15)
+    np.testing.assert_allclose(play.route().swap, [1e-4, 1.5e-4, 1e-4])
     by_tension = signals.with_(drives=(Drive.TENSION,) * 3)
     np.testing.assert_array_equal(play.drive(by_tension).displacement, u)  # no motor holds a length: the gap shows in its reading
     np.testing.assert_allclose(play.sense(by_tension).displacement - u, u - moved, atol=1e-15)
@@ -584,6 +589,30 @@ def test_fits_start_at_every_guess_and_at_each_tendon_alone_and_all() -> None:
     creep = list(named("backbone_creep").starts([], 3))
     assert [dict(s.values)["time"] for s in creep] == [3.0, 15.0, 80.0]
     assert {s.free for s in creep} == {("amplitude", "time")}  # the second retardation time only where the first is in force
+
+
+def test_drives_and_springs_that_are_alike_are_tried_each_with_its_own() -> None:
+    """Beside the plain law's: all but the last have one, which has that of all (gaps) or what makes the product one (shares). Never
+    where they already differ, nor of one drive alone."""
+    still = [some_signals()]
+    for alike, apart, fuller in (
+        (law("tendon_backlash", gap=2e-4), law("tendon_backlash", gap=2e-4, gap_2=1e-4), [("slack",), ("slack", "gap_1", "gap_2")]),
+        (law("sma_cooling", factor=1.3), law("sma_cooling", factor=1.3, share_2=1.1),
+         [("forced", "rate"), ("forced", "rate", "share_1", "share_2")]),
+    ):  # fmt: skip
+        starts = list(alike.fuller_starts(still))
+        assert [s.free for s in starts] == fuller
+        assert all(set(s.values) <= set(s.free) for s in starts)
+        assert [s.free for s in apart.fuller_starts(still)] == fuller[:1]
+        one = named(alike.id)({n: v for n, v in alike.values.items() if not n[-1].isdigit()}, 1)
+        assert [s.free for s in one.fuller_starts(still)] == fuller[:1]
+    own = law("tendon_backlash", gap_2=2e-4)
+    assert [s.free for s in own.fuller_starts(still)] == [("slack",)]
+    np.testing.assert_allclose(own.route().play, [0.0, 1e-4, 0.0])
+    np.testing.assert_allclose(own.route().swap, [1e-4, 1e-4, 1e-4])  # of those without play it is not asked
+    np.testing.assert_allclose(
+        law("tendon_backlash", gap=1e-4, gap_2=-3e-4).route().play, [5e-5, 0.0, 5e-5]
+    )  # never less than none
 
 
 def test_springs_and_drives_are_sought_where_they_are() -> None:

@@ -312,7 +312,7 @@ def test_springs_that_follow_with_play_stand_still_while_their_tendons_turn_back
     """Half a millimetre of play: elongations by a play operator along the paths found, row by row, give springs by themselves the
     tensions found. All of a turn that lies within the gap stays with the tendon, or the share that a softer gap leaves."""
     time, half = np.arange(0.0, 100.0, 1.0), 2.5e-4
-    route = Route(play=(half,) * 3, swap=swap)
+    route = Route(play=(half,) * 3, swap=(swap,))
     found = drive(time, turns(time), SIDEWAYS, route)
     alone, swap = springs(), max(swap, half / 0.99)
     path = found.path - robot().straight_path

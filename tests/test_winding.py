@@ -121,7 +121,7 @@ def test_the_settled_shape_does_not_depend_on_the_step() -> None:
 
 
 SOFT = Route(stretch=1e-4, bedding=4e-4, bedding_tension=0.4, hooked=1.0)
-LOOSE = Route(play=(3e-4,) * 3, swap=3e-4)
+LOOSE = Route(play=(3e-4,) * 3, swap=(3e-4,))
 
 
 @pytest.mark.parametrize("route", [FRICTION, SOFT, LOOSE], ids=["friction", "toe", "play"])

@@ -106,7 +106,7 @@ class Route:
     `stall`: the tension (N) at which a motor that holds a tendon at a length gives way, and holds no more.
     `mounted`: the share of its rest bend that the body had when SMA springs were put on; `hooked`: that of what their first tension
     stretches which was stretched then, so that the springs were as long as described. `play` (m) each tendon has either way before
-    its SMA spring follows, over a travel of `swap` (m)."""
+    its SMA spring follows, over a travel of `swap` (m), its own or one of all."""
 
     mu: float = 0.0
     presliding: float = 4e-4
@@ -118,7 +118,7 @@ class Route:
     stall: float = np.inf
     hooked: float = 0.0
     play: tuple[float, ...] = ()
-    swap: float = 1e-4
+    swap: tuple[float, ...] = (1e-4,)
 
     def elongation(self, tension: np.ndarray) -> np.ndarray:
         """By how much (m) a tendon is longer under a tension (N) than slack."""

@@ -62,7 +62,7 @@ class SensorHysteresis(Effect):
         rest = true.others["sensor_rest"]
         a = np.ascontiguousarray((true.others["sensor"] / rest) ** 0.5 - 1.0)
         side, late = np.empty_like(a), np.empty_like(a)
-        lead(a - a[0], self["swap"], side)
+        lead(a - a[0], np.full(a.shape[1], self["swap"]), side)
         behind(a, true.time, self["time"], late)
         read = a - self["width"] * side - self["share"] * (a - late)
         return true.with_(others={**true.others, "sensor": rest * (1.0 + read) ** 2})

@@ -53,6 +53,14 @@ class SmaCooling(Effect):
         if shares:
             yield Start({"factor": 1.1, **shares}, ("factor", *shares))
 
+    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
+        """With a draught's loss and warm air; and with shares of each spring's own, where they were one."""
+        yield from super().fuller_starts(predicted)
+        shares = [p.name for p in self.declared(self.n_tendon) if p not in self.parameters]
+        if shares and all(self[name] == 1.0 for name in shares):
+            steps = {name: self.values[name] + (0.02 if name in shares else 0.0) for name in (*self.richer, *shares)}
+            yield Start(steps, tuple(steps))
+
     def spring(self, spring: Spring) -> Spring:
         shares = [self[p.name] for p in self.declared(len(spring.loss)) if p not in self.parameters]
         more = self["factor"] * np.array([*shares, 1.0 / np.prod(shares)])

@@ -146,7 +146,7 @@ def rest(held, t, path, tension):
 def of_play(route: Route, zero: np.ndarray, by_spring: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """`play`, `swap`, `side` and `length` of `Held` before anything has moved, for paths of `zero` (n_tendon,) m."""
     play = by_spring * np.array(route.play or np.zeros(zero.size), float)
-    return play, np.maximum(route.swap, play / LOOSEST), np.zeros(zero.size), zero.copy()
+    return play, np.maximum(np.array(route.swap, float), play / LOOSEST), np.zeros(zero.size), zero.copy()
 
 
 @jit
