@@ -134,6 +134,27 @@ def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_par
     assert fuller(study(), plain, 12.0) is not plain, "all the parts that there are"
 
 
+def test_a_law_that_is_fuller_is_tried_fuller_still_with_all_that_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of an amplitude in force: not that alone again, nor the time without it; both, each free once."""
+    monkeypatch.setattr(catalogue()[CREEP], "fuller_starts", lambda law, predicted: iter([]))
+    steps = {"amplitude_2": 0.02, "time_2": 40.0}
+    starts = [Start(steps, free) for free in (("amplitude_2",), ("time_2",), ("amplitude_2", "time_2"))]
+    plain = weighed(calibrated(CREEP), score=10.0)
+    assert fuller(study(), plain, 12.0) is plain, "none to try"
+    monkeypatch.setattr(catalogue()[CREEP], "fuller_starts", lambda law, predicted: iter(starts))
+    scores = iter((50.0, 20.0, 30.0))
+    monkeypatch.setattr(stage, "fit", lambda objective, model, **how: model)
+    monkeypatch.setattr(stage, "weigh", lambda study, model: weighed(model, next(scores)))
+    first = fuller(study(), plain, 12.0)
+    freed = [f.parameter.name for f in first.fit.model.free if f.effect == CREEP]
+    assert freed == [*PLAIN, "amplitude_2"]
+    scores = iter((90.0,))
+    second = fuller(study(), first, 12.0)
+    assert second.score == 90.0
+    assert [f.parameter.name for f in second.fit.model.free if f.effect == CREEP] == [*PLAIN, "amplitude_2", "time_2"]
+    assert fuller(study(), second, 12.0) is second
+
+
 def test_a_fuller_law_that_cannot_be_solved_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = weighed(calibrated(CREEP))
     Fits(monkeypatch, 1e9, fails=1)

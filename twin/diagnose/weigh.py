@@ -59,7 +59,8 @@ def extended(study: Study, member: Weighed, effect: str, start: Start, beat: flo
 
 
 def fuller(study: Study, found: Weighed, accept: float) -> Weighed:
-    """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it.
+    """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it; where one is, one
+    that has all of that and more (springs each with its own).
 
     Before other effects are added: what the plain law leaves would be taken for them.
     """
@@ -67,16 +68,20 @@ def fuller(study: Study, found: Weighed, accept: float) -> Weighed:
     for effect in found.effects:
         richer = catalogue()[effect].richer
         free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
-        if not richer or set(richer) & set(free) or not catalogue()[effect].richer_needs <= parts:
+        if not richer or not catalogue()[effect].richer_needs <= parts:
+            continue
+        plain, in_force = found, set(richer) & set(free)
+        law = next(e for e in plain.fit.model.twin.effects if e.id == effect)
+        starts = law.fuller_starts([t.true for t in plain.fit.evaluation.traces.values()])
+        starts = [s for s in starts if in_force <= set(s.free) and not set(s.free) <= set(free)]
+        if not starts:
             continue
         if not study.budget.allows(f"the fuller law of {effect}"):
             continue
         study.progress(f"fuller law of {effect}")
-        plain = found
-        law = next(e for e in plain.fit.model.twin.effects if e.id == effect)
-        for start in law.fuller_starts([t.true for t in plain.fit.evaluation.traces.values()]):
-            values = {**law.values, **start.values}
-            model = plain.fit.model.without_effect(effect).with_effect(effect, values, (*free, *start.free), n_tendon)
+        for start in starts:
+            values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
+            model = plain.fit.model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
                 fuller = weigh(study, fit(study.objective, model, J=_own(plain.fit), tolerance=ROUGHLY, worth=LITTLE))
             except SolveError:
