@@ -91,6 +91,7 @@ def weighed(effects: tuple[str, ...], score: float, cost: float = 0.0, size: flo
     return SimpleNamespace(
         effects=effects,
         score=score,
+        unheard=9.0 * ("creep" in effects),
         fit=fit,
         discrepancy=SimpleNamespace(size=size, beyond=lambda a: size - a, rest=lambda a: z, mean=z),
     )
@@ -124,9 +125,7 @@ def judged(
         small=tuple(SimpleNamespace(effect=e) for e in small),
         contribution=lambda study, e: sizes.get(e, 0.0),
     )
-    study = SimpleNamespace(
-        progress=lambda words: None, bench=None, trials=[0], accuracy=0.25, unheard=lambda fit: 9.0 * ("creep" in fit.effects)
-    )
+    study = SimpleNamespace(progress=lambda words: None, bench=None, trials=[0], accuracy=0.25)
     return judge(study, SimpleNamespace(base=base, all=ranked), gated, BARS)  # type: ignore[arg-type]
 
 

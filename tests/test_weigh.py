@@ -73,6 +73,7 @@ def test_a_score_is_twice_the_log_evidence_less_priors_and_the_price_of_what_the
     fitted: Any = SimpleNamespace(z=np.array([1.0, 2.0, 3.0]), cost=17.0, effective_parameters=lambda: 2.5)
     found = weigh(study(), fitted)
     assert found.score == pytest.approx(100.0 - 17.0 - 7.0 - 2.5 * np.log(N))
+    assert found.unheard == 7.0
     assert (found.fit, found.discrepancy) == (fitted, "smooth")
 
 

@@ -92,7 +92,7 @@ def judge(study: Study, found: Search, gated: Gated, bars: Thresholds) -> Judgem
     doubtful = unsure(claims, either) if said == "explained" else ()
     said = "partly_explained" if doubtful else said
     runners = _runners_up(found, gated, () if said == "unexplained" else added)
-    ambiguous = tuple(dict.fromkeys((*(w.effects for w in alike), *_as_good(study, found, gated, best))))
+    ambiguous = tuple(dict.fromkeys((*(w.effects for w in alike), *_as_good(found, gated, best))))
     return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart, doubtful)
 
 
@@ -176,7 +176,7 @@ def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[
     return tuple(list(out.values())[:RUNNERS])
 
 
-def _as_good(study: Study, found: Search, gated: Gated, final: Weighed) -> tuple[tuple[str, ...], ...]:
+def _as_good(found: Search, gated: Gated, final: Weighed) -> tuple[tuple[str, ...], ...]:
     """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `ACCEPT` of it, and two
     standard deviations of what only one of them hears. What was too small to claim was dropped from the claimed set, and lends no
     other its evidence.
@@ -188,7 +188,7 @@ def _as_good(study: Study, found: Search, gated: Gated, final: Weighed) -> tuple
     others = [
         w for w in found.all if not claimed <= set(w.effects) and not set(w.effects) <= claimed and not small & set(w.effects)
     ]
-    chance = [2.0 * float(np.sqrt(abs(study.unheard(w.fit) - study.unheard(final.fit)))) for w in others]
+    chance = [2.0 * float(np.sqrt(abs(w.unheard - final.unheard))) for w in others]
     return tuple(w.effects for w, sd in zip(others, chance, strict=True) if w.score > final.score - ACCEPT - 2.0 * sd)
 
 

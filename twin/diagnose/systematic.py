@@ -21,7 +21,6 @@ from twin.diagnose.judge import Judgement
 from twin.diagnose.patterns import Dictionary
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import INVISIBLE
-from twin.diagnose.weigh import Weighed
 from twin.information import solve
 
 
@@ -33,7 +32,7 @@ def with_systematic(study: Study, judged: Judgement, known: Dictionary) -> Judge
     off = systematic(final.fit, known.beside(final.effects), left)
     fit = replace(final.fit, systematic=off)
     claims = tuple(replace(c, parameters=fit.fitted(c.effect)) for c in judged.claims)
-    return replace(judged, final=Weighed(fit, final.score, final.discrepancy), claims=claims)
+    return replace(judged, final=replace(final, fit=fit), claims=claims)
 
 
 def systematic(fit: Fit, unclaimed: Dictionary, left: float) -> np.ndarray:

@@ -20,11 +20,12 @@ Laws = tuple[tuple[str, str], ...]  # effect and its form, sorted; by these sets
 @dataclass(frozen=True)
 class Weighed:
     """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, less the noise of
-    readings that slack tendons do not hear (`Study.unheard`), up to a constant."""
+    readings that the law keeps from the robot, `unheard` (`Study.unheard`), up to a constant."""
 
     fit: Fit
     score: float
     discrepancy: Discrepancy
+    unheard: float = 0.0
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -45,7 +46,8 @@ def weigh(study: Study, fitted: Fit) -> Weighed:
     gain, discrepancy = study.evidence.log_likelihood_gain(fitted.z)
     prior = fitted.cost - float(fitted.z @ fitted.z)
     size = fitted.effective_parameters() * float(np.log(study.objective.n))
-    return Weighed(fitted, gain - study.unheard(fitted) - prior - size, discrepancy)
+    unheard = study.unheard(fitted)
+    return Weighed(fitted, gain - unheard - prior - size, discrepancy, unheard)
 
 
 def extended(study: Study, member: Weighed, effect: str, start: Start, beat: float = np.inf) -> Weighed | None:
