@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 
 from twin.bench import Bench
 from twin.body import TOLERANCE
-from twin.effects import Effect, named
+from twin.effects import Drive, Effect, named
 from twin.errors import SolveError
 from twin.information import scatter, solve, untold
 from twin.quantities import Fitted, Parameter
@@ -150,6 +150,14 @@ class Objective:
 
         Parallel(n_jobs=n, prefer="threads", require="sharedmem")(delayed(solve)(s) for s in range(n))
         return None if total.sum() > most else Evaluation(model, dict(sorted(traces.items())), raw, np.concatenate(z))
+
+    def cut_off(self, twin: Twin) -> np.ndarray:
+        """Its square is what the laws cut off of the readings' noise near slack (`Whitener.cut_off`), flat (n_row n_tendon,)."""
+        pulled, cut = self.bench.driven_by(Drive.TENSION), []
+        for i, k in enumerate(self.trials):
+            tension = np.where(pulled, twin.laws.command(self.bench.inputs[k].signals).tension, np.inf)
+            cut.append(np.sqrt(self.whitener.cut_off(i, tension)).ravel())
+        return np.concatenate(cut)
 
     def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
@@ -308,18 +316,30 @@ def fit(
     at the solution, for standard errors and screening. A fit ends where a step falls by less than `tolerance` of its cost, or by
     less than `worth`. One that would not `beat` a cost though all further steps fell by as much
     as its last ends there. Raises SolveError where the model cannot be solved at its start.
+
+    Laws of load cells are fitted to |z|^2 and the noise that they cut off near slack: else they lean to where tendons at rest fall
+    silent.
     """
     steps = np.array([f.parameter.step for f in model.free])
     low = np.array([f.parameter.low for f in model.free]) / steps
     high = np.array([f.parameter.high for f in model.free]) / steps
     prior = np.array([f.parameter.value for f in model.free]) / steps
     weight = prior_weight(model) ** 2
+    cells = {e.id for e in model.twin.effects if e.acts_in("command")}
+    silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
 
     def believed(x: np.ndarray) -> float:
         return float(weight @ (x - prior) ** 2)
 
+    def cut_off(x: np.ndarray) -> np.ndarray:
+        return objective.cut_off(model.at(x).twin) if silencing else np.zeros(0)
+
+    def besides(x: np.ndarray) -> float:
+        """What is fitted besides |z|^2."""
+        return believed(x) + float(np.sum(cut_off(x) ** 2))
+
     def cost(e: Evaluation) -> float:
-        return float(e.z @ e.z) + believed(e.model.vector())
+        return float(e.z @ e.z) + besides(e.model.vector())
 
     at = objective.evaluate(model, near.traces if near else None)
     fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
@@ -332,15 +352,19 @@ def fit(
     for left in range(STEPS - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
-        H = columns.T @ columns + np.diag(weight)
-        g = columns.T @ at.z + weight * (x - prior)
+        cut = cut_off(x)
+        D = np.zeros((cut.size, x.size))
+        for i in silencing:
+            D[:, i] = (cut_off(x + NUDGE * (np.arange(x.size) == i)) - cut) / NUDGE
+        H = columns.T @ columns + D.T @ D + np.diag(weight)
+        g = columns.T @ at.z + D.T @ cut + weight * (x - prior)
         better, whole, enough = None, damping, max(tolerance * now, worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
             foretold = -float(2.0 * g @ d + d @ H @ d)
             if damping > whole and foretold < enough:  # a step that failed is not shortened until it is worth nothing
                 break
-            better = _improved(objective, at, x + d, now - believed(x + d))
+            better = _improved(objective, at, x + d, now - besides(x + d))
             damping *= 1.0 if better else 10.0
         if better is None:
             break
@@ -351,7 +375,7 @@ def fit(
             break
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))
-    return Fit(at, columns, now)
+    return Fit(at, columns, float(at.z @ at.z) + believed(at.model.vector()))
 
 
 def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.special import ndtr
 from scipy.stats import chi2
 
 from twin.autocorrelation import autocorrelation
@@ -30,6 +31,7 @@ from twin.effects import Drive
 DECLARED = "as declared"
 SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
 SILENT = 0.4  # noises of a reading above slack: as many are below as noise's square is cut off there
+BLUR = 0.25  # noises, over which that is blurred where a fit is to feel it: derivatives then reach the readings beside it
 LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
 OUTLYING = 1e-6  # probability: rows that noise makes less often are not noise
 SAME = (
@@ -96,6 +98,11 @@ class Whitener:
         white = a + np.einsum("nmt,nts,nls,nlr->nmr", A, core, A, a, optimize=True)
         _, decay, scale = self._memory[k]
         return np.einsum("nm,nmt,nmt->nt", (1.0 + decay**2) * scale**2, white, white)
+
+    def cut_off(self, k: int, tension: np.ndarray) -> np.ndarray:
+        """Of `heard`, what is cut off near slack where a law has a tendon under tension (n_k, n_tendon) N, slack below zero."""
+        above = np.divide(tension, self.noise.drive, out=np.full_like(tension, np.inf), where=self.noise.drive > 0.0)
+        return self.heard[k] * ndtr((SILENT - above) / BLUR)
 
     def of(self, which: Sequence[int]) -> Whitener:
         """The same of some of its trials alone, by their positions."""
