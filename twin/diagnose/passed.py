@@ -12,10 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from twin.bench import Inputs
+from twin.diagnose.thresholds import ENDED, PROBED
 from twin.twin import Twin
-
-APART = 4  # rows between two probed readings: as many as a monotone cubic between rows weighs
-LITTLE = 0.5  # of the most that a lasting change does: where it does less a drive is at its end, and stills noise with all else
 
 
 def passed(twin: Twin, inputs: Inputs, noise: np.ndarray) -> np.ndarray:
@@ -30,10 +28,10 @@ def passed(twin: Twin, inputs: Inputs, noise: np.ndarray) -> np.ndarray:
         def driven(by: np.ndarray | float) -> np.ndarray:
             return laws.drive(laws.command(replace(inputs, command=command + by * noise).signals)).command
 
-        at, rows = driven(0.0), np.arange(len(command))[:, None] % APART
+        at, rows = driven(0.0), np.arange(len(command))[:, None] % PROBED
         lasting = (driven(1.0) - at) ** 2
-        whole = np.maximum(lasting, LITTLE**2 * lasting.max(axis=0))
-        square = sum((driven(1.0 * (rows == first)) - at) ** 2 for first in range(APART))
+        whole = np.maximum(lasting, ENDED**2 * lasting.max(axis=0))
+        square = sum((driven(1.0 * (rows == first)) - at) ** 2 for first in range(PROBED))
         np.divide(square, whole, out=share, where=whole > 0.0)
     time = inputs.time - inputs.time[0]
     late = sum(a * -np.expm1(-time / tau).mean() for a, tau in zip(laws.creep.amplitude, laws.creep.time, strict=True))

@@ -147,9 +147,7 @@ LAG = _row(
     "LAG", 4.0, "standard errors", "a loop smaller than that is not said to be there",
     "derivation: two chances in 30,000, over some 20 trials one in a thousand sets",
 )  # fmt: skip
-MOVING = _row(
-    "MOVING", 0.05, "of the fastest rate of a trial", "slower samples have no direction", "judgement"
-)  # fmt: skip
+MOVING = _row("MOVING", 0.05, "of the fastest rate of a trial", "slower samples have no direction", "judgement")
 
 # ---- no-effect sets of the user's own design ---------------------------------------------------------------------------------
 
@@ -200,17 +198,13 @@ LOWEST, HIGHEST = (
 TOP = _row("TOP", 4, "candidates", "of each measure that are refitted", "judgement")
 STARTS = _row("STARTS", 2, "starts an effect", "two of one effect, or its starts crowd the others out", "judgement")
 WIDTH = _row("WIDTH", 3, "models", "carried from level to level", "judgement")
-BEHIND = _row(
-    "BEHIND", 400.0, "2 ln odds", "a model so far behind the best never led after another effect", "judgement"
-)  # fmt: skip
+BEHIND = _row("BEHIND", 400.0, "2 ln odds", "a model so far behind the best never led after another effect", "judgement")
 DEEPEST = _row("DEEPEST", 3, "effects", "at once; four together are hardly ever told apart", "judgement")
 DEEPER = _row(
     "DEEPER", 2.0 / 3.0, "of the base's |z|^2 above the noise", "where the best two leave more no third is sought",
     "derivation: of three right ones, found the largest first, the third takes a third at most where they do not bend alike",
 )  # fmt: skip
-FORM = _row(
-    "FORM", 0.15, "of the largest contribution", "a smaller effect may be what the large one's law gets wrong", BENCHMARK
-)  # fmt: skip
+FORM = _row("FORM", 0.15, "of the largest contribution", "a smaller effect may be what the large one's law gets wrong", BENCHMARK)
 HOPELESS = _row(
     "HOPELESS", 2.0, "times the least cost", "a fit that could at best end there is not finished; evidence forgives a smooth "
     "error, and that is less than what the best leaves", "judgement",
@@ -247,9 +241,7 @@ WORSE = _row(
     "WORSE", 1.005, "ratio", "of the headline's error on trials left out; refitting alone moves it by some thousandth, as it does "
     "where an effect shows elsewhere", "python -m pytest tests/test_choose.py",
 )  # fmt: skip
-HALVED = _row(
-    "HALVED", 4, "trials", "of fewer a half of the session is hardly more than a trial", "derivation: two and two"
-)  # fmt: skip
+HALVED = _row("HALVED", 4, "trials", "of fewer a half of the session is hardly more than a trial", "derivation: two and two")
 COARSELY = _row(
     "COARSELY", 1e-3, "of the cost", "as ROUGHLY, of fits to half of a session: what they leave of the other is known to a "
     "tenth at best",
@@ -293,6 +285,11 @@ TAILS = _row(
 LATE_ROWS = _row(
     "LATE_ROWS", 4000, "rows", "of the trials that move fastest: what tells a lag from a delay is there", "judgement: seconds"
 )
+
+PROBED = _row(
+    "PROBED", 4, "rows", "between readings that a law is probed at", "derivation: as many as a monotone cubic between rows weighs"
+)  # fmt: skip
+ENDED = _row("ENDED", 0.5, "ratio", "of the most that a lasting change does: a drive at its end does less", "judgement: half")
 
 # ---- judge -------------------------------------------------------------------------------------------------------------------
 
@@ -347,8 +344,7 @@ DOUBTFUL = _row(
 # ---- how trials repeat ----------------------------------------------------------------------------------------------------------
 
 OVERSTATED = _row(
-    "OVERSTATED", 3.0, "ratio", "of declared noise to what rows scatter by: a camera's is declared to a factor of two",
-    "judgement",
+    "OVERSTATED", 3.0, "ratio", "of declared noise to what rows scatter by: a camera's is declared to a factor of two", "judgement"
 )  # fmt: skip
 LASTING = _row(
     "LASTING", 1.0, "of the noise", "by which repeats differ throughout; load cells that read elsewhere next time make 0.6 on a "
