@@ -87,6 +87,15 @@ def test_a_drive_at_its_end_passes_none() -> None:
     np.testing.assert_allclose(found[INPUTS.command < 1.4], 1.0, rtol=1e-4)
 
 
+def test_play_between_antagonists_lies_on_the_pulling_side_and_passes_all() -> None:
+    """Alone it would stand still after each turn, and feel nothing until its gap is crossed."""
+    travel = 4e-3 * np.sin(0.3 * TIME)[:, None] * np.ones(3)
+    inputs, play = replace(INPUTS, command=travel, drives=(Drive.DISPLACEMENT,) * 3), law("tendon_backlash", gap=2e-3, swap=1e-3)
+    twin, noise = Twin(load("continuum"), {}, (play,)), np.full(3, 1e-6)
+    np.testing.assert_allclose(passed(twin, inputs, noise, antagonists=True), 1.0, rtol=1e-9)
+    assert np.abs(passed(twin, inputs, noise) - 1.0).max() > 0.1, "or this tells nothing"
+
+
 def test_a_body_that_creeps_feels_noise_less_than_what_lasts() -> None:
     """By 1 at once and by 1 + a in the end, of two elements 1 + a_1 (1 - mean exp(-t / tau_1)) + ... in a trial."""
     creep = law("backbone_creep", amplitude=0.2, time=1e-3 + 0.3, amplitude_2=0.3, time_2=1e4)

@@ -217,11 +217,11 @@ def test_a_law_that_lets_tendons_fall_slack_lacks_what_they_would_hear(
     shares = {2: np.array([[1.0, 0.1], [0.5, 0.75]]), 0: np.array([[0.3, 0.9]])}
     bench = SimpleNamespace(driven_by=lambda kind: np.full(2, kind is drive), inputs=shares)
     monkeypatch.setattr(
-        "twin.diagnose.study.passed", lambda twin, share, noise: share if (twin, len(noise)) == ("twin", 2) else 0.0
+        "twin.diagnose.study.passed", lambda twin, share, noise, pair: share if (twin, len(noise)) == ("twin", 2) else 0.0
     )
     study = Study(SimpleNamespace(whitener=SimpleNamespace(heard=heard, noise=noise), trials=[2, 0], bench=bench), None)  # type: ignore[arg-type]
     tension = {0: np.array([[0.0, 0.09]]), 1: np.zeros((5, 2)), 2: np.array([[0.19, 0.0], [0.1, 0.09]])}
-    traces = {k: SimpleNamespace(true=SimpleNamespace(tension=t)) for k, t in tension.items()}
+    traces = {k: SimpleNamespace(true=SimpleNamespace(tension=t, antagonists=False)) for k, t in tension.items()}
     fit = SimpleNamespace(evaluation=SimpleNamespace(traces=traces), model=SimpleNamespace(twin="twin"))
     assert study.unheard(fit) == pytest.approx(lacks)  # type: ignore[arg-type]
 

@@ -325,7 +325,7 @@ def fit(
     high = np.array([f.parameter.high for f in model.free]) / steps
     prior = np.array([f.parameter.value for f in model.free]) / steps
     weight = prior_weight(model) ** 2
-    cells = {e.id for e in model.twin.effects if e.acts_in("command")}
+    cells = {e.id for e in model.twin.effects if "load cells" in e.needs}
     silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
 
     def believed(x: np.ndarray) -> float:

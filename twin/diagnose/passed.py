@@ -16,7 +16,7 @@ from twin.diagnose.thresholds import ENDED, PROBED
 from twin.twin import Twin
 
 
-def passed(twin: Twin, inputs: Inputs, noise: np.ndarray) -> np.ndarray:
+def passed(twin: Twin, inputs: Inputs, noise: np.ndarray, antagonists: bool = False) -> np.ndarray:
     """Share (n, n_tendon) of the square of the readings' noise (n_tendon,) that moves the robot, of what a lasting change moves it.
 
     A body that creeps feels noise at once, by 1, and what lasts by 1 + sum_j a_j (1 - exp(-t / tau_j)), here in the trial's mean.
@@ -26,7 +26,8 @@ def passed(twin: Twin, inputs: Inputs, noise: np.ndarray) -> np.ndarray:
     if any(effect.acts_in("command", "drive") for effect in twin.effects):
 
         def driven(by: np.ndarray | float) -> np.ndarray:
-            return laws.drive(laws.command(replace(inputs, command=command + by * noise).signals)).command
+            read = replace(inputs, command=command + by * noise).signals.with_(antagonists=antagonists)
+            return laws.drive(laws.command(read)).command
 
         at, rows = driven(0.0), np.arange(len(command))[:, None] % PROBED
         lasting = (driven(1.0) - at) ** 2

@@ -48,7 +48,8 @@ class Study:
         near = np.where(bench.driven_by(Drive.TENSION), SILENT * drive, 0.0)
         lacking = 0.0
         for k, heard in zip(self.trials, whitener.heard, strict=True):
-            felt = np.where(traces[k].true.tension <= near, 0.0, passed(fit.model.twin, bench.inputs[k], drive))
+            true = traces[k].true
+            felt = np.where(true.tension <= near, 0.0, passed(fit.model.twin, bench.inputs[k], drive, true.antagonists))
             lacking += float((heard * (1.0 - felt)).sum())
         return lacking
 

@@ -95,7 +95,7 @@ class TendonBacklash(Effect):
     def _swap(self) -> np.ndarray:
         gap = self._gap()
         there = gap > 0.0
-        return self["swap"] * np.where(there, gap / max(gap[there].mean() if there.any() else 1.0, 1e-9), 1.0)
+        return self["swap"] * np.where(there, gap / gap[there].mean() if there.any() else 1.0, 1.0)
 
     def _side(self, signals: Signals) -> np.ndarray:
         if signals.antagonists:
