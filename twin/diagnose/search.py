@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.diagnose.null import Thresholds
 from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.ranking import rank
+from twin.diagnose.stilled import paid
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import BEHIND, DEEPER, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WIDTH
 from twin.diagnose.weigh import Laws, Weighed, better, extended, fuller, refit_without
@@ -133,16 +134,18 @@ def _in_company(study: Study, member: Weighed, best: Weighed, effects: set[str],
 
 
 def _leaner(study: Study, base: Weighed, best: Weighed, known: Known, accept: float) -> Weighed:
-    """Drop every effect beside the base's whose removal costs less evidence than `accept`; the last one stays."""
+    """Drop every effect beside the base's whose removal costs less evidence than `accept`, less what friction pays it (`paid`); the
+    last one stays."""
     while len(added := [e for e in best.effects if e not in base.effects]) > 1:
         reduced = []
         for effect in added:
             rest = best.laws_without(effect)
             if rest not in known:
                 known[rest] = refit_without(study, base, best, effect)
-            reduced.append(known[rest])
-        lean = max(reduced, key=lambda w: w.score)
-        if lean.score < best.score - accept:
+            reduced.append((known[rest], paid(study, best, known[rest])))
+        lean, due = max(reduced, key=lambda r: r[0].score + r[1])
+        if lean.score < best.score - due - accept:
             break
+        known[best.laws] = replace(best, score=best.score - due, unheard=best.unheard + due)
         best = lean
     return best

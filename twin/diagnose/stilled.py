@@ -1,0 +1,47 @@
+"""What an effect beside friction gains by noise that friction stills, which the robot has never felt.
+
+A tendon that rubs holds still under what its reading trembles by, the more so the farther from sliding it is, or the less it is
+pulled: laws that move it there are paid for it in |z|^2 though they need not be true. How much depends on travel, slip and tension
+row by row; no closed form tells, so that the twin is shaken by as much noise again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from twin.calibrate import Fit
+from twin.diagnose.study import Study
+from twin.diagnose.thresholds import SHAKEN
+from twin.diagnose.weigh import Weighed
+from twin.errors import SolveError
+from twin.twin import Way, readings, report, simulate
+
+
+def paid(study: Study, with_it: Weighed, without: Weighed) -> float:
+    """By how much more of the readings' noise than `Weighed.unheard` tells, in |z|^2, the one set keeps from a robot whose tendons
+    rub in both; 0 where they do not, where all the noise there is would not pay, or shaken the robot has no equilibrium."""
+    heard = sum(float(h.sum()) for h in study.objective.whitener.heard)
+    if not with_it.score - without.score < heard or not all(w.fit.model.twin.laws.route.mu > 0.0 for w in (with_it, without)):
+        return 0.0
+    try:
+        felt = [w.unheard + shaken(study, w.fit) for w in (with_it, without)]
+    except SolveError:
+        return 0.0
+    return max(0.0, felt[1] - felt[0])
+
+
+def shaken(study: Study, fit: Fit) -> float:
+    """|z|^2 of what moves when each reading is one standard deviation of its noise more or less, by lot; the mean of `SHAKEN` lots,
+    the same for every set. Raises SolveError."""
+    bench, whitener, twin = study.bench, study.objective.whitener, fit.model.twin
+    lots, total = np.random.default_rng(0), 0.0
+    at = [readings(bench, report(twin.effects, fit.evaluation.traces[k].true)) for k in study.trials]
+    for _ in range(SHAKEN):
+        signs = [lots.choice([-1.0, 1.0], size=i.command.shape) for i in bench.inputs]
+        inputs = tuple(replace(i, command=i.command + s * whitener.noise.drive) for i, s in zip(bench.inputs, signs, strict=True))
+        traces = simulate(twin, replace(bench, inputs=inputs), trials=study.trials, way=Way(fit.evaluation.traces))
+        moved = [readings(bench, report(twin.effects, t.true)) - y for t, y in zip(traces, at, strict=True)]
+        total += sum(float((whitener.trial(k, d) ** 2).sum()) for k, d in enumerate(moved))
+    return total / SHAKEN
