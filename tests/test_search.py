@@ -27,7 +27,7 @@ def told(effects: tuple[str, ...], score: float, fit: Any, form: str) -> Any:
     def without(effect: str) -> tuple[tuple[str, str], ...]:
         return tuple(law for law in laws if law[0] != effect)
 
-    return SimpleNamespace(effects=effects, laws=laws, laws_without=without, score=score, fit=fit, discrepancy=None)
+    return SimpleNamespace(effects=effects, laws=laws, laws_without=without, score=score, fit=fit, discrepancy=None, unheard=0.0)
 
 
 class World:
@@ -37,12 +37,14 @@ class World:
         self.worth, self.together = worth, together or {}
         self.square: dict[int, float] = {}  # |z|^2 by the number of effects, where it counts
         self.refitted: list[tuple[str, ...]] = []
+        self.paid: dict[str, float] = {}  # by friction, for noise that it stills, by the set
         self.anew: list[set[str]] = []
         monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: self.anew.append(among))
         monkeypatch.setattr(stage, "rank", self.rank)
         monkeypatch.setattr(stage, "extended", self.extended)
         monkeypatch.setattr(stage, "catalogue", lambda: dict.fromkeys(worth, SimpleNamespace(akin=())))
         monkeypatch.setattr(stage, "fuller", lambda study, w, accept: w)
+        monkeypatch.setattr(stage, "paid", lambda study, with_it, without: self.paid.get("+".join(with_it.effects), 0.0))
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
 
     def of(self, *effects: str) -> Any:
@@ -192,6 +194,19 @@ def test_of_two_the_one_that_the_other_does_without_is_dropped(monkeypatch: pyte
 
     monkeypatch.setattr(stage, "rank", rank)
     assert world.found().best.effects == ("creep",)
+
+
+@pytest.mark.parametrize(("due", "left"), [(75.0, ("creep", "friction")), (40.0, ("bias", "creep", "friction"))])
+def test_what_friction_pays_an_effect_is_no_evidence_for_it(
+    monkeypatch: pytest.MonkeyPatch, due: float, left: tuple[str, ...]
+) -> None:
+    """Of 75 that a bias is worth beside friction and creep; nor does the set lead that was paid. The bar is 12."""
+    monkeypatch.setattr(stage, "replace", lambda w, score, unheard: told(w.effects, score, w.fit, ""))
+    world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "bias": 75.0})
+    world.paid = {"bias+creep+friction": due}
+    found = world.found()
+    assert found.best.effects == left
+    assert (found.all[0].effects == ("bias", "creep", "friction")) is (due < 70.0)
 
 
 def test_where_no_further_effect_pays_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:

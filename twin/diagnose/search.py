@@ -146,6 +146,7 @@ def _leaner(study: Study, base: Weighed, best: Weighed, known: Known, accept: fl
         lean, due = max(reduced, key=lambda r: r[0].score + r[1])
         if lean.score < best.score - due - accept:
             break
-        known[best.laws] = replace(best, score=best.score - due, unheard=best.unheard + due)
+        if due > 0.0:
+            known[best.laws] = replace(best, score=best.score - due, unheard=best.unheard + due)
         best = lean
     return best

@@ -33,14 +33,15 @@ def paid(study: Study, with_it: Weighed, without: Weighed) -> float:
 
 
 def shaken(study: Study, fit: Fit) -> float:
-    """|z|^2 of what moves when each reading is one standard deviation of its noise more or less, by lot; the mean of `SHAKEN` lots,
-    the same for every set. Raises SolveError."""
+    """|z|^2 of what moves when as much noise is drawn onto the readings once more, in the mean of `SHAKEN` draws, the same ones for
+    every set. Raises SolveError."""
     bench, whitener, twin = study.bench, study.objective.whitener, fit.model.twin
-    lots, total = np.random.default_rng(0), 0.0
+    rng, total = np.random.default_rng(0), 0.0
     at = [readings(bench, report(twin.effects, fit.evaluation.traces[k].true)) for k in study.trials]
     for _ in range(SHAKEN):
-        signs = [lots.choice([-1.0, 1.0], size=i.command.shape) for i in bench.inputs]
-        inputs = tuple(replace(i, command=i.command + s * whitener.noise.drive) for i, s in zip(bench.inputs, signs, strict=True))
+        inputs = tuple(
+            replace(i, command=i.command + whitener.noise.drive * rng.normal(size=i.command.shape)) for i in bench.inputs
+        )
         traces = simulate(twin, replace(bench, inputs=inputs), trials=study.trials, way=Way(fit.evaluation.traces))
         moved = [readings(bench, report(twin.effects, t.true)) - y for t, y in zip(traces, at, strict=True)]
         total += sum(float((whitener.trial(k, d) ** 2).sum()) for k, d in enumerate(moved))
