@@ -135,7 +135,7 @@ def _in_company(study: Study, member: Weighed, best: Weighed, effects: set[str],
 
 def _leaner(study: Study, base: Weighed, best: Weighed, known: Known, accept: float) -> Weighed:
     """Drop every effect beside the base's whose removal costs less evidence than `accept`, less what friction pays it (`paid`); the
-    last one stays."""
+    last one stays. Of sets that lead the one left by effects more, too, what friction pays them is taken off."""
     while len(added := [e for e in best.effects if e not in base.effects]) > 1:
         reduced = []
         for effect in added:
@@ -146,7 +146,8 @@ def _leaner(study: Study, base: Weighed, best: Weighed, known: Known, accept: fl
         lean, due = max(reduced, key=lambda r: r[0].score + r[1])
         if lean.score < best.score - due - accept:
             break
-        if due > 0.0:
-            known[best.laws] = replace(best, score=best.score - due, unheard=best.unheard + due)
         best = lean
+    for laws, more in list(known.items()):
+        if more.score > best.score and set(laws) > set(best.laws) and (due := paid(study, more, best)) > 0.0:
+            known[laws] = replace(more, score=more.score - due, unheard=more.unheard + due)
     return best
