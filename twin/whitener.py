@@ -54,39 +54,40 @@ class Filter:
         before = np.vstack([before[:1] * 0, before[:-1]])
         last = present & (before == np.arange(n)[:, None] - 1)
         back = A[before, np.arange(A.shape[1])] * np.sqrt(held)[:, :, None]
-        covariance = np.zeros((n, t, t))
-        while True:
-            lacking = np.einsum("nmt,nmts,nms->nm", back, covariance[before], back, optimize=True)
-            self.scale = present / np.sqrt(spread + np.where(last, 0.0, lacking))
+        gap = present & ~last
+        covariance, own, settled = np.zeros((n, t, t)), spread.copy(), False
+        while not settled:
+            own[gap] = spread[gap] + np.einsum("kt,kts,ks->k", back[gap], covariance[before[gap]], back[gap])
+            self.scale = present / np.sqrt(own)
             self.F = A * self.scale[:, :, None]
             if covariance.any():
                 root = np.linalg.cholesky(np.concatenate([np.eye(t)[None], covariance[:-1]]))
-                again = np.einsum("nmt,nts->nms", np.where(last[:, :, None], back, 0.0), root) * self.scale[:, :, None]
-                self.F = np.concatenate([self.F, again], axis=2)
-            eigen, V = np.linalg.eigh(np.einsum("nmp,nmq->npq", self.F, self.F))
-            eigen = np.maximum(eigen, 1e-12)
-            told = np.einsum("nip,np,njp->nij", V[:, :t], 1.0 / (1.0 + eigen), V)
-            settled = not back.any() or np.abs(told[:, :, :t] - covariance).max() < SETTLED
-            covariance = told[:, :, :t]
-            if settled:
-                break
-        self.told = np.ascontiguousarray(told)
-        self.core = np.einsum("nip,np,njp->nij", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
+                self.F = np.concatenate([self.F, np.where(last[:, :, None], back, 0.0) @ root * self.scale[:, :, None]], axis=2)
+            gram = self.F.transpose(0, 2, 1) @ self.F
+            self.told = np.ascontiguousarray(np.linalg.inv(np.eye(gram.shape[1]) + gram)[:, :t])
+            settled = not back.any() or np.abs(self.told[:, :, :t] - covariance).max() < SETTLED
+            covariance = self.told[:, :, :t]
+        eigen, V = np.linalg.eigh(gram)
+        eigen = np.maximum(eigen, 1e-12)
+        self.core = V * ((1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen)[:, None, :] @ V.transpose(0, 2, 1)
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """z (n, m) of x (n, m), in sigmas, zero where nothing was measured."""
         return _whitened(np.ascontiguousarray(x), self.fade, self.gain, self.scale, self.A, self.F, self.core, self.told)
 
 
-def _alone(present: np.ndarray, share: np.ndarray, fade: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@jit
+def _alone(present, share, fade):
     """f K, P' + 1 - s and M^2 of each sample (n, m), before any input's noise."""
-    ahead, held = share.copy(), np.zeros_like(share)
-    gain, spread, memory = (np.empty(present.shape) for _ in range(3))
-    for i, seen in enumerate(present):
-        spread[i], memory[i] = ahead + 1.0 - share, held
-        K = np.where(seen, ahead / spread[i], 0.0)
-        gain[i], held = fade * K, fade**2 * ((1.0 - K) ** 2 * held + K**2)
-        ahead = fade**2 * (1.0 - K) * ahead + (1.0 - fade**2) * share
+    n, m = present.shape
+    gain, spread, memory = np.empty((n, m)), np.empty((n, m)), np.empty((n, m))
+    for j in range(m):
+        ahead, held, square = share[j], 0.0, fade[j] ** 2
+        for i in range(n):
+            spread[i, j], memory[i, j] = ahead + 1.0 - share[j], held
+            K = ahead / spread[i, j] if present[i, j] else 0.0
+            gain[i, j], held = fade[j] * K, square * ((1.0 - K) ** 2 * held + K**2)
+            ahead = square * (1.0 - K) * ahead + (1.0 - square) * share[j]
     return gain, spread, memory
 
 
@@ -144,11 +145,11 @@ class Whitener:
     def _heard(self, k: int, G: np.ndarray) -> np.ndarray:
         """Each row's noise by itself, of all rows that are so far apart that none is felt in another's."""
         n, _, n_tendon = G.shape
-        heard = np.zeros((n, n_tendon))
+        heard, steps = np.zeros((n, n_tendon)), min(APART, n) if self.filters[k].gain.any() else 1
         for t in np.flatnonzero(self.noise.drive):
             noise = self.noise.drive[t] * G[:, :, t]
-            for first in range(min(APART, n)):
-                apart = np.arange(first, n, APART)
+            for first in range(steps):
+                apart = np.arange(first, n, steps)
                 row = np.zeros_like(noise)
                 row[apart] = noise[apart]
                 heard[apart, t] = np.add.reduceat((self.trial(k, row) ** 2).sum(axis=1), apart)
