@@ -39,7 +39,7 @@ def calibrated(recording: Recording) -> tuple[Bench, list[int], Fit, Discrepancy
     bench = prepare(recording, ROBOT)
     fitted = split(bench, Settings().seed)[0]
     found = calibration(recording, Twin.of(ROBOT))[0]
-    return bench, fitted, found, Evidence(bench, fitted).discrepancy(found.z)
+    return bench, fitted, found, Evidence(bench, fitted, np.zeros(bench.n_tendon)).discrepancy(found.z)
 
 
 def residual(recording: Recording) -> tuple[Bench, list[int], np.ndarray]:

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from twin.bench import Bench, prepare
-from twin.diagnose.evidence import COMPONENTS, Evidence, Spectrum, regressors, slope
+from twin.diagnose.evidence import COMPONENTS, Evidence, Spectrum, quiet, regressors, slope
 from twin.diagnose.thresholds import HIGHEST, LOWEST, MEMORY, NOTHING
 from twin.measurements import Channel, Recording, Trial
 from twin.robots import load
@@ -18,20 +18,20 @@ N, TRIALS = 30, 3
 ROWS = slice(N, 2 * N)  # of the second trial
 
 
-def made() -> Bench:
+def made(n: int = N) -> Bench:
     """Three trials of two tendons, the second in uneven rows, later and warmer, with some markers missing."""
     channels = [Channel(f"tendon_{i}_tension", "input", "N") for i in (1, 2, 3)]
     channels += [Channel(f"disk_8_{a}", "output", "mm") for a in "xyz"] + [Channel("tendon_1_displacement", "output", "mm")]
     channels += [Channel("ambient_temperature", "context", "K")]
     trials = []
     for k in range(TRIALS):
-        time = np.linspace(0.0, 20.0, N) + (k == 1) * 0.3 * np.sin(np.arange(N))
-        values = {c.name: np.zeros(N) for c in channels} | {"ambient_temperature": np.full(N, 293.0 + 2.0 * k)}
+        time = np.linspace(0.0, 20.0, n) + (k == 1) * 0.3 * np.sin(np.arange(n)) * N / n
+        values = {c.name: np.zeros(n) for c in channels} | {"ambient_temperature": np.full(n, 293.0 + 2.0 * k)}
         values["tendon_1_tension"] = (1.0 + k) * np.sin(np.pi * time / 20.0) ** 2
         values["tendon_2_tension"] = 1.5 + np.cos(0.4 * time + k)
         if k == 1:
             for a in "xyz":
-                values[f"disk_8_{a}"] = np.where(np.arange(N) % 7 == 3, np.nan, 0.0)
+                values[f"disk_8_{a}"] = np.where(np.arange(n) % 7 == 3, np.nan, 0.0)
         trials.append(Trial(f"{k}.csv", time, values, {"tip_payload": 0.01 * k}, start=100.0 * k))
     return prepare(
         Recording("continuum", "made", "simulation: none", np.zeros(3), tuple(channels), tuple(trials)), load("continuum")
@@ -39,7 +39,7 @@ def made() -> Bench:
 
 
 BENCH = made()
-EVIDENCE = Evidence(BENCH, range(TRIALS))
+EVIDENCE = Evidence(BENCH, range(TRIALS), np.zeros(3))
 M = len(BENCH.outputs)
 
 
@@ -110,9 +110,36 @@ def test_columns_are_made_white_by_the_inverse(residual: np.ndarray) -> None:
         )
 
 
+def test_a_reading_within_its_noise_is_what_its_neighbours_tell_and_a_step_stays() -> None:
+    """By hand, in uneven rows: on a straight line but for 0.02 at one row, and a step of 1, under a noise of 0.01 N (three of it,
+    sqrt(1 + 1/9 + 4/9) times for the neighbours' own, are 0.037)."""
+    time = np.array([0.0, 1.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    straight = 0.5 + 0.1 * time
+    inputs = replace(BENCH.inputs[0], time=time, command=np.stack([straight + 0.02 * (time == 3.0), 1.0 * (time > 4.5)], axis=1))
+    told = quiet(inputs, np.array([0.01, 0.01]))
+    # the rows beside it lean on it: by 1/3 of the way back at 1.0 s, by half of it at 4.0 s
+    np.testing.assert_allclose(told[:, 0], straight + 0.02 * np.array([0.0, 1.0 / 3.0, 0.0, 0.5, 0.0, 0.0, 0.0]), atol=1e-12)
+    np.testing.assert_array_equal(told[:, 1], inputs.command[:, 1])
+    np.testing.assert_array_equal(quiet(inputs, np.zeros(2)), inputs.command)
+
+
+def test_a_residual_that_is_a_readings_noise_is_no_error_of_the_model() -> None:
+    """An output that its tendon's noisy reading moves, and nothing else: white, and yet like each reading less what it was of late.
+    What is told of it as the bench has it (a gain of hundreds) is none once the readings are quiet."""
+    rng, noise, n = np.random.default_rng(8), 0.05, 600
+    bench = made(n)
+    drawn = [noise * rng.normal(size=i.command.shape) for i in bench.inputs]
+    noisy = replace(bench, inputs=tuple(replace(i, command=i.command + e) for i, e in zip(bench.inputs, drawn, strict=True)))
+    z = rng.normal(size=(n * TRIALS, M))
+    z[:, -1] = -np.concatenate(drawn)[:, 0] / noise
+    as_read, quietly = (Evidence(noisy, range(TRIALS), np.full(3, x)).discrepancy(z) for x in (0.0, noise))
+    assert as_read.gain > 100.0
+    assert quietly.gain < 0.1 * as_read.gain
+
+
 def test_what_an_error_could_move_with_is_what_its_name_says() -> None:
     """Columns of unit RMS, proportional to pulls over the largest, their products, slopes, lags, time and temperature."""
-    phi, inputs = regressors(BENCH, range(TRIALS)), BENCH.inputs
+    phi, inputs = regressors(BENCH, range(TRIALS), np.zeros(3)), BENCH.inputs
     named = dict(zip(phi.names, phi.matrix.T, strict=True))
     np.testing.assert_allclose(np.mean(phi.matrix**2, axis=0), 1.0)
     top = np.max([i.command.max() for i in inputs])

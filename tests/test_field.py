@@ -26,7 +26,7 @@ def found_on(bench: Day, effect: str | None, strength: float) -> tuple[Field | N
     prepared = prepare(recording, robot)
     trials = list(range(len(prepared.inputs)))
     start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
-    study = Study(objective, Evidence(prepared, trials))
+    study = Study(objective, Evidence(prepared, trials, objective.whitener.noise.drive))
     final = weigh(study, fit(objective, start, refresh=True))
     tip = np.concatenate([final.fit.evaluation.traces[k].true.markers[:, -1] for k in trials])
     return field(study, final), tip, truth

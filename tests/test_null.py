@@ -35,7 +35,7 @@ def calibrated(bench: Day) -> Any:
     prepared = prepare(bench(None)[0].select(["slow_1", "pair_3", "circle_1", "circle_2"]), robot)
     start, objective, _ = objective_of(prepared, Twin.of(robot), [0, 1, 2, 3], Settings(jobs=1))
     base = fit(objective, start, refresh=True)
-    study = Study(objective, Evidence(prepared, [0, 1, 2, 3]))
+    study = Study(objective, Evidence(prepared, [0, 1, 2, 3], objective.whitener.noise.drive))
     return SimpleNamespace(study=study, base=base, patterns=dictionary(objective, base))
 
 

@@ -51,7 +51,7 @@ def fitted_alone(bench: Day, effect: str, seed: int = 5, design: str = "") -> tu
     trials = list(range(len(prepared.inputs)))
     start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
     base = fit(objective, start, refresh=True)
-    study = Study(objective, Evidence(prepared, trials))
+    study = Study(objective, Evidence(prepared, trials, objective.whitener.noise.drive))
     every = rank(objective, study.evidence, base, weigh(study, base).discrepancy, dictionary(objective, base, {effect}), top=99)
     found = [c for c in every if c.effect == effect][:BEST]
     assert found, "the screening must see an effect of this size"
@@ -92,7 +92,7 @@ def taken_for(bench: Day, true: str, wrong: str) -> tuple[Study, Search, Truth]:
     prepared = prepare(recording, robot)
     trials = list(range(len(prepared.inputs)))
     start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
-    study = Study(objective, Evidence(prepared, trials))
+    study = Study(objective, Evidence(prepared, trials, objective.whitener.noise.drive))
     base = weigh(study, fit(objective, start, refresh=True))
     taken = extended(study, base, wrong, next(iter(catalogue()[wrong].starts([], 3))))
     assert taken is not None
@@ -147,7 +147,7 @@ def test_ageing_that_levels_off_is_found_with_the_rate_at_which_it_does(bench: D
     trials = list(range(len(prepared.inputs)))
     start, objective, _ = objective_of(prepared, Twin.of(robot), trials, Settings())
     base = fit(objective, start, refresh=True)
-    study = Study(objective, Evidence(prepared, trials))
+    study = Study(objective, Evidence(prepared, trials, objective.whitener.noise.drive))
     first, *others = rank(objective, study.evidence, base, weigh(study, base).discrepancy, dictionary(objective, base))
     assert (first.effect, first.start.free) == ("backbone_ageing", ("rate", "levelling"))
     assert all(o.gain < first.gain for o in others)

@@ -31,7 +31,7 @@ def calibrated(recording: Recording) -> tuple[Study, Fit]:
     bench = prepare(recording, robot)
     trials = list(range(len(bench.inputs)))
     start, objective, _ = objective_of(bench, Twin.of(robot), trials, Settings())
-    return Study(objective, Evidence(bench, trials)), fit(objective, start, refresh=True)
+    return Study(objective, Evidence(bench, trials, objective.whitener.noise.drive)), fit(objective, start, refresh=True)
 
 
 @pytest.mark.parametrize("effect", [None, "backbone_creep", "base_tilt", "contact", "magnet"])

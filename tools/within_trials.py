@@ -68,7 +68,9 @@ def judged(recording: Recording) -> Within:
     found = fit(objective, start, refresh=True)
     G = sensitivity_at(objective, found.evaluation)
     rows = row_noise(bench, found.evaluation.raw, G, objective.whitener.noise.drive)
-    return within(Study(objective, Evidence(bench, trials)), found, rows, G, np.ones(len(bench.outputs), bool))
+    return within(
+        Study(objective, Evidence(bench, trials, objective.whitener.noise.drive)), found, rows, G, np.ones(len(bench.outputs), bool)
+    )
 
 
 if __name__ == "__main__":

@@ -44,7 +44,9 @@ class Calibrated:
         bench = prepare(recording, twin.robot)
         fitted, held = split(bench, settings.seed)
         start, objective, _ = objective_of(bench, twin, fitted, settings)
-        return Calibrated(bench, held, objective, Evidence(bench, fitted), fit(objective, start, refresh=True))
+        return Calibrated(
+            bench, held, objective, Evidence(bench, fitted, objective.whitener.noise.drive), fit(objective, start, refresh=True)
+        )
 
     def screened(self, at: Fit) -> list[Candidate]:
         """Effects not in force whose pattern lowers |z|^2 by more than p log n to first order, at their best start, best first."""

@@ -35,7 +35,7 @@ def calibrate(
     bench, alone = without_spikes(blind(bench, sealed), nominal)
     progress("noise")
     start, objective, notes = objective_of(bench, twin, fitted, settings)
-    study = Study(objective, Evidence(bench, fitted), progress, budget)
+    study = Study(objective, Evidence(bench, fitted, objective.whitener.noise.drive), progress, budget)
     progress("calibration")
     return study, weigh(study, _with_jumps(study, fit(objective, start, refresh=True))), [*alone, *notes]
 

@@ -37,14 +37,14 @@ class Regressors:
     names: tuple[str, ...]
 
 
-def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
-    """What an unnamed error could move with, on the listed trials' samples (n, p)."""
+def regressors(bench: Bench, trials: Sequence[int], noise: np.ndarray) -> Regressors:
+    """What an unnamed error could move with, on the listed trials' samples (n, p); `noise` (n_tendon,) is the readings'."""
     inputs = [bench.inputs[k] for k in trials]
     span = np.max([np.abs(i.command).max(axis=0) for i in inputs], axis=0)
     held = bench.driven_by(Drive.DISPLACEMENT)
     for kind in (held, ~held):  # tendons driven alike have one scale
         span[kind] = max(span[kind].max(initial=0.0), 1e-9)
-    u = [i.command / span for i in inputs]
+    u = [quiet(i, noise) / span for i in inputs]
     slopes = [slope(i, w) for i, w in zip(inputs, u, strict=True)]
     typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
     U, dU = np.concatenate(u), np.concatenate(slopes)
@@ -94,6 +94,18 @@ def regressors(bench: Bench, trials: Sequence[int]) -> Regressors:
     return Regressors(np.stack(columns, axis=1), np.array(component), tuple(names))
 
 
+def quiet(inputs: Inputs, noise: np.ndarray) -> np.ndarray:
+    """Commands (n, n_tendon), each as the rows beside it tell, unless it differs from that by more than three of its `noise`
+    (n_tendon,): a regressor with a reading's own noise in it is like the residual, which has it too, though nothing is missing."""
+    u, t = inputs.command, inputs.time
+    if len(u) < 3:
+        return u
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    between = (1.0 - share) * u[:-2] + share * u[2:]
+    within = np.abs(u[1:-1] - between) < 3.0 * noise * np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    return np.concatenate([u[:1], np.where(within, between, u[1:-1]), u[-1:]])
+
+
 def slope(inputs: Inputs, u: np.ndarray) -> np.ndarray:
     """du/dt (n, n_tendon) of commands smoothed over three samples, so that noise alone makes no direction."""
     padded = np.pad(u, ((1, 1), (0, 0)), mode="edge")
@@ -141,10 +153,11 @@ class Discrepancy:
 
 
 class Evidence:
-    """Discrepancy of whitened residuals on fixed trials; everything that does not depend on the residual is made once."""
+    """Discrepancy of whitened residuals on fixed trials, of readings with that `noise` (n_tendon,) N, m or A; everything that does
+    not depend on the residual is made once."""
 
-    def __init__(self, bench: Bench, trials: Sequence[int]) -> None:
-        self.phi = regressors(bench, trials)
+    def __init__(self, bench: Bench, trials: Sequence[int], noise: np.ndarray) -> None:
+        self.phi = regressors(bench, trials, noise)
         groups = list(dict.fromkeys(o.group for o in bench.outputs))
         self.groups = groups
         self.member = np.array([groups.index(o.group) for o in bench.outputs])
