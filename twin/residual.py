@@ -13,9 +13,9 @@ from twin.autocorrelation import autocorrelation
 from twin.bench import Bench, Inputs
 from twin.effects import Drive
 from twin.noise import DECLARED, Noise
-from twin.whitener import Whitener
 
 LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
+OWN = 0.1  # of what sensors see: where it is less, inputs' noise hides what their own remembers, and it hardly matters
 LAGS = (1, 2, 3, 4)  # rows, at which what noise remembers is read off repeats
 CLEAR = 3.0  # standard errors of a correlation that is clearly there
 MOST = 0.9  # correlation from row to row: beyond it noise is no noise, but drifts
@@ -205,25 +205,32 @@ def _remembered(
 ) -> tuple[np.ndarray, np.ndarray]:
     """How differences d remember, by group: `rho` and `fade` of a Noise, zero unless clearly there (3 standard errors).
 
-    Rows white across channels, C^(-1/2) d of the covariance C in sigmas, have the lagged covariances g_k C^(-1/2) C^(-1/2), where
-    g_k is a sensor's own: what inputs add is each row's own, and their directions tell little of it. Noise is AR(1) unless g_2 is
-    clearly more than g_1^2; then s f^k is fitted to g_1 .. g_4.
+    Rows x in sigmas, of the covariance C across channels, have the lagged covariances g_k I, where g_k is a sensor's own: what
+    inputs add is each row's own. Those of y = C^-1 x are g_k C^-2, so that directions in which inputs are most of the noise tell
+    little, as the score of the likelihood has it. Noise is AR(1) unless g_2 is clearly more than g_1^2; then s f^k is fitted to
+    g_1 .. g_4.
     """
-    white = Whitener(noise, d, G, [np.zeros((len(g), g.shape[2])) for g in G])
-    z = [white.trial(k, x) for k, x in enumerate(d)]
     A = [noise.drive * g / noise.sigma[:, None] * np.isfinite(x)[:, :, None] for g, x in zip(G, d, strict=True)]
-    inner = [np.linalg.inv(np.eye(a.shape[2]) + np.einsum("nmt,nms->nts", a, a)) for a in A]
-    alone = [np.isfinite(x) - np.einsum("nmt,nts,nms->nm", a, i, a, optimize=True) for x, a, i in zip(d, A, inner, strict=True)]
+    inner = [np.linalg.inv(np.eye(a.shape[2]) + a.transpose(0, 2, 1) @ a) for a in A]
+    inverse = [
+        np.isfinite(x)[:, :, None] * np.eye(member.size) - a @ i @ a.transpose(0, 2, 1) for x, a, i in zip(d, A, inner, strict=True)
+    ]
+    y = [(C @ np.nan_to_num(x / noise.sigma)[:, :, None])[:, :, 0] for x, C in zip(d, inverse, strict=True)]
     rho, fade = np.zeros(member.size), np.zeros(member.size)
     for g in range(member.max() + 1):
-        columns = member == g
-        power = sum(float((x[:, columns] ** 2 * s[:, columns]).sum()) for x, s in zip(z, alone, strict=True))
-        sure = CLEAR * np.sqrt(sum(x[1:, columns].size for x in z)) / power if power > 0.0 else np.inf
-        lagged = np.array([sum(float((x[k:, columns] * x[:-k, columns]).sum()) for x in z) for k in LAGS]) / max(power, 1e-300)
+        own = member == g
+        told = sum(float((C[:, own] ** 2).sum()) for C in inverse)  # trace of C^-2
+        spread = np.sqrt(sum(float((C[:, own][:, :, own] ** 2).sum()) for C in inverse))
+        alone = sum(float(C[:, own, own].sum()) for C in inverse)  # of as many squares as were seen, the sensors' own
+        if not alone > OWN * sum(float(np.isfinite(x[:, own]).sum()) for x in d):
+            continue
+        power = sum(float((x[:, own] ** 2).sum()) for x in y) / alone
+        lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in LAGS]) / (told * power)
+        sure = CLEAR * spread / told
         if lagged[0] > sure:
-            rho[columns] = fade[columns] = min(lagged[0], MOST)
+            rho[own] = fade[own] = min(lagged[0], MOST)
             if lagged[1] - lagged[0] ** 2 > sure * np.sqrt(1.0 + 4.0 * lagged[0] ** 2):
-                rho[columns], fade[columns] = _fading(lagged)
+                rho[own], fade[own] = _fading(lagged)
     return rho, fade
 
 
