@@ -16,10 +16,9 @@ from twin.diagnose.stilled import paid, shaken
 from twin.effects import Effect, named
 from twin.errors import SolveError
 from twin.measurements import Channel, Recording, Trial
-from twin.noise import Noise
+from twin.residual import Noise, Whitener
 from twin.robots import load
 from twin.twin import Twin, readings, report, simulate
-from twin.whitener import Whitener
 
 N, CELL, SIGMA = 160, 0.03, 2e-4  # rows; N, m
 PULLS = tuple(Channel(f"tendon_{i}_tension", "input", "N", CELL) for i in (1, 2, 3))

@@ -20,8 +20,7 @@ from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import ALONE, EVEN, RIVAL
 from twin.information import solve
-from twin.noise import Noise
-from twin.whitener import Whitener
+from twin.residual import Noise, Whitener
 
 Share = tuple[str, float]
 
