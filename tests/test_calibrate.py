@@ -24,12 +24,13 @@ from twin.effects import catalogue
 from twin.errors import SolveError
 from twin.information import solve, untold
 from twin.measurements import Recording, read
+from twin.noise import Noise
 from twin.quantities import Parameter
-from twin.residual import Noise, Whitener
 from twin.robots import load
 from twin.robots.robot import models_folder
 from twin.twin import Trace, Twin
 from twin.twin import _trial as one
+from twin.whitener import Whitener
 
 SEEDS = (5, 6)
 ROBOT = load("continuum")

@@ -15,9 +15,10 @@ from twin.bench import Inputs
 from twin.calibrate import NUDGE, Evaluation, Model, Objective, fit
 from twin.effects import Loads, catalogue
 from twin.effects.effect import Drive
-from twin.residual import BLUR, SILENT, Noise, Whitener
+from twin.noise import Noise
 from twin.robots import load
 from twin.twin import Twin
+from twin.whitener import BLUR, SILENT, Whitener
 
 ROBOT = load("continuum")
 N, CELL, REST = 1500, 0.03, 0.06  # rows; N, a reading's noise and the tension of two tendons at rest

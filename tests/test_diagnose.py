@@ -17,11 +17,13 @@ from twin.diagnose import Diagnosis, Settings, calibration, diagnose
 from twin.diagnose.split import split
 from twin.errors import DataError
 from twin.measurements import Channel, Recording, Trial
+from twin.noise import Noise
 from twin.report import contents
-from twin.residual import Noise, Whitener, estimate_noise, repeats
+from twin.residual import estimate_noise, repeats
 from twin.robots import load
 from twin.storage import twin_table
 from twin.twin import Twin
+from twin.whitener import Whitener
 
 ROBOT = load("continuum")
 FEW = ["slow_1", "slow_2", "pair_3", "circle_1", "circle_2", "wander_3"]

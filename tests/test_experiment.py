@@ -19,7 +19,7 @@ from twin.diagnose import experiment as stage
 from twin.diagnose.experiment import Experiment, menu, next_experiment
 from twin.effects import Drive
 from twin.errors import SolveError
-from twin.residual import Noise
+from twin.noise import Noise
 
 
 @cache

@@ -20,8 +20,9 @@ from twin.diagnose.identifiability import Visibility, identifiability
 from twin.diagnose.patterns import Dictionary, Pattern, dictionary
 from twin.diagnose.thresholds import CLEAR
 from twin.effects import Start, catalogue
-from twin.residual import Noise, Whitener
+from twin.noise import Noise
 from twin.twin import Twin
+from twin.whitener import Whitener
 
 SIGMA = {"marker": 2.5e-4, "displacement": 5e-5, "tension": 1e-2}  # m, m, N
 MATERIAL = 0.1  # sigma

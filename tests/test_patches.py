@@ -18,7 +18,7 @@ from twin.errors import DataError
 from twin.evaluate import rms
 from twin.measurements import Clouds, Recording, Trial, write
 from twin.measurements.patches import BANDS, FEWEST, NEIGHBOURS, PATCHES, SHARED, cut, scatter, side
-from twin.residual import Noise
+from twin.noise import Noise
 from twin.robots import load
 from twin.soft import SoftBody
 from twin.soft.skin import GRAZING, Skin, stand

@@ -13,7 +13,7 @@ from twin.diagnose import repeatability as stage
 from twin.diagnose.repeatability import repeatability
 from twin.diagnose.thresholds import BREAK, LASTING, OVERSTATED
 from twin.errors import SolveError
-from twin.residual import DECLARED, Noise
+from twin.noise import DECLARED, Noise
 
 ROWS, OUTPUTS, SCATTER = 400, 6, 2e-4  # m
 

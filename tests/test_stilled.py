@@ -16,9 +16,10 @@ from twin.diagnose.stilled import paid, shaken
 from twin.effects import Effect, named
 from twin.errors import SolveError
 from twin.measurements import Channel, Recording, Trial
-from twin.residual import Noise, Whitener
+from twin.noise import Noise
 from twin.robots import load
 from twin.twin import Twin, readings, report, simulate
+from twin.whitener import Whitener
 
 N, CELL, SIGMA = 160, 0.03, 2e-4  # rows; N, m
 PULLS = tuple(Channel(f"tendon_{i}_tension", "input", "N", CELL) for i in (1, 2, 3))
@@ -53,7 +54,7 @@ def studied(*effects: Effect, at: Bench = BENCH) -> tuple[Any, Any]:
 
 
 def test_a_body_without_friction_feels_all_of_it() -> None:
-    """What its readings' noise is told to add; the whitener is told of no change of pulls. 1,920 squares: 3 %."""
+    """What its readings' noise is told to add: pulls change so slowly that SYNC adds nothing. 1,920 squares: 3 %."""
     study, fit = studied()
     assert shaken(study, fit) == pytest.approx(float(study.objective.whitener.heard[0].sum()), rel=0.1)
 

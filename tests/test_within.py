@@ -19,7 +19,7 @@ from twin.diagnose.repeatability import repeatability
 from twin.diagnose.study import Study
 from twin.diagnose.within import Moving, Within, _judged, _unseen
 from twin.measurements import Recording
-from twin.residual import DECLARED, Noise
+from twin.noise import DECLARED, Noise
 from twin.robots import load
 from twin.twin import Twin
 

@@ -22,9 +22,9 @@ from twin.effects import Drive, Effect, named
 from twin.errors import SolveError
 from twin.information import scatter, solve, untold
 from twin.quantities import Fitted, Parameter
-from twin.residual import Whitener
 from twin.robots import Robot
 from twin.twin import Trace, Twin, Way, readings, report, simulated
+from twin.whitener import Whitener
 
 ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance

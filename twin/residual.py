@@ -1,131 +1,29 @@
-"""Measured - predicted, in sensor sigmas: how large the noise is, and the residual made white by it.
-
-Two noises meet in a marker. Its own, sigma, and that of the readings that drive the twin (tensions or displacements): one wrong
-by du moves the predicted shape by G du, the same way in all channels; so does a row whose inputs and markers were not taken at
-quite the same moment, by a small share of the input's change from row to row. With A = sigma_u G / sigma the residual in sigmas has
-covariance
-I + A A', and C^(-1/2) r = r + A V diag((1/sqrt(1+l) - 1)/l) V' A' r (A'A = V l V') makes it white across channels. Successive
-samples may still be correlated (AR(1), rho per group); z_k = (x_k - rho^g x_(k-g)) / sqrt(1 - rho^(2g)) over a gap of g samples.
-
-A tendon that a law makes slack does not feel its reading's noise, and |z|^2 falls by it though the law need not be true: the robot
-has never felt it. `Whitener.heard` is what that noise adds where the tendon is taut, so that laws can be compared without it
-(the corrected score of errors in variables, Nakamura, Biometrika 77, 1990). A tendon that a law leaves x noises above slack feels
-max(0, x + e): of the noise's square 1 - Var max(0, x + e) is lost, which is the share of readings under `SILENT`, to 0.03.
-"""
+"""The noise of a robot's sensors and driving readings, read off measured - predicted."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import ndtr
 from scipy.stats import chi2
 
 from twin.autocorrelation import autocorrelation
 from twin.bench import Bench, Inputs
 from twin.effects import Drive
+from twin.noise import DECLARED, Noise
 
-DECLARED = "as declared"
-SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
-SILENT = 0.4  # noises of a reading above slack: as many are below as noise's square is cut off there
-BLUR = 0.25  # noises, over which that is blurred where a fit is to feel it: derivatives then reach the readings beside it
 LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
+OWN = 0.1  # of what sensors see: where it is less, inputs' noise hides what their own remembers, and it hardly matters
+LAGS = (1, 2, 3, 4)  # rows, at which what noise remembers is read off repeats
+CLEAR = 3.0  # standard errors of a correlation that is clearly there
+MOST = 0.9  # correlation from row to row: beyond it noise is no noise, but drifts
+SLOWEST = 0.97  # the same, of what lasts beside white noise
 OUTLYING = 1e-6  # probability: rows that noise makes less often are not noise
 SAME = (
     0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
 )
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations: sigma (n_output,) SI per channel; drive (n_tendon,) N or m of a driving reading; rho (n_output,)
-    lag-1 correlation."""
-
-    sigma: np.ndarray
-    drive: np.ndarray
-    rho: np.ndarray
-    source: str
-
-    @property
-    def declared(self) -> bool:
-        return self.source == DECLARED
-
-    def floor(self, bench: Bench, sensitivity: Sequence[np.ndarray]) -> dict[str, float]:
-        """RMS error a perfect twin would still show, by group (m; Euclidean per marker).
-
-        The sensors' noise, and that of the readings it is driven by, through the sensitivities (n_k, n_output, n_tendon).
-        """
-        driven = np.mean([((G * self.drive) ** 2).sum(axis=2).mean(axis=0) for G in sensitivity], axis=0)  # (n_output,)
-        floors = {}
-        for group in dict.fromkeys(o.group for o in bench.outputs):
-            square = float(np.mean([self.sigma[j] ** 2 + driven[j] for j, o in enumerate(bench.outputs) if o.group == group]))
-            floors[group] = float(np.sqrt(square * (3.0 if group == "marker" else 1.0)))
-        return floors
-
-
-class Whitener:
-    """Makes residuals and their derivatives white, given a Noise and sensitivities G (n_k, n_output, n_tendon) to the commands;
-    `taut` are those of tendons held taut, where some are slack.
-
-    `heard` (n_k, n_tendon): the expected |z|^2 of a row that a reading's noise is in, of a tendon that is taut.
-    """
-
-    def __init__(
-        self, noise: Noise, measured: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], command: Sequence[np.ndarray],
-        taut: Sequence[np.ndarray] | None = None,
-    ) -> None:  # fmt: skip
-        self.noise = noise
-        self.present = [np.isfinite(y) for y in measured]
-        self._mix = [self._across(p, g, u) for p, g, u in zip(self.present, sensitivity, command, strict=True)]
-        self._memory = [self._along(p) for p in self.present]
-        self.heard = [self._heard(k, G) for k, G in enumerate(taut or sensitivity)]
-
-    def _across(self, present: np.ndarray, G: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        change = np.abs(np.diff(command, axis=0, prepend=command[:1], append=command[-1:]))  # (n + 1, t)
-        spread = np.hypot(self.noise.drive, SYNC * np.maximum(change[1:], change[:-1]))  # (n, t)
-        A = spread[:, None, :] * G / self.noise.sigma[:, None] * present[:, :, None]  # (n, m, t)
-        eigen, V = np.linalg.eigh(np.einsum("nmt,nms->nts", A, A))
-        eigen = np.maximum(eigen, 1e-12)
-        core = np.einsum("nij,nj,nkj->nik", V, (1.0 / np.sqrt(1.0 + eigen) - 1.0) / eigen, V)
-        return A, core
-
-    def _heard(self, k: int, G: np.ndarray) -> np.ndarray:
-        a = self.noise.drive * G / self.noise.sigma[:, None] * self.present[k][:, :, None]
-        A, core = self._mix[k]
-        white = a + np.einsum("nmt,nts,nls,nlr->nmr", A, core, A, a, optimize=True)
-        _, decay, scale = self._memory[k]
-        return np.einsum("nm,nmt,nmt->nt", (1.0 + decay**2) * scale**2, white, white)
-
-    def cut_off(self, k: int, tension: np.ndarray) -> np.ndarray:
-        """Of `heard`, what is cut off near slack where a law has a tendon under tension (n_k, n_tendon) N, slack below zero."""
-        above = np.divide(tension, self.noise.drive, out=np.full_like(tension, np.inf), where=self.noise.drive > 0.0)
-        return self.heard[k] * ndtr((SILENT - above) / BLUR)
-
-    def of(self, which: Sequence[int]) -> Whitener:
-        """The same of some of its trials alone, by their positions."""
-        part = copy(self)
-        for name in ("present", "heard", "_mix", "_memory"):
-            setattr(part, name, [getattr(self, name)[k] for k in which])
-        return part
-
-    def trial(self, k: int, r: np.ndarray) -> np.ndarray:
-        """Whitened residual (n, m) of trial k; zero where nothing was measured. Works for columns of a Jacobian alike."""
-        present = self.present[k]
-        x = np.where(present, r, 0.0) / self.noise.sigma
-        A, core = self._mix[k]
-        x = x + np.einsum("nmt,nt->nm", A, np.einsum("nts,ns->nt", core, np.einsum("nmt,nm->nt", A, x)))
-        before, decay, scale = self._memory[k]
-        return (x - decay * np.take_along_axis(x, before, axis=0)) * scale
-
-    def _along(self, present: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """For each sample (n, m): the row of the one measured before it, its correlation with that one, and 1 / the spread left."""
-        rows = np.arange(len(present))[:, None]
-        before = np.vstack([np.full((1, present.shape[1]), -1), np.maximum.accumulate(np.where(present, rows, -1), axis=0)[:-1]])
-        decay = np.where(before < 0, 0.0, self.noise.rho ** (rows - before))
-        return np.maximum(before, 0), decay, present / np.sqrt(1.0 - decay**2)
 
 
 def repeats(bench: Bench) -> list[tuple[int, int]]:
@@ -168,6 +66,7 @@ def estimate_noise(
     drive = cells if np.isfinite(cells).all() else None
     notes = []
     groups, member = _members(bench)
+    rho = np.zeros(member.size)
     if pairs:
         reading = bench.reading if drive is None else drive
         d = [
@@ -194,7 +93,8 @@ def estimate_noise(
         sigma, fitted = _likeliest(D, G_all, member, len(groups), bench.reading, drive=drive)
         drive = fitted if drive is None else drive
     noise = Noise(sigma, drive, np.zeros(len(sigma)), source)
-    noise = replace(noise, rho=_correlation(noise, d, G, member) if pairs else rho)
+    rho, fade = _remembered(noise, d, G, member) if pairs else (rho, rho)
+    noise = replace(noise, rho=rho, fade=fade)
     if not np.isfinite(cells).all():
         units = ["mm" if d is Drive.DISPLACEMENT else f"m{d.shown[0]}" for d in bench.drives]
         said = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
@@ -300,16 +200,44 @@ def _likeliest(
     return unpack(x)
 
 
-def _correlation(noise: Noise, d: Sequence[np.ndarray], G: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
-    """Lag-1 correlation per group of the whitened differences; zero unless it is clearly there (3 standard errors)."""
-    white = Whitener(noise, d, G, [np.zeros((len(g), g.shape[2])) for g in G])
-    z = [white.trial(k, x) for k, x in enumerate(d)]
-    rho = np.zeros(member.size)
+def _remembered(
+    noise: Noise, d: Sequence[np.ndarray], G: Sequence[np.ndarray], member: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """How differences d remember, by group: `rho` and `fade` of a Noise, zero unless clearly there (3 standard errors).
+
+    Rows x in sigmas, of the covariance C across channels, have the lagged covariances g_k I, where g_k is a sensor's own: what
+    inputs add is each row's own. Those of y = C^-1 x are g_k C^-2, so that directions in which inputs are most of the noise tell
+    little, as the score of the likelihood has it. Noise is AR(1) unless g_2 is clearly more than g_1^2; then s f^k is fitted to
+    g_1 .. g_4.
+    """
+    A = [noise.drive * g / noise.sigma[:, None] * np.isfinite(x)[:, :, None] for g, x in zip(G, d, strict=True)]
+    inner = [np.linalg.inv(np.eye(a.shape[2]) + a.transpose(0, 2, 1) @ a) for a in A]
+    inverse = [
+        np.isfinite(x)[:, :, None] * np.eye(member.size) - a @ i @ a.transpose(0, 2, 1) for x, a, i in zip(d, A, inner, strict=True)
+    ]
+    y = [(C @ np.nan_to_num(x / noise.sigma)[:, :, None])[:, :, 0] for x, C in zip(d, inverse, strict=True)]
+    rho, fade = np.zeros(member.size), np.zeros(member.size)
     for g in range(member.max() + 1):
-        columns = member == g
-        product = sum(float((x[1:, columns] * x[:-1, columns]).sum()) for x in z)
-        power = sum(float((x[:, columns] ** 2).sum()) for x in z)
-        count = sum(x[1:, columns].size for x in z)
-        if power > 0 and product / power > 3.0 / np.sqrt(count):
-            rho[columns] = min(product / power, 0.9)
-    return rho
+        own = member == g
+        told = sum(float((C[:, own] ** 2).sum()) for C in inverse)  # trace of C^-2
+        spread = np.sqrt(sum(float((C[:, own][:, :, own] ** 2).sum()) for C in inverse))
+        alone = sum(float(C[:, own, own].sum()) for C in inverse)  # of as many squares as were seen, the sensors' own
+        if not alone > OWN * sum(float(np.isfinite(x[:, own]).sum()) for x in d):
+            continue
+        power = sum(float((x[:, own] ** 2).sum()) for x in y) / alone
+        lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in LAGS]) / (told * power)
+        sure = CLEAR * spread / told
+        if lagged[0] > sure:
+            rho[own] = fade[own] = min(lagged[0], MOST)
+            if lagged[1] - lagged[0] ** 2 > sure * np.sqrt(1.0 + 4.0 * lagged[0] ** 2):
+                rho[own], fade[own] = _fading(lagged)
+    return rho, fade
+
+
+def _fading(lagged: np.ndarray) -> tuple[float, float]:
+    """s f and f of the s f^k, s at most 1, that are nearest to the correlations `lagged` at `LAGS`."""
+    fade = np.linspace(max(lagged[0], 0.01), SLOWEST, 200)
+    powers = fade[:, None] ** np.array(LAGS)
+    share = np.clip(powers @ lagged / (powers**2).sum(axis=1), 0.0, 1.0)
+    best = int(np.argmin(((lagged - share[:, None] * powers) ** 2).sum(axis=1)))
+    return float(share[best] * fade[best]), float(fade[best])

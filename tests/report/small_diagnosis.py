@@ -16,8 +16,8 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.suspicions import Suspicion
 from twin.effects import Drive, Loads, named
 from twin.measurements import Channel, Recording, Trial
+from twin.noise import Noise
 from twin.quantities import Fitted
-from twin.residual import Noise
 from twin.twin import Twin
 
 LOOP = 2e-3  # m: half width of the loop that tendon 2 leaves in disk_8_x

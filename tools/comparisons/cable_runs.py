@@ -21,9 +21,10 @@ from twin.calibrate import NUDGE, Fit, Free, Model, Objective, fit
 from twin.effects import named
 from twin.evaluate import evaluate
 from twin.measurements import Recording
-from twin.residual import Noise, Whitener
+from twin.noise import Noise
 from twin.robots import load
 from twin.twin import Twin
+from twin.whitener import Whitener
 
 LOADS = (20, 60)  # per cent, fitted
 WIDTH = 0.3  # of a loop's width: the bar

@@ -20,9 +20,10 @@ from twin.calibrate import Model, Objective, fit
 from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.evaluate import evaluate
 from twin.measurements import Recording, Trial
-from twin.residual import Noise, Whitener
+from twin.noise import Noise
 from twin.robots import load
 from twin.twin import Twin
+from twin.whitener import Whitener
 
 FITTED = {("load20", "0.1Hz"), ("load30", "0.1Hz"), ("load20", "0.3Hz"), ("load30", "0.3Hz")}
 FRICTION = {"tendon_friction", "joint_friction"}  # while no cable falls slack no data tell one from the other

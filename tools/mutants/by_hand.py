@@ -32,8 +32,8 @@ CHANGES = (  # (file, what a line holds, what it is to hold)
     # markers on the other side of their disks
     ("twin/robots/continuum.py", "pos=[*offset[:2], at + offset[2]]", "pos=[*offset[:2], at - offset[2]]"),
     # the noise model's bar and what it takes out
-    ("twin/residual.py", "product / power > 3.0 / np.sqrt(count)", "product / power > 0.3 / np.sqrt(count)"),
-    ("twin/residual.py", "product / power > 3.0 / np.sqrt(count)", "product / power > 30.0 / np.sqrt(count)"),
+    ("twin/residual.py", "sure = CLEAR * np.sqrt", "sure = 0.1 * CLEAR * np.sqrt"),
+    ("twin/residual.py", "sure = CLEAR * np.sqrt", "sure = 10.0 * CLEAR * np.sqrt"),
     ("twin/residual.py", "return out - moved @ np.linalg.lstsq", "return out - 0.0 * moved @ np.linalg.lstsq"),
     ("twin/residual.py", "both -= basis[ok] @", "both -= 0.0 * basis[ok] @"),
     # a second robot for nothing

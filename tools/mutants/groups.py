@@ -55,7 +55,10 @@ GROUPS = {
             "intervals or linear or widen or neighbour_serve or thousandth or hardly or elsewhere or far_off",
         ),
     ),
-    "residual": Group(("twin/residual.py",), ("tests/test_residual.py",)),
+    "residual": Group(
+        ("twin/noise.py", "twin/residual.py", "twin/whitener.py"),
+        ("tests/test_residual.py", "tests/test_diagnose.py", "tests/test_cut_off.py"),
+    ),
     "autocorrelation": Group(("twin/autocorrelation.py",), ("tests/test_autocorrelation.py",)),
     "laws": Group(("twin/laws.py",), ("tests/test_laws.py", "tests/test_dynamics.py", "-k", "laws or alike")),
     "bench": Group(("twin/bench.py",), ("tests/test_prepare.py", "tests/test_evaluate.py", "tests/test_design.py")),

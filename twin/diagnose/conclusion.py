@@ -11,7 +11,7 @@ from twin.diagnose.screen import Screening
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
 from twin.errors import SolveError
-from twin.residual import Noise
+from twin.noise import Noise
 from twin.twin import Twin
 
 

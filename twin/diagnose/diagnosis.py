@@ -12,8 +12,8 @@ from twin.diagnose.identifiability import Visibility
 from twin.diagnose.loops import Loops
 from twin.diagnose.null import Thresholds
 from twin.diagnose.suspicions.case import Suspicion
+from twin.noise import Noise
 from twin.quantities import Fitted
-from twin.residual import Noise
 from twin.shape.under_hand import UnderHand
 from twin.twin import Twin
 

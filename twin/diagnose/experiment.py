@@ -20,7 +20,8 @@ from twin.effects import Drive
 from twin.errors import SolveError
 from twin.information import solve
 from twin.measurements import Channel
-from twin.residual import Noise, Whitener
+from twin.noise import Noise
+from twin.whitener import Whitener
 
 _Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, what a's adds to it
 
@@ -144,8 +145,8 @@ def _foreseen(bench: Bench, noise: Noise) -> tuple[Bench, Noise]:
     tip = [Output(Channel(f"tip_{a}", "output", "mm", sigma), "marker", senses[f"tip_{a}"].index, k) for k, a in enumerate("xyz")]
     keep = [j for j in range(len(bench.outputs)) if j not in skin]
     outputs = (*(bench.outputs[j] for j in keep), *tip)
-    whole = replace(noise, sigma=np.append(noise.sigma[keep], 3 * [sigma]), rho=np.append(noise.rho[keep], np.zeros(3)))
-    return replace(bench, outputs=outputs), whole
+    rho, fade = (np.append(x[keep], np.zeros(3)) for x in (noise.rho, noise.lasting[1]))
+    return replace(bench, outputs=outputs), replace(noise, sigma=np.append(noise.sigma[keep], 3 * [sigma]), rho=rho, fade=fade)
 
 
 def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> float:

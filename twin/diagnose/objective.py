@@ -13,9 +13,11 @@ from twin.diagnose.diagnosis import Settings
 from twin.diagnose.thresholds import PUSHED
 from twin.effects import Drive
 from twin.evaluate import TYPICAL
-from twin.residual import Noise, Whitener, estimate_noise
+from twin.noise import Noise
+from twin.residual import estimate_noise
 from twin.springs.heat import memory
 from twin.twin import Trace, Twin, Way, readings, report, simulate
+from twin.whitener import Whitener
 
 
 def objective_of(bench: Bench, twin: Twin, fitted: list[int], settings: Settings) -> tuple[Model, Objective, list[str]]:

@@ -68,8 +68,8 @@ def _repeated(study: Study, raw: list[np.ndarray], group: str) -> Iterator[str]:
         return
     lasting = {p: _means(raw[place[p[0]]][:, own]) - _means(raw[place[p[1]]][:, own]) for p in pairs}
     size = {p: _rms(d) / np.sqrt(2.0) for p, d in lasting.items()}
-    sigma, rho = _rms(noise.sigma[own]), float(np.mean(noise.rho[own]))
-    chance = sigma * np.sqrt((1.0 + rho) / (1.0 - rho) / min(len(raw[place[a]]) for a, _ in pairs))
+    sigma = _rms(noise.sigma[own])
+    chance = _rms(noise.in_means(min(len(raw[place[a]]) for a, _ in pairs))[own])
     whole = _rms(np.array(list(size.values())))
     if not whole > max(LASTING * sigma, SURE * chance):
         return

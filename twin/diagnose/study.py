@@ -15,7 +15,7 @@ from twin.diagnose.passed import passed
 from twin.effects import Drive
 from twin.evaluate import ACCURATE
 from twin.quantities import each
-from twin.residual import SILENT
+from twin.whitener import SILENT
 
 Progress = Callable[[str], None]
 

@@ -20,7 +20,8 @@ from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import ALONE, EVEN, RIVAL
 from twin.information import solve
-from twin.residual import Noise, Whitener
+from twin.noise import Noise
+from twin.whitener import Whitener
 
 Share = tuple[str, float]
 
