@@ -2,27 +2,67 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numba
-from numba.core import event
+from numba.core import caching, event
 
 # No flag that lets the compiler assume finite numbers: a diverging step must be seen as such.
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
+def _compiled(package: Path) -> str:
+    """A digest of all modules of a package that compile functions."""
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        if b"twin.compiled import" in text or path == Path(__file__):
+            digest.update(text)
+    return digest.hexdigest()
+
+
+_SOURCES = _compiled(Path(__file__).parent)
+
+
+class Kept(caching.IndexDataCacheFile):
+    """Machine code of one function on disk.
+
+    Numba's own takes it for fresh while the function's file is, though functions of other files were compiled into it; and numbers
+    it, so that two processes that compile at once may take one number for two signatures.
+    """
+
+    def _data_name(self, number: int) -> str:
+        return super()._data_name(uuid4().int)
+
+    def save(self, key: Any, data: Any) -> None:
+        if not self._load_index():
+            for stale in Path(self._cache_path).glob(Path(self._index_name).stem + ".*.nbc"):
+                stale.unlink(missing_ok=True)  # were it another process's: what is not found is compiled again
+        super().save(key, data)
+
+
+def _kept(dispatcher: Any) -> Any:
+    cache = dispatcher._cache
+    stamp = (cache._impl.locator.get_source_stamp(), _SOURCES)
+    cache._cache_file = Kept(cache._cache_path, cache._impl.filename_base, stamp)
+    return dispatcher
+
+
 def jit(function: Callable[..., Any]) -> Any:
     """Compile to machine code, without the GIL, kept on disk between runs."""
-    return numba.njit(nogil=True, fastmath=_FAST, error_model="numpy", cache=True)(function)
+    return _kept(numba.njit(nogil=True, fastmath=_FAST, error_model="numpy", cache=True)(function))
 
 
 def inner(function: Callable[..., Any]) -> Any:
     """As `jit`, for what compiled code alone calls: without the wrappers that take arguments from Python, which cost a tenth of the
     time to compile."""
     bare: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return numba.njit(nogil=True, fastmath=_FAST, error_model="numpy", cache=True, **bare)(function)
+    return _kept(numba.njit(nogil=True, fastmath=_FAST, error_model="numpy", cache=True, **bare)(function))
 
 
 def part(function: Callable[..., Any]) -> Any:

@@ -31,7 +31,7 @@ def write_set(
     ambient: bool = False,
     exact_input: bool = False,
 ) -> None:
-    """Add sensor noise and write. `exact_input`: the input is a command, which no instrument blurs."""
+    """Add sensor noise and write. `exact_input`: a tension that drives the robot is a command, which no instrument blurs."""
     folder.mkdir(parents=True, exist_ok=True)
     disks, tendons = logs[0].markers.shape[1], logs[0].tension.shape[1]
     shown = [disks - 1] if day.tip_only else list(range(disks))
@@ -48,9 +48,10 @@ def write_set(
         if sigma is not None:
             lines.append(f"noise = {sigma:.4g}")
 
+    commanded = exact_input and not (day.by_length or day.by_current)
     for i in range(tendons):
         role = "output" if day.by_length or day.by_current else "input"
-        channel(f"tendon_{i + 1}_tension", role, "N", None if exact_input else noise.load_cell)
+        channel(f"tendon_{i + 1}_tension", role, "N", None if commanded else noise.load_cell)
     for k in shown:
         for axis in "xyz":
             channel(f"disk_{k + 1}_{axis}", "output", "mm", 1e3 * noise.marker)
@@ -73,7 +74,7 @@ def write_set(
         lines.append(f'tip_payload = "{1e3 * log.trial.payload:g} g"')
         if log.trial.gravity is not None:
             lines.append(f"gravity = {list(log.trial.gravity)}")
-        tension = log.tension if exact_input else log.tension + noise.load_cell * rng.normal(size=log.tension.shape)
+        tension = log.tension if commanded else log.tension + noise.load_cell * rng.normal(size=log.tension.shape)
         markers = noise.of_markers(rng, log.markers)[:, shown].reshape(len(log.tension), -1)
         columns = [log.trial.time[:, None], tension, 1e3 * markers]
         formats = ["%.4f"] + ["%.4f"] * tendons + ["%.3f"] * markers.shape[1]

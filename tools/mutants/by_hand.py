@@ -32,10 +32,12 @@ CHANGES = (  # (file, what a line holds, what it is to hold)
     # markers on the other side of their disks
     ("twin/robots/continuum.py", "pos=[*offset[:2], at + offset[2]]", "pos=[*offset[:2], at - offset[2]]"),
     # the noise model's bar and what it takes out
-    ("twin/residual.py", "sure = CLEAR * np.sqrt", "sure = 0.1 * CLEAR * np.sqrt"),
-    ("twin/residual.py", "sure = CLEAR * np.sqrt", "sure = 10.0 * CLEAR * np.sqrt"),
+    ("twin/residual.py", "sure = CLEAR * spread", "sure = 0.1 * CLEAR * spread"),
+    ("twin/residual.py", "sure = CLEAR * spread", "sure = 10.0 * CLEAR * spread"),
     ("twin/residual.py", "return out - moved @ np.linalg.lstsq", "return out - 0.0 * moved @ np.linalg.lstsq"),
     ("twin/residual.py", "both -= basis[ok] @", "both -= 0.0 * basis[ok] @"),
+    # machine code numbered, as numba does
+    ("twin/compiled.py", "super()._data_name(uuid4().int)", "super()._data_name(number)"),
     # a second robot for nothing
     ("twin/diagnose/rigs.py", "- len(own) * np.log(n) - 2.0", "- 2.0"),
     ("twin/diagnose/rigs.py", "- 2.0 * len(trials) * np.log(2.0)", "- 0.0 * len(trials) * np.log(2.0)"),

@@ -47,6 +47,7 @@ GROUPS = {
             LAWS,
         ),
     ),
+    "kept": Group(("twin/compiled.py",), ("tests/test_compiled.py",)),
     "calibrate": Group(
         ("twin/calibrate.py",),
         (
