@@ -18,7 +18,7 @@ from twin.measurements.patches import PATCHES, SHARED, Patches, cut, scatter, si
 from twin.measurements.recording import CONTACT
 from twin.robots import Robot
 
-LOGGED, ROOMY = 20, 40  # rows of a thermometer: of fewer a cross-validation says little; as many tell how a room warms
+LOGGED, ROOMY = 20, 100  # rows of a thermometer: of fewer a cross-validation says little; as many tell how a room warms
 ROOM = 296.15  # K, where nothing else is said: the temperature stiffness is quoted at
 
 
