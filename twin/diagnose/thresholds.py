@@ -290,7 +290,7 @@ PROBED = _row(
     "PROBED", 4, "rows", "between readings that a law is probed at", "derivation: as many as a monotone cubic between rows weighs"
 )  # fmt: skip
 ENDED = _row("ENDED", 0.5, "ratio", "of the most that a lasting change does: a drive at its end does less", "judgement: half")
-SHAKEN = _row("SHAKEN", 12, "draws", "of noise that friction is shaken by", "judgement: 7 of |z|^2 on a day of 800 rows")
+SHAKEN = _row("SHAKEN", 12, "draws", "of noise that friction is shaken by", "judgement: +- 7 where 81 of |z|^2 are owed")
 
 # ---- judge -------------------------------------------------------------------------------------------------------------------
 
