@@ -15,7 +15,6 @@ from twin.effects import Drive
 from twin.noise import DECLARED, Noise
 
 LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
-OWN = 0.1  # of what sensors see: where it is less, inputs' noise hides what their own remembers, and it hardly matters
 LAGS = (1, 2, 3, 4)  # rows, at which what noise remembers is read off repeats
 CLEAR = 3.0  # standard errors of a correlation that is clearly there
 MOST = 0.9  # correlation from row to row: beyond it noise is no noise, but drifts
@@ -221,8 +220,8 @@ def _remembered(
         own = member == g
         told = sum(float((C[:, own] ** 2).sum()) for C in inverse)  # trace of C^-2
         spread = np.sqrt(sum(float((C[:, own][:, :, own] ** 2).sum()) for C in inverse))
-        alone = sum(float(C[:, own, own].sum()) for C in inverse)  # of as many squares as were seen, the sensors' own
-        if not alone > OWN * sum(float(np.isfinite(x[:, own]).sum()) for x in d):
+        alone = sum(float(C[:, own, own].sum()) for C in inverse)  # of the squares seen, the sensors' own
+        if not alone > 0.0:  # never measured
             continue
         power = sum(float((x[:, own] ** 2).sum()) for x in y) / alone
         lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in LAGS]) / (told * power)
