@@ -90,6 +90,40 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     assert extended(study(), member, "tendon_friction", Start({"mu": 0.1}, ("mu",))) is None
 
 
+def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One step with the shape held, then all from where that ended; where nothing has a shape, or no sign, all at once."""
+    drift, member = "load_cell_drift", weighed(calibrated("base_tilt"))
+    fits = Fits(monkeypatch)
+    stepped, after = {"rate_1": 3e-5, "rate_2": -2e-5}, SimpleNamespace(traces={0: "stepped"})
+
+    def fit(objective: Any, model: Model, **how: Any) -> Any:
+        fits.fit(objective, model, **how)
+        if len(fits.asked) == 2:
+            return model
+        moved = model.without_effect(drift).with_effect(
+            drift, {**model.twin.effects[-1].values, **stepped}, ("rate_1", "rate_2"), 3
+        )
+        return SimpleNamespace(model=moved, evaluation=after)
+
+    monkeypatch.setattr(stage, "fit", fit)
+    start = Start({"rate_1": 1e-5, "rate_2": 1e-5, "levelling": 1e-3}, ("rate_1", "rate_2", "levelling"))
+    found = extended(study(), member, drift, start, beat=7.0)
+    assert found is not None
+    (first, how), (whole, then) = fits.asked
+    assert [f.label for f in first.free[len(member.fit.model.free) :]] == [f"{drift}.rate_1", f"{drift}.rate_2"]
+    assert first.twin.effects[-1].values == {**named(drift)({}, 3).values, **start.values}
+    assert how == {"near": HERE, "J": member.fit.J, "worth": np.inf}  # a fit that ends with its first step
+    assert [f.label for f in whole.free[len(member.fit.model.free) :]] == [f"{drift}.{n}" for n in start.free]
+    assert whole.twin.effects[-1].values == {**named(drift)({}, 3).values, **start.values, **stepped}
+    assert then == {"near": after, "J": member.fit.J, "tolerance": ROUGHLY, "worth": LITTLE, "beat": 7.0}
+    Fits(monkeypatch, fails=1)
+    assert extended(study(), member, drift, start) is None
+    for effect, begun in ((drift, Start({"rate_1": 1e-5}, ("rate_1",))), (CREEP, Start({"amplitude": 0.1}, ("amplitude", "time")))):
+        plain = Fits(monkeypatch)
+        assert extended(study(), member, effect, begun) is not None
+        assert len(plain.asked) == 1
+
+
 def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     member, said = weighed(calibrated("base_tilt", CREEP, "tendon_friction"), score=10.0), []
     told = study()

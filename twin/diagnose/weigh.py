@@ -51,13 +51,33 @@ def weigh(study: Study, fitted: Fit) -> Weighed:
 
 
 def extended(study: Study, member: Weighed, effect: str, start: Start, beat: float = np.inf) -> Weighed | None:
-    """`member` with one effect more, fitted as far as it may `beat` a cost; None without equilibrium."""
-    model = member.fit.model.with_effect(effect, dict(start.values), start.free, study.bench.n_tendon)
+    """`member` with one effect more, fitted as far as it may `beat` a cost; None without equilibrium.
+
+    Amplitudes of either sign take a step before the shape that goes with them: what a shape does is in proportion to them, and
+    of a drift begun with the wrong sign the first step would end in any shape.
+    """
+    n_tendon, model, near = study.bench.n_tendon, member.fit.model, member.fit.evaluation
+    values = dict(start.values)
     try:
-        found = fit(study.objective, model, near=member.fit.evaluation, J=member.fit.J, tolerance=ROUGHLY, worth=LITTLE, beat=beat)
+        if signed := _signed(effect, start, n_tendon):
+            amplitudes = model.with_effect(effect, values, signed, n_tendon)
+            begun = fit(study.objective, amplitudes, near=near, J=member.fit.J, worth=np.inf)
+            values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
+            model, near = begun.model.without_effect(effect), begun.evaluation
+        model = model.with_effect(effect, values, start.free, n_tendon)
+        found = fit(study.objective, model, near=near, J=member.fit.J, tolerance=ROUGHLY, worth=LITTLE, beat=beat)
         return weigh(study, found)
     except SolveError:
         return None
+
+
+def _signed(effect: str, start: Start, n_tendon: int) -> tuple[str, ...]:
+    """Of a start that frees a shape too, the amplitudes that may have either sign."""
+    law = catalogue()[effect]
+    if not set(start.free) & set(law.shape):
+        return ()
+    table = {p.name: p for p in law.declared(n_tendon)}
+    return tuple(n for n in start.free if n not in law.shape and table[n].low < table[n].value)
 
 
 def fuller(study: Study, found: Weighed, accept: float) -> Weighed:
