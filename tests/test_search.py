@@ -86,6 +86,35 @@ def test_where_two_effects_leave_two_thirds_no_third_is_sought(monkeypatch: pyte
     assert (("creep", "drift", "friction") in world.refitted) == third
 
 
+@pytest.mark.parametrize(("left", "best"), [(0.49, ("curvature", "drift")), (0.51, ("asymmetry",))])
+def test_what_halves_the_error_is_carried_on_though_it_has_no_evidence_alone(
+    monkeypatch: pytest.MonkeyPatch, left: float, best: tuple[str, ...]
+) -> None:
+    """Either alone leaves an error as smooth as before, of half its square, and asymmetry, which hardly lessens it, smoothest."""
+    alone = {"curvature": -30.0, "drift": -40.0, "asymmetry": 900.0, "tilt": -500.0}
+    together = {"curvature+drift": 5000.0, "asymmetry+curvature": -950.0, "asymmetry+drift": -950.0}
+    world = World(monkeypatch, alone, together)
+    of, noise = world.of, 10_000.0
+    leaves = {"": 1.0, "asymmetry": 0.98, "tilt": 1.0, "drift": left * 0.98, "curvature": 0.6}
+
+    def with_square(*effects: str) -> Any:
+        found = of(*effects)
+        found.fit.z = np.full(1, (noise + 1e6 * leaves.get("+".join(found.effects), 0.0)) ** 0.5)
+        return found
+
+    monkeypatch.setattr(world, "of", with_square)
+    assert world.found().best.effects == best
+
+
+@pytest.mark.parametrize(("left", "third"), [(0.49, True), (0.51, False)])
+def test_without_any_evidence_what_halves_the_error_is_carried_on_alone(
+    monkeypatch: pytest.MonkeyPatch, left: float, third: bool
+) -> None:
+    world = World(monkeypatch, {"curvature": -30.0, "drift": -40.0, "tilt": -50.0}, {"curvature+drift": 5000.0})
+    world.square = {0: 10_000.0 + 1e6, 1: 10_000.0 + left * 1e6, 2: 10_000.0}
+    assert world.found().best.effects == (("curvature", "drift") if third else ())
+
+
 @pytest.mark.parametrize(("share", "tried"), [(0.24, False), (0.26, True)])
 def test_a_pattern_that_promises_a_quarter_of_what_counts_is_refitted(
     monkeypatch: pytest.MonkeyPatch, share: float, tried: bool

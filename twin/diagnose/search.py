@@ -11,7 +11,7 @@ from twin.diagnose.patterns import Dictionary, dictionary
 from twin.diagnose.ranking import rank
 from twin.diagnose.stilled import paid
 from twin.diagnose.study import Study
-from twin.diagnose.thresholds import BEHIND, DEEPER, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WIDTH
+from twin.diagnose.thresholds import BEHIND, DEEPER, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WHITER, WIDTH
 from twin.diagnose.weigh import Laws, Weighed, better, extended, fuller, refit_without
 from twin.effects import Start, catalogue
 
@@ -35,9 +35,8 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
     beam = [base]
     for level in range(1, DEEPEST + 1):
         best_before = max(w.score for w in known.values())
-        ahead = [m for m in beam if m.score >= best_before - BEHIND]
         fresh: Known = {}
-        for member in ahead:
+        for member in beam:
             lacks = patterns.beside(member.effects)
             # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
             # effects that promise something by the base's; the others' are the base's.
@@ -50,13 +49,28 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
         fresh = {k: fuller(study, w, bars.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
-        beam = sorted(fresh.values(), key=lambda w: -w.score)[:WIDTH]
-        if not beam or beam[0].score < best_before + bars.accept or (level > 1 and _leaves(study, base, beam[0]) > DEEPER):
+        beam = carried(study, base, beam, list(fresh.values()), best_before + bars.accept)
+        if not beam or (level > 1 and _leaves(study, base, beam[0]) > DEEPER):
             break
     best = max(known.values(), key=lambda w: w.score - bars.accept * len(w.effects))
     best = exchanged(study, best, known)
     best = _leaner(study, base, best, known, bars.accept)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+
+
+def carried(study: Study, base: Weighed, beam: list[Weighed], fresh: list[Weighed], bar: float) -> list[Weighed]:
+    """The models of the `beam` and one effect to which one more is added next: where evidence passes the `bar` the best by it,
+    `WIDTH` of them, none far behind; and the one that leaves least of |z|^2, where that is less than `WHITER` of what these leave,
+    or where there are none the beam.
+
+    Evidence forgives a smooth error whatever its size: of two effects that bend alike either may leave it as smooth as none, and
+    so have no evidence until the other is there.
+    """
+    best = max((w.score for w in fresh), default=-np.inf)
+    ahead = sorted((w for w in fresh if best >= bar and w.score >= best - BEHIND), key=lambda w: -w.score)[:WIDTH]
+    least = min(_leaves(study, base, w) for w in ahead or beam)
+    whitest = min(fresh, key=lambda w: _leaves(study, base, w), default=base)
+    return [*ahead, whitest] if _leaves(study, base, whitest) < WHITER * least else ahead
 
 
 def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
@@ -77,7 +91,7 @@ def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars
 def _leaves(study: Study, base: Weighed, member: Weighed) -> float:
     """The share of the base's |z|^2 above the noise that a set leaves."""
     noise = float(study.objective.n)
-    return (float(member.fit.z @ member.fit.z) - noise) / max(float(base.fit.z @ base.fit.z) - noise, 1.0)
+    return max(float(member.fit.z @ member.fit.z) - noise, 0.0) / max(float(base.fit.z @ base.fit.z) - noise, 1.0)
 
 
 def _asked(study: Study, base: Weighed, member: Weighed, bars: Thresholds) -> float:

@@ -198,6 +198,7 @@ LOWEST, HIGHEST = (
 TOP = _row("TOP", 4, "candidates", "of each measure that are refitted", "judgement")
 STARTS = _row("STARTS", 2, "starts an effect", "two of one effect, or its starts crowd the others out", "judgement")
 WIDTH = _row("WIDTH", 3, "models", "carried from level to level", "judgement")
+WHITER = _row("WHITER", 0.5, "of what the best by evidence leave", "half of an error is no smooth part of it", "judgement: as HALF")
 BEHIND = _row("BEHIND", 400.0, "2 ln odds", "a model so far behind the best never led after another effect", "judgement")
 DEEPEST = _row("DEEPEST", 3, "effects", "at once; four together are hardly ever told apart", "judgement")
 DEEPER = _row(
