@@ -102,3 +102,21 @@ def test_the_only_hold_and_the_only_end_of_a_range_are_not_sealed_and_an_end_tha
     assert sealed_of(pulls([2.0, 2.0, *alike], nudged=((0, 2), (0, 3), (1, 2), (2, 3)))) == set(range(8)), "a nudge is no motion"
     assert sealed_of(pulls([4.0, 3.85, *alike])) == set(range(8))
     assert sealed_of(pulls([4.0, 3.75, *alike])) == set(range(1, 8))
+
+
+@pytest.mark.parametrize(
+    "loads",
+    [{"payload": 0.01}, {"gravity": np.array([0.0, 9.81, 0.0])}, {"force": np.array([0.1, 0.0, 0.0])}],
+    ids=["payload", "mount", "force"],
+)
+def test_a_load_stays_in_sight_though_all_trials_without_it_repeat_another(loads: dict[str, object]) -> None:
+    """Four pairs of repeats and, once each, three under a load, as labs do it: two of them, and one of a pair, are sealed."""
+    once = pulls([1.0, 1.0, 1.3, 1.3, 1.6, 1.6, 2.0, 2.0, 1.0, 1.5, 2.0])
+    inputs = [replace(i, loads=replace(i.loads, payload=0.0)) for i in once.inputs]
+    bench = replace(once, inputs=tuple(inputs))
+    for k in (8, 9, 10):
+        bench = altered(bench, k, **loads)
+    for seed in range(30):
+        fitted, sealed = split(bench, seed)
+        assert len(sealed) == 3
+        assert set(fitted) & {8, 9, 10}

@@ -13,12 +13,14 @@ from twin.diagnose.design import longest_rest, pulled, rates
 from twin.diagnose.thresholds import EDGE, PACE, SEALED, STEADY
 from twin.residual import repeats
 
+LOADS = ("payload", "mount", "force")
+
 
 def split(bench: Bench, seed: int) -> tuple[list[int], list[int]]:
     """(fitted, sealed) trials, both in order of the clock.
 
     What only one of the trials still open shows (a payload, a mount, a kind of motion, an end of a range) is sealed last, and so
-    are repeats, which the noise is read from.
+    are repeats, which the noise is read from. A load that nobody sees any more is worse than a repeat less.
     """
     n = len(bench.inputs)
     shown = list(_conditions(bench))
@@ -27,7 +29,7 @@ def split(bench: Bench, seed: int) -> tuple[list[int], list[int]]:
     open_, wanted = set(range(n)), max(1, round(SEALED * n))
     while n - len(open_) < wanted:
         count = Counter(c for k in open_ for c in shown[k])
-        lost = {k: sum(count[c] == 1 for c in shown[k]) for k in open_}
+        lost = {k: sum(1 + (c[0] in LOADS) for c in shown[k] if count[c] == 1) for k in open_}
         open_.remove(min(open_, key=lambda k: (lost[k] + (k in repeated), k in repeated, place[k])))
     return sorted(open_), [k for k in range(n) if k not in open_]
 
@@ -38,7 +40,7 @@ def blind(bench: Bench, trials: Sequence[int]) -> Bench:
     return replace(bench, measured=tuple(measured))
 
 
-def _conditions(bench: Bench) -> Iterator[set[Hashable]]:
+def _conditions(bench: Bench) -> Iterator[set[tuple[Hashable, ...]]]:
     """What each trial shows, by its inputs and conditions alone."""
     tops = np.array([np.abs(i.command).max(axis=0) for i in bench.inputs])
     ranges = {
@@ -48,7 +50,7 @@ def _conditions(bench: Bench) -> Iterator[set[Hashable]]:
     }
     for k, i in enumerate(bench.inputs):
         moved = pulled(i, float(tops.max()))
-        shown: set[Hashable] = {
+        shown: set[tuple[Hashable, ...]] = {
             ("payload", round(i.loads.payload, 6)),
             ("mount", *np.round(i.loads.gravity, 3)),
             ("force", *np.round(i.loads.force, 3)),
@@ -57,7 +59,7 @@ def _conditions(bench: Bench) -> Iterator[set[Hashable]]:
             *(("pace", round(float(np.log(r) / np.log(PACE)))) for r in rates(i, float(tops.max()))),
         }
         if longest_rest(i, float(tops.max())) >= STEADY:
-            shown.add("hold")
+            shown.add(("hold",))
         for name, values in ranges.items():
             span = np.ptp(values, axis=0)
             shown |= {("most", name, c) for c in np.flatnonzero(values[k] >= values.max(axis=0) - EDGE * span) if span[c] > 0}
