@@ -42,7 +42,7 @@ def test_a_sealed_trial_that_is_missed_is_named_where_all_seems_explained():
     after[4] = after[4] + 2.5 * floor / np.sqrt(3.0)  # with the noise itself 2.7 floors, 1.2 mm, in that trial alone
     missed = replace(d, predictions={**d.predictions, "after": after})
     assert sentence(missed).endswith(
-        "But it misses sealed circle_4 by 1.20 mm in position (noise floor 0.44 mm): the fitted trials do not show all that "
+        "But it misses sealed circle_4 by 1.2 mm in position (noise floor 0.44 mm): the fitted trials do not show all that "
         "happens there."
     )
     assert "misses" not in sentence(d)

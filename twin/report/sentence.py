@@ -161,8 +161,10 @@ def _missed(d: Diagnosis) -> str:
         if missed:
             most = max(missed, key=lambda g: missed[g])
             unit, factor = SHOWN[most]
-            off, floor = number(factor * left[most]), number(factor * d.errors.floor[most])
-            told.append(f"{labels(d, (k,))[0]} by {off} {unit} in {KIND[most].replace('_', ' ')} (noise floor {floor} {unit})")
+            off, floor = factor * left[most], factor * d.errors.floor[most]
+            told.append(
+                f"{labels(d, (k,))[0]} by {off:.2g} {unit} in {KIND[most].replace('_', ' ')} (noise floor {floor:.2g} {unit})"
+            )
     return f" But it misses sealed {', '.join(told)}: the fitted trials do not show all that happens there." if told else ""
 
 
