@@ -86,16 +86,20 @@ def test_where_two_effects_leave_two_thirds_no_third_is_sought(monkeypatch: pyte
     assert (("creep", "drift", "friction") in world.refitted) == third
 
 
-@pytest.mark.parametrize(("left", "best"), [(0.49, ("curvature", "drift")), (0.51, ("asymmetry",))])
+@pytest.mark.parametrize(
+    ("left", "both", "best"),
+    [(0.49, 0.24, ("curvature", "drift")), (0.51, 0.24, ("asymmetry",)), (0.49, 0.26, ("asymmetry",))],
+)
 def test_what_halves_the_error_is_carried_on_though_it_has_no_evidence_alone(
-    monkeypatch: pytest.MonkeyPatch, left: float, best: tuple[str, ...]
+    monkeypatch: pytest.MonkeyPatch, left: float, both: float, best: tuple[str, ...]
 ) -> None:
-    """Either alone leaves an error as smooth as before, of half its square, and asymmetry, which hardly lessens it, smoothest."""
+    """Either alone leaves an error as smooth as before, of half its square, and asymmetry, which hardly lessens it, smoothest. The
+    two together must halve it once more."""
     alone = {"curvature": -30.0, "drift": -40.0, "asymmetry": 900.0, "tilt": -500.0}
     together = {"curvature+drift": 5000.0, "asymmetry+curvature": -950.0, "asymmetry+drift": -950.0}
     world = World(monkeypatch, alone, together)
     of, noise = world.of, 10_000.0
-    leaves = {"": 1.0, "asymmetry": 0.98, "tilt": 1.0, "drift": left * 0.98, "curvature": 0.6}
+    leaves = {"": 1.0, "asymmetry": 0.98, "tilt": 1.0, "drift": left * 0.98, "curvature": 0.6, "curvature+drift": both * 0.98}
 
     def with_square(*effects: str) -> Any:
         found = of(*effects)

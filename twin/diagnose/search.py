@@ -32,25 +32,29 @@ class Search:
 def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) -> Search:
     """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
     known: Known = {base.laws: base}
-    beam = [base]
+    beam, step = [base], []
     for level in range(1, DEEPEST + 1):
         best_before = max(w.score for w in known.values())
         fresh: Known = {}
-        for member in beam:
+        for member in (*beam, *step):
             lacks = patterns.beside(member.effects)
             # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
             # effects that promise something by the base's; the others' are the base's.
-            if member is beam[0] and member is not base:
+            if member is (*beam, *step)[0] and member is not base:
                 least = STALE * _asked(study, base, member, bars)
                 promise = rank(study.objective, study.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
                 lacks = dictionary(study.objective, member.fit, {c.effect for c in promise if c.gain >= least})
             study.progress(f"effects, {level} at once")
+            before = dict(fresh)
             extend(study, base, member, lacks, bars, fresh)
+            if any(member is s for s in step):
+                more, half = best_before + bars.accept, WHITER * _leaves(study, base, member)
+                fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(study, base, w) < half}
         leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
         fresh = {k: fuller(study, w, bars.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
-        beam = carried(study, base, beam, list(fresh.values()), best_before + bars.accept)
-        if not beam or (level > 1 and _leaves(study, base, beam[0]) > DEEPER):
+        beam, step = carried(study, base, [*beam, *step], list(fresh.values()), best_before + bars.accept)
+        if not (beam or step) or (level > 1 and _leaves(study, base, (*beam, *step)[0]) > DEEPER):
             break
     best = max(known.values(), key=lambda w: w.score - bars.accept * len(w.effects))
     best = exchanged(study, best, known)
@@ -58,10 +62,13 @@ def search(study: Study, base: Weighed, patterns: Dictionary, bars: Thresholds) 
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
-def carried(study: Study, base: Weighed, beam: list[Weighed], fresh: list[Weighed], bar: float) -> list[Weighed]:
+def carried(
+    study: Study, base: Weighed, beam: list[Weighed], fresh: list[Weighed], bar: float
+) -> tuple[list[Weighed], list[Weighed]]:
     """The models of the `beam` and one effect to which one more is added next: where evidence passes the `bar` the best by it,
-    `WIDTH` of them, none far behind; and the one that leaves least of |z|^2, where that is less than `WHITER` of what these leave,
-    or where there are none the beam.
+    `WIDTH` of them, none far behind; and, as a step only, the one that leaves least of |z|^2, where that is less than `WHITER` of
+    what these leave, or where there are none the beam. What is built on a step counts where it passes the bar and halves the error
+    once more: it explains what lay under the smooth one.
 
     Evidence forgives a smooth error whatever its size: of two effects that bend alike either may leave it as smooth as none, and
     so have no evidence until the other is there.
@@ -70,7 +77,7 @@ def carried(study: Study, base: Weighed, beam: list[Weighed], fresh: list[Weighe
     ahead = sorted((w for w in fresh if best >= bar and w.score >= best - BEHIND), key=lambda w: -w.score)[:WIDTH]
     least = min(_leaves(study, base, w) for w in ahead or beam)
     whitest = min(fresh, key=lambda w: _leaves(study, base, w), default=base)
-    return [*ahead, whitest] if _leaves(study, base, whitest) < WHITER * least else ahead
+    return ahead, [whitest] if _leaves(study, base, whitest) < WHITER * least else []
 
 
 def extend(study: Study, base: Weighed, member: Weighed, lacks: Dictionary, bars: Thresholds, fresh: Known) -> None:
