@@ -15,6 +15,7 @@ from twin.report import console, sentence, widths
 from twin.report.loops import advice, loop_words
 from twin.report.numbers import column, number, percent, plus_minus, rough
 from twin.report.sentence import blind, claim_words, verdict_words
+from twin.wording import in_words
 
 
 def test_explained_says_what_how_much_and_where_it_was_measured():
@@ -196,7 +197,7 @@ def test_of_many_numbers_of_a_kind_the_surest_are_said() -> None:
     assert "gain 2 = 0.50" in words
     assert "gain 5 = 1.30" in words
     assert "gain 1 =" not in words
-    assert words.endswith("…")
+    assert words.endswith(" and 2 more")
 
 
 def test_what_the_budget_left_untried_stands_beside_the_verdict():
@@ -233,3 +234,10 @@ def test_loop_widths_are_drawn_of_loads_that_differ_whatever_their_size(size: fl
         replace(i, loads=replace(i.loads, torque=np.full(len(i.time), x))) for i, x in zip(d.bench.inputs, torques, strict=True)
     ]
     assert (widths.plot(replace(d, bench=replace(d.bench, inputs=tuple(held)))) is not None) == two
+
+
+@pytest.mark.parametrize(
+    ("identifier", "words"), [("tendon_friction", "tendon friction"), ("sma_cooling", "SMA cooling"), ("creep", "creep")]
+)
+def test_identifiers_are_said_as_people_say_them(identifier: str, words: str) -> None:
+    assert in_words(identifier) == words

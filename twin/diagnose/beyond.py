@@ -19,6 +19,7 @@ from twin.diagnose.left_out import left_out
 from twin.diagnose.study import Study
 from twin.diagnose.thresholds import EDGE, HALVED, PACE, WORSE
 from twin.diagnose.weigh import Weighed
+from twin.wording import in_words
 
 SHOWN = {"payload": "payload", "torque": "load torque", "rate": "rate of pull", "mount": "mount"}
 
@@ -41,7 +42,7 @@ class Beyond:
         )
         if not self.harmful:
             return told
-        named = " and ".join(e.replace("_", " ") for e in self.harmful)
+        named = " and ".join(in_words(e) for e in self.harmful)
         return f"{told}; {named} helps inside and harms beyond: do not trust it there"
 
 

@@ -16,6 +16,7 @@ from twin.diagnose.null import Thresholds
 from twin.diagnose.places import place
 from twin.diagnose.rigs import Rigs
 from twin.diagnose.thresholds import NEAR, SHOWN, SHUFFLES, STEP
+from twin.wording import in_words
 
 
 def components(discrepancy: Discrepancy) -> dict[str, float]:
@@ -92,7 +93,7 @@ def nearest(effects: Sequence[str], share: float) -> str:
     """A hint: the best known explanation that was not claimed, and the share it takes off the error left out; "" if little."""
     if not share > NEAR:
         return ""
-    names = " with ".join(e.replace("_", " ") for e in effects)
+    names = " with ".join(in_words(e) for e in effects)
     return f" Of the known effects {names} comes nearest, but takes only {100 * share:.0f} % off the error on trials left out."
 
 
@@ -143,7 +144,7 @@ def change(bench: Bench, trials: Sequence[int], z: np.ndarray) -> tuple[int, int
 
 def doubtful(effects: Sequence[str]) -> str:
     """Of claims less likely than not."""
-    named = " and ".join(e.replace("_", " ") for e in effects)
+    named = " and ".join(in_words(e) for e in effects)
     return (
         f"{named}: less likely than not, for other sets of effects have more evidence; what all of them imitate may be none of them"
     )
@@ -151,5 +152,5 @@ def doubtful(effects: Sequence[str]) -> str:
 
 def undecided(effect: str, rival: str) -> str:
     """An effect that was found, and is not claimed because these data cannot tell it from another."""
-    one, other = (e.replace("_", " ") for e in (effect, rival))
+    one, other = (in_words(e) for e in (effect, rival))
     return f" {one.capitalize()} or {other} would explain more, but these data cannot tell which: neither is claimed."

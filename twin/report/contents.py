@@ -14,6 +14,7 @@ from twin.quantities import Fitted
 from twin.report.loops import advice, table
 from twin.report.numbers import SHOWN, finite
 from twin.report.sentence import error_words, groups, headline, labels, structure_left, verdict_words
+from twin.wording import in_words
 
 FORMAT = "twin-report/1"
 
@@ -72,7 +73,7 @@ def experiment_words(diagnosis: Diagnosis) -> str | None:
     if e is None:
         return asked
     runs = "one run separates" if e.repeats == 1 else f"{e.repeats} runs together separate"
-    one, other = (" + ".join(names).replace("_", " ") or "no effect" for names in e.between)
+    one, other = (" + ".join(map(in_words, names)) or "no effect" for names in e.between)
     words = f"{e.words}: {runs} {one} from {other} by {(e.separation * e.repeats) ** 0.5:.0f} standard errors"
     return f"{words}; and {asked}" if asked else words
 

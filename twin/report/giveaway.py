@@ -14,9 +14,9 @@ import numpy as np
 
 from twin.diagnose import Diagnosis
 from twin.effects import named
-from twin.report.sentence import effect_words
 from twin.report.stages import before_and_after, residuals
 from twin.report.variables import Variable, variables
+from twin.wording import in_words
 
 BINS = 14
 FEWEST = 4  # samples in a bin whose mean is drawn
@@ -52,7 +52,7 @@ def giveaways(diagnosis: Diagnosis) -> list[Giveaway]:
     before, after = residuals(d, first), residuals(d, second)
     if d.claims:
         changed = [a - b for a, b in zip(before, after, strict=True)]
-        laws = [(effect_words(c.effect), named(c.effect).moves_with) for c in d.claims]
+        laws = [(in_words(c.effect), named(c.effect).moves_with) for c in d.claims]
         wanted = [(kind_of(moves), f"{name} moves with {moves}") for name, moves in laws]
     elif d.verdict == "unexplained" and d.strongest:
         changed, name = after, d.strongest[0][0]

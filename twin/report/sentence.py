@@ -10,15 +10,11 @@ from twin.diagnose.evidence import IN_WORDS
 from twin.effects import named
 from twin.evaluate import KIND
 from twin.report.numbers import SHOWN, number, percent, plus_minus
+from twin.wording import in_words
 
 MOST = 3  # parameters of an effect named in a sentence
 SURE = 0.9  # probability below which what a lone claim cannot be told from is named as well as it
 MISSED = 2.0  # times the noise floor: what noise alone leaves of a trial of ten rows stays below it
-
-
-def effect_words(identifier: str) -> str:
-    """An effect's identifier as people say it: tendon_friction -> tendon friction."""
-    return identifier.replace("_", " ")
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -60,14 +56,15 @@ def claim_words(claim: Claim) -> str:
         surest = sorted(main, key=lambda n: -abs(claim.parameters[n].value - level) / (claim.parameters[n].std or math.inf))
         shown = [n for n in main if n in surest[:MOST]]
     words = [f"{n.replace('_', ' ')} = {plus_minus(claim.parameters[n])}" for n in shown]
-    return ", ".join([effect_words(claim.effect), *words, *(["…"] if len(main) > MOST else [])])
+    rest = f" and {len(main) - MOST} more" if len(main) > MOST else ""
+    return ", ".join([in_words(claim.effect), *words]) + rest
 
 
 def rivals(diagnosis: Diagnosis) -> list[str]:
     """Other explanations within the accuracy of the evidence, in words: sets that do not contain what is claimed."""
     claimed = {c.effect for c in diagnosis.claims}
     others = [effects for effects in diagnosis.ambiguous if not claimed or not claimed <= set(effects)]
-    return [" with ".join(effect_words(e) for e in effects) for effects in others]
+    return [" with ".join(in_words(e) for e in effects) for effects in others]
 
 
 def needs(lacking: tuple[str, ...]) -> str:
@@ -80,7 +77,7 @@ def blind(diagnosis: Diagnosis) -> str | None:
     lacking: dict[tuple[str, ...], list[str]] = {}
     shown = {v.effect for v in diagnosis.identifiability if math.isfinite(v.seen)}
     for effect, why in dict.fromkeys((v.effect, v.lacking) for v in diagnosis.identifiability if v.effect not in shown):
-        lacking.setdefault(why, []).append(effect_words(effect))
+        lacking.setdefault(why, []).append(in_words(effect))
     words = [f"{', '.join(names)} ({needs(why)})" for why, names in lacking.items()]
     return f"These data cannot show: {'; '.join(words)}." if words else None
 
@@ -92,7 +89,7 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def untried_words(diagnosis: Diagnosis) -> str:
     """What the budget left no time for; nothing where all was tried."""
-    names = [" ".join(effect_words(word) for word in name.split()) for name in diagnosis.untried]
+    names = [" ".join(in_words(word) for word in name.split()) for name in diagnosis.untried]
     if not names:
         return ""
     rest = f" and {len(names) - MOST} more" if len(names) > MOST else ""
@@ -120,9 +117,7 @@ def verdict_words(diagnosis: Diagnosis) -> str:
     explains = "" if share is None else f" {they} {percent(share)} of the structured error."
     doubt = f" These data cannot tell {'them' if many else 'it'} from {' or '.join(others[:2])}." if others else ""
     if others and not many and d.claims[0].probability < SURE:
-        names = (
-            f"{' or '.join((effect_words(d.claims[0].effect), *others[:2]))}, these data cannot tell which. The twin has {names}"
-        )
+        names = f"{' or '.join((in_words(d.claims[0].effect), *others[:2]))}, these data cannot tell which. The twin has {names}"
         doubt = ""
     little = left and d.structure_after <= d.bars.left and d.line[0] <= d.bars.faint
     rest = " Little is left, but something speaks against it: see what is left, and the notices." if little else ""
@@ -144,7 +139,7 @@ def error_words(diagnosis: Diagnosis) -> str:
         words = f"{where} the error is {after} {unit}, from {nominal} {unit} as described (noise floor {floor} {unit})."
     if worse := [g for g in groups(d) if e.after[g] > e.calibrated[g]]:
         by = max(e.after[g] / e.calibrated[g] - 1.0 for g in worse)
-        of = " and ".join(KIND[g].replace("_", " ") for g in worse)
+        of = " and ".join(in_words(KIND[g]) for g in worse)
         words += f" There this twin is worse than the calibrated one in {of}, by {percent(by)}."
     if e.lost:
         words += f" It has no equilibrium for sealed {', '.join(labels(d, e.lost))}, which counts for nothing here."

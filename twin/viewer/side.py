@@ -16,6 +16,7 @@ from twin.twin import Twin
 from twin.viewer.live import Heated, Live
 from twin.viewer.replay import Replay, Track
 from twin.viewer.scene import Scene
+from twin.wording import in_words
 
 DESCRIBED, BETTER = "as described", "with effects"
 
@@ -42,7 +43,7 @@ class Side:
             names = (DESCRIBED, BETTER)
             self.which = gui.add_dropdown("predicted", names, initial_value=first, hint="before and after a diagnosis")
             self.effects = {
-                e.id: gui.add_checkbox(e.id.replace("_", " "), True, hint=f"moves with {e.moves_with}") for e in self.twin.effects
+                e.id: gui.add_checkbox(in_words(e.id), True, hint=f"moves with {e.moves_with}") for e in self.twin.effects
             }
         for handle in (self.which, *self.effects.values()):
             changed(handle)
@@ -87,4 +88,4 @@ class Side:
         """What is shown, in words."""
         if self.which.value == DESCRIBED:
             return DESCRIBED
-        return ", ".join(e.id.replace("_", " ") for e in self.chosen().effects) or "no effect"
+        return ", ".join(in_words(e.id) for e in self.chosen().effects) or "no effect"

@@ -5,12 +5,13 @@ from __future__ import annotations
 from twin.diagnose import Claim
 from twin.report.numbers import SHOWN, column, percent, plus_minus
 from twin.report.sections.section import Section, Story
-from twin.report.sentence import effect_words, headline
+from twin.report.sentence import headline
+from twin.wording import in_words
 
 
 def section(story: Story) -> Section:
     d = story.diagnosis
-    claimed = " and ".join(effect_words(c.effect) for c in d.claims) or "no effect"
+    claimed = " and ".join(in_words(c.effect) for c in d.claims) or "no effect"
     return Section(
         "attribution",
         "Runners-up",
@@ -19,8 +20,8 @@ def section(story: Story) -> Section:
             "claimed": claimed,
             "unit": SHOWN[headline(d)][0],
             "runners_up": _table(d.runners_up, headline(d)),
-            "too_small": [effect_words(c.effect) for c in d.below_materiality],
-            "ambiguous": [" with ".join(effect_words(e) for e in effects) for effects in d.ambiguous],
+            "too_small": [in_words(c.effect) for c in d.below_materiality],
+            "ambiguous": [" with ".join(in_words(e) for e in effects) for effects in d.ambiguous],
             "small": _table(d.below_materiality, headline(d)),
         },
     )
@@ -31,7 +32,7 @@ def _table(claims: tuple[Claim, ...], group: str) -> list[dict[str, object]]:
     moved = column([c.contribution for c in claims], 2)
     return [
         {
-            "name": effect_words(c.effect),
+            "name": in_words(c.effect),
             "error": error,
             "moved": sigma,
             "probability": percent(c.probability),

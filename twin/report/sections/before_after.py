@@ -10,6 +10,7 @@ from twin.report.numbers import SHOWN, number, places, upper_first
 from twin.report.plots import ACCENT, BEFORE, MEASURED, Plot, figure
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import error_words, groups, labels
+from twin.wording import in_words
 
 ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with the effects"}
 
@@ -17,8 +18,7 @@ ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with th
 def section(story: Story) -> Section:
     d = story.diagnosis
     tables = [
-        {"kind": upper_first(KIND[g].replace("_", " ")), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)}
-        for g in groups(d)
+        {"kind": upper_first(in_words(KIND[g])), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)} for g in groups(d)
     ]
     content = {"tables": tables, "trials": labels(d, d.sealed_trials), "words": error_words(d)}
     return Section("before-after", "Before and after", "before_after.html", content)

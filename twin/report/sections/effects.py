@@ -8,7 +8,8 @@ from twin.diagnose import Claim
 from twin.effects import named
 from twin.report.numbers import SHOWN, column, percent, plus_minus, upper_first
 from twin.report.sections.section import Section, Story
-from twin.report.sentence import effect_words, explained_share, headline
+from twin.report.sentence import explained_share, headline
+from twin.wording import in_words
 
 
 def section(story: Story) -> Section:
@@ -35,7 +36,7 @@ def table(claims: tuple[Claim, ...], group: str) -> list[dict[str, object]]:
     moved = column([c.contribution for c in claims])
     return [
         {
-            "name": effect_words(c.effect),
+            "name": in_words(c.effect),
             "law": _in_words(c.effect),
             "parameters": [{"name": n, "value": plus_minus(f)} for n, f in c.parameters.items()],
             "probability": percent(c.probability),

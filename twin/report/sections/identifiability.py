@@ -8,7 +8,8 @@ from twin.diagnose.identifiability import Visibility
 from twin.quantities import Fitted
 from twin.report.numbers import column, percent, rough
 from twin.report.sections.section import Section, Story
-from twin.report.sentence import effect_words, needs
+from twin.report.sentence import needs
+from twin.wording import in_words
 
 
 def section(story: Story) -> Section:
@@ -21,11 +22,11 @@ def _rows(table: tuple[Visibility, ...]) -> list[dict[str, object]]:
     seen, apart = column([v.seen for v in table], 2), column([v.apart for v in table], 2)
     return [
         {
-            "name": f"{effect_words(v.effect)} ({v.form})" if v.form else effect_words(v.effect),
+            "name": f"{in_words(v.effect)} ({v.form})" if v.form else in_words(v.effect),
             "never": None if math.isfinite(v.seen) else f"never: {needs(v.lacking)}",
             "seen": a,
             "apart": b,
-            "rival": f"{effect_words(v.rival)}, {percent(1 - v.share)}" if v.rival else "",
+            "rival": f"{in_words(v.rival)}, {percent(1 - v.share)}" if v.rival else "",
             "smallest": _smallest(v),
             "lacking": "; ".join(v.lacking),
         }

@@ -8,6 +8,7 @@ from twin.evaluate import KIND
 from twin.report.numbers import SHOWN, column
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import groups
+from twin.wording import in_words
 
 
 def section(story: Story) -> Section:
@@ -19,7 +20,7 @@ def section(story: Story) -> Section:
         low, high = column([float(sigma.min()), float(sigma.max())])
         rows.append(
             {
-                "kind": KIND[g].replace("_", " "),
+                "kind": in_words(KIND[g]),
                 "channels": len(j),
                 "unit": SHOWN[g][0],
                 "sigma": low if low == high else f"{low} to {high}",
