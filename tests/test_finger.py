@@ -209,6 +209,22 @@ def test_tendons_pull_or_are_slack() -> None:
     np.testing.assert_allclose(tip(path)[2], tip(solve(one, command[2:3] - 1e-3))[0], atol=1e-7)  # slack: how slack does not matter
 
 
+def test_lengths_count_from_the_hanging_rest_without_its_payload() -> None:
+    """A bar of changing section, F, stretches by F int dz / (E pi r^2) = F h / (E pi a b) between radii a and b a length h apart:
+    slack cords along it grow by that, less what the clamp holds back (5 % of a beam's bending there, by others' finite elements)
+    and more by where on the last centimetre the cord ends. As set to zero before, drums then pull on a robot that has grown."""
+    grid, loads = body().lattice, Loads(HANGING, payload=0.02)
+    a, b = float(grid.cone.radius(0.01)), float(grid.cone.radius(0.1))
+    grown = 0.02 * 9.81 * 0.09 / (125e3 * np.pi * a * b)
+    slack = np.zeros((1, 4))
+    free, held = (solve(body(), slack, drives, loads=loads) for drives in (TENSION, HELD))
+    plain = solve(body(), slack, TENSION)
+    np.testing.assert_allclose(free.path - plain.path, grown, rtol=0.1)
+    np.testing.assert_allclose(plain.path, SoftStatics(body()).straight_path[None], atol=1e-9)
+    assert (held.tension > 0.01).all()
+    np.testing.assert_allclose(held.path, plain.path, atol=1e-6)
+
+
 def test_friction_leaves_what_the_capstan_law_says() -> None:
     """Pulled far beyond pre-sliding, every point slides: the last segment has exp(-mu total turn) of the base's tension. Found from
     the balance of the body: the same shape as without friction needs that much more at the base, within what the distribution of

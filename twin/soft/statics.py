@@ -62,7 +62,8 @@ class SoftStatics:
         return self.parts.cells.weight.size * 6
 
     def solve(self, problem: Problem) -> SoftPath:
-        """Equilibria in order; tendons held at lengths are measured from the hanging rest, and so is `path`.
+        """Equilibria in order; tendons held at lengths are measured from the hanging rest, under the weight of the body alone, and
+        so is `path`: a payload comes on when drums have been set to zero.
 
         The first sample without one ends the trial: from there on the status is NOT_FOUND and no shape is given. Raises SolveError
         for springs that pull, which nothing here solves.
@@ -149,8 +150,8 @@ class Trial:
         self.problem, self.parts, body = problem, statics.parts, statics.body
         n, nt = problem.command.shape
         loads, turn = problem.loads, turned(body.turn)
-        weight = np.outer(body.lattice.volume, body.density * loads.gravity @ turn)
-        self.force = weight + np.outer(statics.tip, loads.payload * loads.gravity @ turn) + statics.pressed(loads)
+        self.weight = np.outer(body.lattice.volume, body.density * loads.gravity @ turn)
+        self.force = self.weight + np.outer(statics.tip, loads.payload * loads.gravity @ turn) + statics.pressed(loads)
         self.wall = seen_from(loads.wall, turn, np.zeros(3))
         self.held = problem.which(Drive.DISPLACEMENT)
         self.scale = np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float)
@@ -176,17 +177,21 @@ class Trial:
             return b""
         cells, route = self.parts.cells, self.problem.route
         numbers = (
-            cells.shear, cells.bulk, cells.gradient, self.parts.cables.weights, self.force, self.wall, self.scale, self.held,
-            self.problem.command, np.array([route.mu, route.presliding, route.stretch]),
+            cells.shear, cells.bulk, cells.gradient, self.parts.cables.weights, self.weight, self.force, self.wall, self.scale,
+            self.held, self.problem.command, np.array([route.mu, route.presliding, route.stretch]),
         )  # fmt: skip
         return fingerprint(*numbers)
 
     def run(self) -> None:
-        """At rest under its loads, then all samples in order, up to the first that has no equilibrium."""
-        self.hangs = self._one(0, self.at, np.zeros(len(self.at), bool))
-        if self.hangs:
-            self.hanging = self.room.pulled.length.copy()
-            self.state.slip[:] = 0.0
+        """At rest under its own weight, where lengths count from; then under its loads; then all samples in order, up to the first
+        that has no equilibrium."""
+        slack, loaded = np.zeros(len(self.at), bool), self.force
+        self.force = self.weight
+        self.hangs = self._one(0, self.at, slack)
+        self.hanging, self.force = self.room.pulled.length.copy(), loaded
+        if self.hangs and (loaded != self.weight).any():
+            self.hangs = self._one(0, self.at, slack)
+        self.state.slip[:] = 0.0
         i, n, near = 0, len(self.status), self.problem.near
         kept = Kept(self.found.u[:0], self.found.tension[:0], self.found.inverse[:0])
         if near is not None and len(near.LU) == n:
