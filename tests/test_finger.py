@@ -223,6 +223,11 @@ def test_lengths_count_from_the_hanging_rest_without_its_payload() -> None:
     np.testing.assert_allclose(plain.path, SoftStatics(body()).straight_path[None], atol=1e-9)
     assert (held.tension > 0.01).all()
     np.testing.assert_allclose(held.path, plain.path, atol=1e-6)
+    before = named("tip_payload")({"mass": 0.02, "zeroed": 1.0}, 4).surround(Loads(HANGING))
+    there, drawn = (solve(body(), slack, drives, loads=before) for drives in (TENSION, HELD))
+    np.testing.assert_allclose(there.path, plain.path, atol=1e-9)
+    np.testing.assert_allclose(there.q, free.q, atol=1e-9)
+    assert (drawn.tension < 1e-6).all()
 
 
 def test_friction_leaves_what_the_capstan_law_says() -> None:

@@ -72,7 +72,8 @@ class Push:
 @dataclass(frozen=True)
 class Loads:
     """Surroundings of one trial: gravity (3,) m/s^2; payload (kg) and force (3,) N at the tip; a wall or a post (10,) as
-    `twin.effects.contact.obstacle` makes it; torque (n,) or (1,) N m on a jaw's hinge, along its positive angle; a push."""
+    `twin.effects.contact.obstacle` makes it; torque (n,) or (1,) N m on a jaw's hinge, along its positive angle; a push. `at_zero`:
+    the payload (kg) that hung on silicone already when its tendons' lengths were set to zero."""
 
     gravity: np.ndarray
     payload: float = 0.0
@@ -80,6 +81,7 @@ class Loads:
     wall: np.ndarray = field(default_factory=lambda: np.zeros(10))
     torque: np.ndarray = field(default_factory=lambda: np.zeros(1))
     push: Push | None = None
+    at_zero: float = 0.0
 
 
 @dataclass(frozen=True)

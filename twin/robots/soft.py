@@ -43,6 +43,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
                 "strain sensors",
                 "planes",
                 "length",
+                "hanging zero",
                 "rest shape",
                 "holes",
                 "surface",

@@ -150,8 +150,10 @@ class Trial:
         self.problem, self.parts, body = problem, statics.parts, statics.body
         n, nt = problem.command.shape
         loads, turn = problem.loads, turned(body.turn)
-        self.weight = np.outer(body.lattice.volume, body.density * loads.gravity @ turn)
-        self.force = self.weight + np.outer(statics.tip, loads.payload * loads.gravity @ turn) + statics.pressed(loads)
+        along = loads.gravity @ turn
+        weight = np.outer(body.lattice.volume, body.density * along)
+        self.zero = weight + np.outer(statics.tip, loads.at_zero * along)  # what lengths are set to zero under
+        self.force = weight + np.outer(statics.tip, loads.payload * along) + statics.pressed(loads)
         self.wall = seen_from(loads.wall, turn, np.zeros(3))
         self.held = problem.which(Drive.DISPLACEMENT)
         self.scale = np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float)
@@ -177,19 +179,19 @@ class Trial:
             return b""
         cells, route = self.parts.cells, self.problem.route
         numbers = (
-            cells.shear, cells.bulk, cells.gradient, self.parts.cables.weights, self.weight, self.force, self.wall, self.scale,
+            cells.shear, cells.bulk, cells.gradient, self.parts.cables.weights, self.zero, self.force, self.wall, self.scale,
             self.held, self.problem.command, np.array([route.mu, route.presliding, route.stretch]),
         )  # fmt: skip
         return fingerprint(*numbers)
 
     def run(self) -> None:
-        """At rest under its own weight, where lengths count from; then under its loads; then all samples in order, up to the first
-        that has no equilibrium."""
+        """At rest where lengths count from; then under its loads; then all samples in order, up to the first that has no
+        equilibrium."""
         slack, loaded = np.zeros(len(self.at), bool), self.force
-        self.force = self.weight
+        self.force = self.zero
         self.hangs = self._one(0, self.at, slack)
         self.hanging, self.force = self.room.pulled.length.copy(), loaded
-        if self.hangs and (loaded != self.weight).any():
+        if self.hangs and (loaded != self.zero).any():
             self.hangs = self._one(0, self.at, slack)
         self.state.slip[:] = 0.0
         i, n, near = 0, len(self.status), self.problem.near
