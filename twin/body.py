@@ -75,9 +75,9 @@ class Body:
     to act on: "weight", "elasticity" (one stiffness for all of it), "markers", "load cells", "strain sensors", "antagonists",
     "rope" (tendons that may bed in); and what it offers to change: "planes" of bending and stiffness along its "length"
     (`bend_unequally`, `grade`), its "rest shape" (`precurve`), "holes" (`reroute`), a "surface" that may touch, "viscosity" that
-    may creep, a "hanging zero" (lengths count from where it hangs, not from a straight body); "skin", whose patches it compares with
-    clouds (`Problem.seen`). `antagonists` as in `Signals`; `frame` is that of the markers; `tendons` are the sites each tendon passes,
-    base to tip, and `markers` those that are seen.
+    may creep, a "hanging zero" (lengths count from where it hangs, not from a straight body); "skin", whose patches it compares
+    with clouds (`Problem.seen`). `antagonists` as in `Signals`; `frame` is that of the markers; `tendons` are the sites each
+    tendon passes, base to tip, and `markers` those that are seen.
     """
 
     spec: mujoco.MjSpec
