@@ -124,14 +124,16 @@ def test_a_single_trial_is_left_out_by_quarters() -> None:
 
 
 def test_worse_is_all_channels_or_the_headline() -> None:
-    """Two channels, of which the marker is the headline: 1,000 samples each."""
+    """Two channels, of which the marker is the headline: 1,000 samples each. A description good for half a sigma of it, whose own
+    square is 0.25, may add that to 1; not to what is worse altogether."""
 
-    def of(marker: float, displacement: float) -> LeftOut:
+    def of(marker: float, displacement: float, accuracy: float = 0.0) -> LeftOut:
         outputs = [SimpleNamespace(group="displacement"), SimpleNamespace(group="marker")]
         study: Any = SimpleNamespace(
             bench=SimpleNamespace(outputs=outputs),
             objective=SimpleNamespace(n=2000),
             evidence=SimpleNamespace(present=np.ones((1000, 2), bool)),
+            accuracy=np.array([0.0, accuracy]),
         )
         return LeftOut(study, np.tile([displacement, marker], (1000, 1)))
 
@@ -142,3 +144,6 @@ def test_worse_is_all_channels_or_the_headline() -> None:
     assert of(1.02, 1.0).worse(plain), "the markers' error is worse, though the displacements' falls more"
     assert of(0.9, 2.1).worse(plain), "all channels together are worse"
     assert not plain.worse(plain)
+    assert not of(1.11, 1.0, accuracy=0.5).worse(plain), "1.232 of 1.26"
+    assert of(1.13, 1.0, accuracy=0.5).worse(plain), "1.277 of 1.26"
+    assert of(1.11, 1.95, accuracy=0.5).worse(plain), "all channels together are worse"
