@@ -14,6 +14,7 @@ from twin.quantities import Fitted
 from twin.report import console, sentence, widths
 from twin.report.loops import advice, loop_words
 from twin.report.numbers import column, number, percent, plus_minus, rough
+from twin.report.sections import before_after
 from twin.report.sentence import blind, claim_words, verdict_words
 from twin.wording import in_words
 
@@ -241,3 +242,28 @@ def test_loop_widths_are_drawn_of_loads_that_differ_whatever_their_size(size: fl
 )
 def test_identifiers_are_said_as_people_say_them(identifier: str, words: str) -> None:
     assert in_words(identifier) == words
+
+
+def test_small_numbers_keep_their_digits() -> None:
+    d = diagnosis()
+    e = d.errors
+    small = replace(
+        e,
+        nominal={**e.nominal, "tension": 0.08},
+        calibrated={**e.calibrated, "tension": 0.0303},
+        after={**e.after, "tension": 0.0089},
+        floor={**e.floor, "tension": 0.008},
+    )
+    assert "(noise floor 0.44 mm), of tendon tension from 0.030 to 0.009 N." in sentence(replace(d, errors=small))
+
+
+@pytest.mark.parametrize(("described", "cut"), [(3e-3, False), (0.11, True)])
+def test_a_description_far_off_does_not_hide_the_other_bars(described: float, cut: bool) -> None:
+    """0.88 mm, the upper end of the calibrated one's interval, is the most of the others: 3 mm are drawn, of 110 the bar is cut."""
+    d = diagnosis()
+    far = replace(d, errors=replace(d.errors, nominal=dict.fromkeys(d.errors.nominal, described)))
+    drawn = before_after.plot(far, "marker").figure
+    shown = drawn.layout.xaxis.range
+    assert (shown is not None) == cut
+    assert shown is None or 0.88 < shown[1] < 110.0
+    assert any("110" in str(a.text) for a in drawn.layout.annotations) == cut

@@ -9,7 +9,7 @@ from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.effects import named
 from twin.evaluate import KIND
-from twin.report.numbers import SHOWN, number, percent, plus_minus
+from twin.report.numbers import SHOWN, column, number, percent, places, plus_minus
 from twin.wording import in_words
 
 MOST = 3  # parameters of an effect named in a sentence
@@ -129,7 +129,8 @@ def error_words(diagnosis: Diagnosis) -> str:
     """The error on sealed trials, whatever it says."""
     d, group, e = diagnosis, headline(diagnosis), diagnosis.errors
     unit, factor = SHOWN[group]
-    nominal, before, after, floor = (number(x[group] * factor) for x in (e.nominal, e.calibrated, e.after, e.floor))
+    told = [factor * x[group] for x in (e.nominal, e.calibrated, e.after, e.floor)]
+    nominal, before, after, floor = (number(x, max(2, places(told[1:], 2))) for x in told)
     count = len(d.sealed_trials) - len(e.lost)
     where = f"On {count} sealed trial{'s' if count != 1 else ''}" + (", each in turn," if d.folds else "")
     if d.claims:
@@ -157,9 +158,7 @@ def _missed(d: Diagnosis) -> str:
             most = max(missed, key=lambda g: missed[g])
             unit, factor = SHOWN[most]
             off, floor = factor * left[most], factor * d.errors.floor[most]
-            told.append(
-                f"{labels(d, (k,))[0]} by {off:.2g} {unit} in {KIND[most].replace('_', ' ')} (noise floor {floor:.2g} {unit})"
-            )
+            told.append(f"{labels(d, (k,))[0]} by {off:.2g} {unit} in {in_words(KIND[most])} (noise floor {floor:.2g} {unit})")
     return f" But it misses sealed {', '.join(told)}: the fitted trials do not show all that happens there." if told else ""
 
 
@@ -168,8 +167,8 @@ def _besides(d: Diagnosis) -> str:
     e, words = d.errors, ""
     for group in (g for g in groups(d)[1:] if e.after[g] < 0.5 * e.calibrated[g]):
         unit, factor = SHOWN[group]
-        before, after = number(factor * e.calibrated[group]), number(factor * e.after[group])
-        words += f", of {KIND[group].replace('_', ' ')} from {before} to {after} {unit}"
+        before, after = column([factor * e.calibrated[group], factor * e.after[group]], 2)
+        words += f", of {in_words(KIND[group])} from {before} to {after} {unit}"
     return words
 
 

@@ -13,12 +13,14 @@ from twin.report.sentence import error_words, groups, labels
 from twin.wording import in_words
 
 ROWS = {"nominal": "as described", "calibrated": "calibrated", "after": "with the effects"}
+FAR = 5.0  # times all else: a description that is further off would leave nothing to see of the others, and its bar is cut off
+ROOM = 1.5  # times all else that a cut axis shows
 
 
 def section(story: Story) -> Section:
     d = story.diagnosis
     tables = [
-        {"kind": upper_first(in_words(KIND[g])), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": _plot(d, g)} for g in groups(d)
+        {"kind": upper_first(in_words(KIND[g])), "unit": SHOWN[g][0], "rows": rows(d, g), "plot": plot(d, g)} for g in groups(d)
     ]
     content = {"tables": tables, "trials": labels(d, d.sealed_trials), "words": error_words(d)}
     return Section("before-after", "Before and after", "before_after.html", content)
@@ -50,7 +52,8 @@ def _of(d: Diagnosis, stage: str, group: str) -> tuple[float, tuple[float, float
     return factor * value, None if interval is None else (factor * interval[0], factor * interval[1])
 
 
-def _plot(d: Diagnosis, group: str) -> Plot:
+def plot(d: Diagnosis, group: str) -> Plot:
+    """The errors of one group of outputs as bars; that of a description `FAR` off is cut and its number written in it."""
     shown, (unit, factor) = stages(d), SHOWN[group]
     found = [_of(d, s, group) for s in shown]
     ends = [interval or (value, value) for value, interval in found]
@@ -77,6 +80,11 @@ def _plot(d: Diagnosis, group: str) -> Plot:
     out.update_yaxes(autorange="reversed", ticks="", showgrid=False)
     out.update_xaxes(title_text=f"root-mean-square error ({unit})", rangemode="tozero")
     floor = factor * d.errors.floor[group]
+    others = max([floor, *(high for _, high in ends[1:])])
+    if values[0] > FAR * others:
+        out.update_xaxes(range=[0.0, ROOM * others])
+        text = f"{number(values[0], places(values[:1], 3))} {unit} \N{RIGHTWARDS ARROW}"
+        out.add_annotation(x=0.99, xref="paper", xanchor="right", y=ROWS[shown[0]], text=text, showarrow=False, font={"size": 12})
     out.add_vline(x=floor, line={"color": MEASURED, "width": 1.2, "dash": "dot"})
     out.add_annotation(x=floor, y=1, yref="paper", yanchor="bottom", text="noise floor", showarrow=False, font={"size": 12})
     return Plot("Error before and after, with the noise floor", height, out)
