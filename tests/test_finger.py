@@ -213,8 +213,8 @@ def test_lengths_count_from_the_hanging_rest_without_its_payload() -> None:
     """A bar of changing section, F, stretches by F int dz / (E pi r^2) = F h / (E pi a b) between radii a and b a length h apart:
     slack cords along it grow by that, less what the clamp holds back (5 % of a beam's bending there, by others' finite elements)
     and more by where on the last centimetre the cord ends. As set to zero before, drums then pull on a robot that has grown."""
-    grid, loads = body().lattice, Loads(HANGING, payload=0.02)
-    a, b = float(grid.cone.radius(0.01)), float(grid.cone.radius(0.1))
+    cone, loads = body().cone, Loads(HANGING, payload=0.02)
+    a, b = float(cone.radius(0.01)), float(cone.radius(0.1))
     grown = 0.02 * 9.81 * 0.09 / (125e3 * np.pi * a * b)
     slack = np.zeros((1, 4))
     free, held = (solve(body(), slack, drives, loads=loads) for drives in (TENSION, HELD))
