@@ -114,12 +114,13 @@ def test_a_robot_beside_the_file_is_found_from_there(tmp_path: Path) -> None:
 def test_standard_errors_and_units_are_kept(tmp_path: Path) -> None:
     twin = Twin(load("continuum"), {"disks.mass": 0.0051, "tendons.radius": 8.1e-3}, (catalogue()["tip_payload"](mass=2e-3),))
     laws = {"tip_payload": {"mass": Fitted(2e-3, 3e-4, "kg")}}
+    payload = {"mass": {"value": 2e-3, "std": 3e-4, "unit": "kg"}, "zeroed": {"value": 0.0, "unit": "1"}}
     path = stored(tmp_path, twin, parameters={"disks.mass": Fitted(0.0051, 1e-4, "kg")}, effects=laws)
     table = tomllib.loads(path.read_text())
     assert table["format"] == "twin/1"
     assert table["parameters"]["disks.mass"] == {"value": 0.0051, "std": 1e-4, "unit": "kg"}
     assert table["parameters"]["tendons.radius"] == {"value": 8.1e-3, "unit": "m"}
-    assert table["effect"] == [{"id": "tip_payload", "parameters": {"mass": {"value": 2e-3, "std": 3e-4, "unit": "kg"}}}]
+    assert table["effect"] == [{"id": "tip_payload", "parameters": payload}]
     assert table["provenance"] == {"seed": 0}
     assert [p.name for p in tmp_path.iterdir()] == ["twin.toml"]  # no half-written neighbour stays
 
