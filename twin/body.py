@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from twin.effects import Creep, Drive, Drives, Loads, Route, driven_by
 from twin.measurements.patches import Patches
+from twin.quantities import Size
 from twin.springs.spring import Spring
 
 TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm
@@ -91,6 +92,11 @@ class Body:
     frame: Frame = field(default_factory=Frame)
     tendons: tuple[tuple[str, ...], ...] = ()
     markers: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> Size:
+        """How large it is beside bodies for which effects' numbers are written: those without a rod, as the numbers have it."""
+        return Size()
 
     def first_mode(self) -> float:
         """Frequency (Hz) of the first mode, a scale for rates; without end for a body that only statics describes."""

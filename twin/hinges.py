@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from twin.body import Body
+from twin.quantities import Size
+
+ONE = (0.12, 1.625)  # m, N: length and strength of the nominal robot, for which effects' numbers are written
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,15 @@ class HingeChain(Body):
     length: float
     bows: bool = True
     stiffening: float = 0.0
+
+    @property
+    def size(self) -> Size:
+        """Its length, and the tension at which one tendon bends it by a radian, 1 / (r sum h/EI), beside the nominal robot's; to
+        two digits, since nothing depends on more."""
+        flexible = sum(1.0 / min(self.spec.joint(n).stiffness[0] for n in (at.bend_x, at.bend_y)) for at in self.joints)
+        radius = max(math.hypot(*self.spec.site(holes[0]).pos[:2]) for holes in self.tendons)
+        length, force = (float(f"{x / one:.2g}") for x, one in zip((self.length, 1.0 / (radius * flexible)), ONE, strict=True))
+        return Size(length, force)
 
     def bend_unequally(self, along: float, across: float) -> None:
         """Of EI_x and EI_y make EI_x (1 + along), EI_y (1 - along) and sqrt(EI_x EI_y) across between them: the hinges are turned

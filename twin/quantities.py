@@ -6,13 +6,33 @@ Values are SI everywhere inside the program; units as people write them are conv
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.errors import DataError, TwinError, did_you_mean
 
 Values = Mapping[str, float]
+ABOVE = 5e-324  # the least number above zero
+
+# With which powers of a robot's length and force quantities grow: weights are forces, times stay. Units not listed do not grow.
+POWERS = {
+    "m": (1, 0), "1/m": (-1, 0), "N": (0, 1), "kg": (0, 1), "N/s": (0, 1), "m/N": (1, -1), "N/m": (-1, 1), "N*m": (1, 1),
+    "N*m*s/rad": (1, 1),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Size:
+    """How long, and how strong, a robot is beside the one for which effects' numbers are written (`HingeChain.size`)."""
+
+    length: float = 1.0
+    force: float = 1.0
+
+    def of(self, unit: str) -> float:
+        """By how much a quantity in this SI unit is larger on such a robot, by dimensional analysis."""
+        length, force = POWERS.get(unit, (0, 0))
+        return self.length**length * self.force**force
 
 
 @dataclass(frozen=True)
@@ -40,6 +60,20 @@ class Parameter:
             raise DataError(f"parameter {self.name}: value {self.value:g} lies outside its bounds [{self.low:g}, {self.high:g}]")
         if self.std is not None and not self.std > 0:
             raise DataError(f"parameter {self.name}: std must be positive, got {self.std:g}")
+
+    def on(self, size: Size) -> Parameter:
+        """The same of a robot of this size, where it is written for one of size 1."""
+        by = size.of(self.unit)
+        std, scale = (None if x is None else x * by for x in (self.std, self.scale))
+        return replace(self, value=self.value * by, low=self.low * by, high=self.high * by, std=std, scale=scale)
+
+    @property
+    def anywhere(self) -> Parameter:
+        """The same with the bounds of robots of any size: of what grows with them its sign."""
+        if self.unit not in POWERS:
+            return self
+        low = -np.inf if self.low < 0.0 else ABOVE if self.low > 0.0 else 0.0
+        return replace(self, low=low, high=np.inf)
 
     @property
     def step(self) -> float:
@@ -72,9 +106,10 @@ def check_bounds(parameter: Parameter, value: float) -> None:
     """Raises TwinError where `value` is not a finite number inside the parameter's bounds (to rounding)."""
     slack = 1e-9 * max((abs(b) for b in (parameter.low, parameter.high) if np.isfinite(b)), default=1.0)
     if not (np.isfinite(value) and parameter.low - slack <= value <= parameter.high + slack):
-        raise TwinError(
-            f"parameter {parameter.name} = {value:g} {parameter.unit}: allowed is [{parameter.low:g}, {parameter.high:g}]"
-        )
+        end = {0.0: "0 or more", ABOVE: "more than 0", -np.inf: "any finite number"}
+        both = f"[{parameter.low:g}, {parameter.high:g}]"
+        allowed = end.get(parameter.low, both) if parameter.high == np.inf else both
+        raise TwinError(f"parameter {parameter.name} = {value:g} {parameter.unit}: allowed is {allowed}")
 
 
 def each(values: Values, name: str, *counts: int) -> np.ndarray:

@@ -70,7 +70,7 @@ def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
         raise DataError(listed(problems))
     robot = load(file.robot, folder)
     values = read_values(file.parameters, robot.parameters, "parameters", problems)
-    effects = read_effects(file.effect, robot.n_tendon, problems)
+    effects = read_effects(file.effect, robot.n_tendon, robot.size, problems)
     if not problems:
         problems += robot.objections(values)
     if problems:

@@ -162,6 +162,15 @@ def test_a_zero_offset_of_the_load_cell_passes_with_a_notice_and_a_push_does_not
         read(folder)
 
 
+def test_a_strong_robots_cell_may_be_off_by_a_twentieth_of_its_largest_reading(folder: Path) -> None:
+    edit(folder / "a.csv", "0.1,100", "0.1,6000")  # 59 N, so that its zero may be off by 300 gf
+    edit(folder / "a.csv", "0.0,0,", "0.0,-299,")
+    assert len(read(folder).notices) == 1
+    edit(folder / "a.csv", "0.0,-299,", "0.0,-301,")
+    with pytest.raises(DataError, match="row 2, column tendon_1_tension"):
+        read(folder)
+
+
 def test_a_file_over_the_limit_is_not_read(folder: Path) -> None:
     with (folder / "a.csv").open("wb") as sparse:
         sparse.truncate(bounds.LARGEST_TRIAL + 1)

@@ -20,6 +20,7 @@ from twin.calibrate import Fit, Objective, fit
 from twin.diagnose import Diagnosis, Settings, diagnose
 from twin.diagnose.objective import objective_of
 from twin.effects import named
+from twin.effects.similar import starts
 from twin.errors import SolveError
 from twin.measurements import Recording
 from twin.robots import load
@@ -138,7 +139,7 @@ def giving_way(bench: Bench, rows: Sequence[int]) -> tuple[Twin, Twin]:
 def _with(objective: Objective, found: Fit, name: str, n_tendon: int) -> Fit:
     """One effect more, from the best of its starts."""
     predicted = [t.true for t in found.evaluation.traces.values()]
-    begun = named(name).starts(predicted, n_tendon)
+    begun = starts(named(name), predicted, n_tendon, objective.bench.robot.size)
     return min((fit(objective, found.model.with_effect(name, s.values, s.free, n_tendon)) for s in begun), key=lambda f: f.cost)
 
 

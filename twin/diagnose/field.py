@@ -57,8 +57,8 @@ def field(study: Study, final: Weighed) -> Field | None:
         return None
     at = body.senses["tip_x"].index
     tip = np.concatenate([fit.evaluation.traces[k].true.markers[:, at] for k in study.trials])
-    twin = fit.model.twin
-    pushed = [(Model(replace(twin, effects=(*twin.effects, TipForce({f"along_{a}": PROBE}))), ()), PROBE) for a in "xyz"]
+    twin, probe = fit.model.twin, PROBE * study.bench.robot.size.force
+    pushed = [(Model(replace(twin, effects=(*twin.effects, TipForce({f"along_{a}": probe}))), ()), probe) for a in "xyz"]
     C = study.objective.columns(fit.evaluation, pushed, unsolved="zeros")
     away = tip - tip.mean(axis=0)
     rows = np.repeat(away, len(fit.z) // len(tip), axis=0)

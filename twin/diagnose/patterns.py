@@ -10,6 +10,7 @@ import numpy as np
 from twin.bench import Bench
 from twin.calibrate import Fit, Model, Objective
 from twin.effects import Start, catalogue
+from twin.effects.similar import declared, starts
 from twin.errors import TwinError
 from twin.twin import Twin, report
 
@@ -55,7 +56,7 @@ def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = N
     for identifier, law in catalogue().items():
         if identifier in present or present & set(law.akin) or not law.needs <= parts or not (among is None or identifier in among):
             continue
-        for start in (s for s in law.starts(predicted, bench.n_tendon) if s.needs <= parts):
+        for start in (s for s in starts(law, predicted, bench.n_tendon, bench.robot.size) if s.needs <= parts):
             try:
                 models, names = _patterns(fit.model, bench, identifier, start)
             except TwinError:
@@ -70,7 +71,7 @@ def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = N
 def _patterns(model: Model, bench: Bench, identifier: str, start: Start) -> tuple[list[tuple[Model, float]], list[str]]:
     """For each amplitude of the effect, the model with that amplitude alone switched on, and by how much."""
     law = catalogue()[identifier]
-    off = {p.name: p.value for p in law.declared(bench.n_tendon)}
+    off = {p.name: p.value for p in declared(law, bench.n_tendon, bench.robot.size)}
     shape = {k: v for k, v in start.values.items() if k in law.shape}
     names = [n for n in start.free if n not in law.shape]
     models = []

@@ -12,6 +12,7 @@ from twin.diagnose.study import Study
 from twin.diagnose.thresholds import LITTLE, ROUGHLY
 from twin.diagnose.zeros import of_robot
 from twin.effects import Start, catalogue
+from twin.effects.similar import fuller_starts
 from twin.errors import SolveError
 
 Laws = tuple[tuple[str, str], ...]  # effect and its form, sorted; by these sets are told apart
@@ -94,7 +95,8 @@ def fuller(study: Study, found: Weighed, accept: float) -> Weighed:
             continue
         plain, in_force = found, set(richer) & set(free)
         law = next(e for e in plain.fit.model.twin.effects if e.id == effect)
-        starts = law.fuller_starts([t.true for t in plain.fit.evaluation.traces.values()])
+        predicted = [t.true for t in plain.fit.evaluation.traces.values()]
+        starts = fuller_starts(law, predicted, study.bench.robot.size)
         starts = [s for s in starts if in_force <= set(s.free) and not set(s.free) <= set(free)]
         if not starts:
             continue

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 
-NO_LAWS = ("effect", "levelling")  # what laws share
+NO_LAWS = ("effect", "levelling", "similar")  # what laws share
 
 
 @cache

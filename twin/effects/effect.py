@@ -226,9 +226,9 @@ class Effect(ABC):
     moves_with: ClassVar[str]
 
     def __init__(self, values: Values | None = None, n_tendon: int = 3, **named: float) -> None:
-        """Raises TwinError for an unknown parameter or a value outside its bounds."""
+        """What is not given is as on a robot of size 1. Raises TwinError for an unknown parameter or a value that no robot has."""
         try:
-            self.values: dict[str, float] = overrides(self.declared(n_tendon), {**(values or {}), **named})
+            self.values: dict[str, float] = overrides([p.anywhere for p in self.declared(n_tendon)], {**(values or {}), **named})
         except TwinError as error:
             raise TwinError(f"effect {self.id}: {error}") from None
         self.n_tendon = n_tendon

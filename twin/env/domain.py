@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from twin.effects import Effect, catalogue
+from twin.effects.similar import declared
 from twin.errors import DataError, UnknownNameError
 from twin.measurements.files import is_file
 from twin.quantities import Parameter
@@ -94,19 +95,19 @@ def draw(twin: Twin, spread: Spread, ranges: Mapping[str, tuple[float, float]], 
         effects.setdefault(effect, catalogue()[effect]({}, twin.robot.n_tendon))
         if parameter not in effects[effect].values:
             raise UnknownNameError("parameter to draw", name, [f"{effect}.{n}" for n in effects[effect].values])
-    return replace(twin, values=values, effects=tuple(_redrawn(e, off, ranges, rng) for _, e in sorted(effects.items())))
+    return replace(twin, values=values, effects=tuple(_redrawn(e, twin, off, ranges, rng) for _, e in sorted(effects.items())))
 
 
 def _of(effect: str, twin: Twin) -> tuple[Parameter, ...]:
-    return catalogue()[effect].declared(twin.robot.n_tendon)
+    return declared(catalogue()[effect], twin.robot.n_tendon, twin.robot.size)
 
 
 def _redrawn(
-    effect: Effect, off: Mapping[str, float], ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator
+    effect: Effect, twin: Twin, off: Mapping[str, float], ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator
 ) -> Effect:  # fmt: skip
     values = {
         p.name: _drawn(p, effect[p.name], off.get(f"{effect.id}.{p.name}"), ranges.get(f"{effect.id}.{p.name}"), rng)
-        for p in effect.declared(effect.n_tendon)
+        for p in _of(effect.id, twin)
     }
     return type(effect)(values, effect.n_tendon)
 

@@ -13,9 +13,10 @@ from twin.measurements.tables import Table
 
 _LEAST_SAMPLES = 3
 SHORTEST_STEP, LONGEST_TRIAL = 1e-6, 1e7  # s: a microsecond, faster than any robot here is logged; four months
-# How far below zero an input tension may read: sigmas of declared noise, or what the zero of a load cell may be off; the wider
-# counts. An offset is data, which the diagnosis can name (load_cell_bias); a pushing tendon is not.
-SLACK_SIGMAS, _ZERO_OFFSET = 5.0, 0.3  # -, N
+# How far below zero an input tension may read: sigmas of declared noise, or what the zero of a load cell may be off, of a small
+# one and of the largest reading of a trial; the widest counts. An offset is data, which the diagnosis can name (load_cell_bias); a
+# pushing tendon is not.
+SLACK_SIGMAS, _ZERO_OFFSET, _OF_LARGEST = 5.0, 0.3, 0.05  # -, N, -
 
 
 def check_table(table: Table, channels: Sequence[Channel]) -> None:
@@ -43,7 +44,7 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         if channel.si_unit == "K":
             _check_floor(table, channel, column, 0.0, "below absolute zero; leave the cell empty if it is missing")
         elif channel.kind == "tendon_tension" and channel.role == "input":
-            slack = max(SLACK_SIGMAS * (channel.noise or 0.0), _ZERO_OFFSET)
+            slack = max(SLACK_SIGMAS * (channel.noise or 0.0), _ZERO_OFFSET, _OF_LARGEST * np.nanmax(column, initial=0.0))
             advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign"
             _check_floor(table, channel, column, -slack, advice)
 

@@ -9,10 +9,11 @@ from typing import Any
 from pydantic import Field
 
 from twin.effects import Effect, named
+from twin.effects.similar import declared
 from twin.errors import DataError, TwinError, did_you_mean, shown
 from twin.forms import Form, fill
 from twin.measurements.quantity_strings import number
-from twin.quantities import Parameter, check_bounds
+from twin.quantities import Parameter, Size, check_bounds
 from twin.units import difference_scale, unit_scale
 
 
@@ -31,8 +32,8 @@ class Value(Form):
     std: Any = None
 
 
-def read_effects(entries: Sequence[object], n_tendon: int, problems: list[str]) -> list[Effect]:
-    """The effects of a file; all that is wrong with them is added to `problems`."""
+def read_effects(entries: Sequence[object], n_tendon: int, size: Size, problems: list[str]) -> list[Effect]:
+    """The effects of a file, of a robot of this size; all that is wrong with them is added to `problems`."""
     found: list[Effect] = []
     for at, entry in enumerate(entries, 1):
         table = fill(EffectTable, entry, f"effect {at}", problems)
@@ -46,19 +47,20 @@ def read_effects(entries: Sequence[object], n_tendon: int, problems: list[str]) 
         if any(e.id == table.id for e in found):
             problems.append(f"effect {table.id} stands there twice; merge the two")
         before = len(problems)
-        values = read_values(table.parameters, law.declared(n_tendon), f"effect {table.id}", problems)
+        parameters = declared(law, n_tendon, size)
+        values = read_values(table.parameters, parameters, f"effect {table.id}", problems)
         if len(problems) == before:
-            found.append(law(values, n_tendon))
+            found.append(law({**{p.name: p.value for p in parameters}, **values}, n_tendon))
     return found
 
 
-def read_uncertain(entries: Sequence[object], effects: Sequence[Effect]) -> tuple[tuple[str, Parameter], ...]:
+def read_uncertain(entries: Sequence[object], effects: Sequence[Effect], size: Size) -> tuple[tuple[str, Parameter], ...]:
     """Of the effects as they were read from these entries, the parameters whose std is given: what is believed of each, SI, beside
     its effect's identifier."""
     found = []
     for entry, law in zip(entries, effects, strict=True):
         table = EffectTable.model_validate(entry).parameters
-        for parameter in law.declared(law.n_tendon):
+        for parameter in declared(type(law), law.n_tendon, size):
             written = table.get(parameter.name)
             if isinstance(written, Mapping) and written.get("std") is not None:
                 std = difference_scale(str(written["unit"]), parameter.unit).to_si(number(written["std"]))

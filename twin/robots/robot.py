@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ from twin.errors import DataError, TwinError, UnknownNameError, listed, shown
 from twin.forms import Form, Line, fill
 from twin.hinges import HingeChain
 from twin.measurements.files import is_file, read_text
-from twin.quantities import Parameter, Values, overrides
+from twin.quantities import Parameter, Size, Values, overrides
 from twin.robots.effect_tables import read_effects, read_uncertain
 from twin.robots.family import family
 from twin.robots.schema import GRAVITY, Fact, Quantity, Row, Schema, Structure, absent, parameters, unknown
@@ -58,6 +58,11 @@ class Robot:
     def nuisance(self) -> tuple[Parameter, ...]:
         """What a built robot may differ in from its description."""
         return tuple(p for p in self.parameters if p.std is not None)
+
+    @cached_property
+    def size(self) -> Size:
+        """How large it is, as described, beside the robots for which effects' numbers are written."""
+        return self.build().size
 
     def build(self, values: Values | None = None) -> Body:
         """The MuJoCo body at the given parameter values, nominal where none is given. Raises TwinError for a bad name."""
@@ -164,9 +169,12 @@ def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
     found = _parameters(schema, structure, file.parameters, problems)
     gravity = _read_fact(GRAVITY, file.gravity, {"axis": 3}, problems)
     accuracy = _read_fact(schema.accuracy, file.accuracy, {}, problems)
-    effects = read_effects(file.effect, structure.counts()["tendon"], problems)
+    nominal = {p.name: p.value for p in found}
     if not problems:
-        problems += schema.objections(structure, {p.name: p.value for p in found})
+        problems += schema.objections(structure, nominal)
+    counts = structure.model_dump(exclude_none=True)
+    size = family(file.family).build(counts, nominal).size if file.effect and not problems else Size()
+    effects = read_effects(file.effect, structure.counts()["tendon"], size, problems)
     if problems:
         raise DataError(listed(problems))
     pull = np.array([p.value for p in gravity])
@@ -176,12 +184,12 @@ def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
         family=file.family,
         title=file.title,
         folder=folder,
-        structure=structure.model_dump(exclude_none=True),
+        structure=counts,
         parameters=tuple(p for p in found if p.name not in {row.name for row in schema.rows if row.stated}),
         gravity=pull,
         accuracy=accuracy[0].value,
         effects=tuple((e.id, e.values) for e in effects),
-        uncertain=read_uncertain(file.effect, effects),
+        uncertain=read_uncertain(file.effect, effects, size),
     )
 
 

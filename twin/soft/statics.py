@@ -187,18 +187,17 @@ class Trial:
     def run(self) -> None:
         """At rest where lengths count from; then under its loads; then all samples in order, up to the first that has no
         equilibrium."""
-        slack, loaded = np.zeros(len(self.at), bool), self.force
-        self.force = self.zero
-        self.hangs = self._one(0, self.at, slack)
-        self.hanging, self.force = self.room.pulled.length.copy(), loaded
-        if self.hangs and (loaded != self.zero).any():
-            self.hangs = self._one(0, self.at, slack)
+        slack = np.zeros(len(self.at), bool)
+        self.hangs = self._one(0, self.at, slack, self.zero)
+        self.hanging = self.room.pulled.length.copy()
+        if self.hangs and (self.force != self.zero).any():
+            self.hangs = self._one(0, self.at, slack, self.force)
         self.state.slip[:] = 0.0
         i, n, near = 0, len(self.status), self.problem.near
         kept = Kept(self.found.u[:0], self.found.tension[:0], self.found.inverse[:0])
         if near is not None and len(near.LU) == n:
             kept = Kept(near.q, near.tension, near.LU)
-        way = self._way(slice(0, n), self.problem.command, self.held)
+        way = self._way(slice(0, n), self.problem.command, self.held, self.force)
         while i < n and self.hangs:
             end = along(self.parts, way, kept, i, self.state, self.found, self.room)
             self.status[i:end] = DIRECT
@@ -226,7 +225,7 @@ class Trial:
         if i and self.status[i - 1]:
             self.state.u[:], self.state.tension[:] = self.found.u[i - 1], self.found.tension[i - 1] / self.scale[i - 1]
         while done < 1.0 and part > SMALLEST:
-            if self._one(i, start + min(1.0, done + part) * (goal - start), self.held):
+            if self._one(i, start + min(1.0, done + part) * (goal - start), self.held, self.force):
                 done += part
                 part = min(2.0 * part, 1.0 - done)
             else:
@@ -237,19 +236,20 @@ class Trial:
             self.found.inverse[i] = self.state.inverse
         return done >= 1.0
 
-    def _one(self, i: int, command: np.ndarray, held: np.ndarray) -> bool:
-        """To one command under the loads of sample i."""
+    def _one(self, i: int, command: np.ndarray, held: np.ndarray, force: np.ndarray) -> bool:
+        """To one command under `force` (n_free, 3) N on the nodes and what else loads sample i."""
         n, nt, nq = 1, len(command), self.state.u.size
         nothing = Kept(np.empty((0, nq)), np.empty((0, nt)), np.empty((0, nq, nq), np.float32))
         found = Found(np.empty((n, nq)), np.empty((n, nt)), np.empty((n, nt)), nothing.inverse, np.zeros(n, bool))
-        return along(self.parts, self._way(slice(i, i + 1), command[None], held), nothing, 0, self.state, found, self.room) == 1
+        way = self._way(slice(i, i + 1), command[None], held, force)
+        return along(self.parts, way, nothing, 0, self.state, found, self.room) == 1
 
-    def _way(self, rows: slice, command: np.ndarray, held: np.ndarray) -> Way:
+    def _way(self, rows: slice, command: np.ndarray, held: np.ndarray, force: np.ndarray) -> Way:
         problem, scale = self.problem, self.scale[rows]
         once = problem.once and len(command) == len(self.scale)
         tension, free = np.ascontiguousarray(np.maximum(command, 0.0)), np.ascontiguousarray(self.hanging - command)
         return Way(
-            tension, free, held, np.outer(scale, np.full(len(held), problem.route.stretch)), self.force, self.wall, scale,
+            tension, free, held, np.outer(scale, np.full(len(held), problem.route.stretch)), force, self.wall, scale,
             float(problem.route.mu), float(problem.route.presliding),
             np.array(problem.time[rows], float), np.array(problem.creep.amplitude, float), np.array(problem.creep.time, float),
             CLOSE * problem.tolerance / TOLERANCE, once, problem.keep,
