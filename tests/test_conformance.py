@@ -15,7 +15,9 @@ from twin.bench import prepare
 from twin.effects import Drive, Effect, catalogue, named
 from twin.errors import SolveError, TwinError
 from twin.measurements import Channel, Recording, Trial
+from twin.quantities import Size
 from twin.robots import load
+from twin.robots.effect_tables import read_effects
 from twin.twin import Twin, readings, report, simulate
 
 FIXED = {
@@ -167,9 +169,13 @@ def test_off_is_the_plain_twin(law: type[Effect], two_trials: Recording) -> None
 def test_unknown_parameters_and_broken_bounds_are_refused(law: type[Effect]) -> None:
     with pytest.raises(TwinError, match=rf"effect {law.id}.*available"):
         law({"nonsense": 1.0})
-    p = law.declared(3)[0]
+    p, problems = law.declared(3)[0], []
     with pytest.raises(TwinError, match=rf"effect {law.id}.*allowed"):
-        law({p.name: p.high + 1.0 + abs(p.high)})
+        law({p.name: np.nan})
+    # The bounds of a robot's size are those of files that name a robot.
+    beyond = {"id": law.id, "parameters": {p.name: p.high + 1.0 + abs(p.high)}}
+    assert read_effects([beyond], 3, Size(), problems) == []
+    assert [f"effect {law.id}" in said and "allowed" in said for said in problems] == [True]
 
 
 def starts(law: type[Effect], data: Recording) -> list[Effect]:

@@ -254,7 +254,7 @@ def test_small_numbers_keep_their_digits() -> None:
         after={**e.after, "tension": 0.0089},
         floor={**e.floor, "tension": 0.008},
     )
-    assert "(noise floor 0.44 mm), of tendon tension from 0.030 to 0.009 N." in sentence(replace(d, errors=small))
+    assert "(noise floor 0.44 mm), of tendon tension from 0.030 to 0.0089 N." in sentence(replace(d, errors=small))
 
 
 @pytest.mark.parametrize(("described", "cut"), [(3e-3, False), (0.11, True)])

@@ -69,3 +69,17 @@ def figure(traces: list[Any], height: int, **layout: Any) -> go.Figure:
     out.update_yaxes(quiet)
     out.layout.template = None  # type: ignore[attr-defined]
     return out
+
+
+def box(points: np.ndarray) -> dict[str, object]:
+    """Axes of equal scale around points (n, 3) mm, none shorter than a third of the longest."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = np.maximum(1.1 * (high - low), 0.33 * (high - low).max() + 1e-9)
+    middle = 0.5 * (low + high)
+    axis = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "#dfe3e6", "showspikes": False, "nticks": 7}
+    axes = {
+        f"{a}axis": {"title": {"text": f"{a} (mm)"}, "range": [float(m - s / 2), float(m + s / 2)], **axis}
+        for a, m, s in zip("xyz", middle, span, strict=True)
+    }
+    ratio = dict(zip("xyz", map(float, 1.25 * span / span.max()), strict=True))
+    return {**axes, "aspectmode": "manual", "aspectratio": ratio, "dragmode": "orbit"}

@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from twin.body import Body
 from twin.errors import DataError
-from twin.report.plots import ACCENT, BEFORE, MEASURED, figure, plain
+from twin.report.plots import ACCENT, BEFORE, MEASURED, box, figure, plain
 from twin.robots import Robot
 
 MM = 1e3
@@ -47,9 +47,11 @@ def draw(robot: Robot) -> go.Figure:
         traces.append(
             _lines([arrow], f"gravity, {pull:.2f} m/s²", line={"color": "#000000", "width": 6, "dash": "dot"}, text=["", "g"])
         )
-    axes = {f"{a}axis": {"title": {"text": f"{a} / mm"}} for a in "xyz"}
+    drawn = np.concatenate([np.array([t.x, t.y, t.z], float).T for t in traces])
+    scene = box(drawn[np.isfinite(drawn).all(axis=1)])
     title = {"text": plain(f"{robot.name}: {robot.title}"), "font": {"size": 15}}
-    return figure(traces, HEIGHT, scene={"aspectmode": "data", **axes}, title=title, margin={"l": 0, "r": 0, "t": 90, "b": 0})
+    beside = {"x": 0.0, "y": 1.0}  # above there is no room for twelve tendons
+    return figure(traces, HEIGHT, scene=scene, title=title, legend=beside, margin={"l": 0, "r": 0, "t": 50, "b": 0})
 
 
 def _solids(model: mujoco.MjModel, data: mujoco.MjData) -> list[go.Scatter3d]:

@@ -9,7 +9,7 @@ from twin.diagnose import Claim, Diagnosis
 from twin.diagnose.evidence import IN_WORDS
 from twin.effects import named
 from twin.evaluate import KIND
-from twin.report.numbers import SHOWN, column, number, percent, places, plus_minus
+from twin.report.numbers import SHOWN, number, percent, places, plus_minus
 from twin.wording import in_words
 
 MOST = 3  # parameters of an effect named in a sentence
@@ -167,7 +167,7 @@ def _besides(d: Diagnosis) -> str:
     e, words = d.errors, ""
     for group in (g for g in groups(d)[1:] if e.after[g] < 0.5 * e.calibrated[g]):
         unit, factor = SHOWN[group]
-        before, after = column([factor * e.calibrated[group], factor * e.after[group]], 2)
+        before, after = (number(x, places([x], 2)) for x in (factor * e.calibrated[group], factor * e.after[group]))
         words += f", of {in_words(KIND[group])} from {before} to {after} {unit}"
     return words
 

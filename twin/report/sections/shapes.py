@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from twin.diagnose import Diagnosis
 from twin.report import skin
 from twin.report.numbers import MM
-from twin.report.plots import BEFORE, MEASURED, Plot, figure, numbers
+from twin.report.plots import BEFORE, MEASURED, Plot, box, figure, numbers
 from twin.report.sections.section import Section, Story
 from twin.report.sentence import labels
 from twin.report.stages import before_and_after, markers
@@ -61,7 +61,7 @@ def _plot(d: Diagnosis, chosen: list[tuple[int, int]]) -> Plot:
     origin = {"size": 5, "color": BEFORE, "symbol": "square"}
     traces.append(go.Scatter3d(x=[0], y=[0], z=[0], name="origin of the base frame", mode="markers", marker=origin))
     every = np.concatenate([measured, *predicted, *larger]).reshape(-1, 3)
-    scene = {**_box(np.vstack([every, np.zeros(3)])), "camera": _camera(d.bench.inputs[chosen[0][0]].loads.gravity)}
+    scene = {**box(np.vstack([every, np.zeros(3)])), "camera": _camera(d.bench.inputs[chosen[0][0]].loads.gravity)}
     out = figure(traces, HEIGHT, scene=scene, updatemenus=[_buttons(times)], margin={"l": 0, "r": 0, "t": 44, "b": 44})
     return Plot("Measured and predicted shapes", HEIGHT, out)
 
@@ -71,20 +71,6 @@ def _magnification(measured: np.ndarray, predicted: list[np.ndarray]) -> float:
     largest = max(float(np.abs(p - measured).max()) for p in predicted)
     wanted = float(np.ptp(measured.reshape(-1, 3), axis=0).max()) / (6.0 * max(largest, 1e-9))
     return max([n for n in (2.0, 5.0, 10.0, 20.0, 50.0, 100.0) if n <= wanted], default=2.0)
-
-
-def _box(points: np.ndarray) -> dict[str, object]:
-    """Axes of equal scale around points (n, 3) mm, none shorter than a third of the longest."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    span = np.maximum(1.1 * (high - low), 0.33 * (high - low).max() + 1e-9)
-    middle = 0.5 * (low + high)
-    axis = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "#dfe3e6", "showspikes": False, "nticks": 7}
-    axes = {
-        f"{a}axis": {"title": {"text": f"{a} (mm)"}, "range": [float(m - s / 2), float(m + s / 2)], **axis}
-        for a, m, s in zip("xyz", middle, span, strict=True)
-    }
-    ratio = dict(zip("xyz", map(float, 1.25 * span / span.max()), strict=True))
-    return {**axes, "aspectmode": "manual", "aspectratio": ratio, "dragmode": "orbit"}
 
 
 def _camera(gravity: np.ndarray) -> dict[str, dict[str, float]]:
