@@ -40,12 +40,14 @@ class World:
         self.lost: set[str] = set()
         monkeypatch.setattr(stage, "catalogue", lambda: laws)
         monkeypatch.setattr(stage, "report", lambda effects, true: ((), true))
+        monkeypatch.setattr(stage, "starts", lambda law, predicted, n, size: law.starts(predicted, n) if size == "its size" else ())
+        monkeypatch.setattr(stage, "declared", lambda law, n, size: law.declared(n) if size == "its size" else ())
         twin = SimpleNamespace(effects=[SimpleNamespace(id=e) for e in present])
         model = SimpleNamespace(twin=twin, with_effect=self.with_effect)
         trace = SimpleNamespace(true="true")
         self.fit: Any = SimpleNamespace(model=model, evaluation=SimpleNamespace(traces={0: trace}), z=np.zeros(N))
         body = SimpleNamespace(parts=frozenset({"tendons"}))
-        bench = SimpleNamespace(n_tendon=3, robot=SimpleNamespace(build=lambda: body))
+        bench = SimpleNamespace(n_tendon=3, robot=SimpleNamespace(build=lambda: body, size="its size"))
         self.objective: Any = SimpleNamespace(bench=bench, columns=self.columns)
 
     def with_effect(self, identifier: str, values: dict[str, float], free: tuple[str, ...], n_tendon: int) -> Any:
