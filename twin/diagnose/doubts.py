@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from twin.calibrate import Fit
 from twin.diagnose.thresholds import DOUBTFUL
-from twin.effects.similar import similar
 
 
 def unlikely(found: Fit) -> list[str]:
@@ -25,8 +24,7 @@ def unlikely(found: Fit) -> list[str]:
 def strained(found: Fit) -> list[str]:
     """Effects whose parameter, one that may go either way, ended at an end of its range, or whose values nothing of that name has,
     in words: another law is behind them."""
-    twin = found.model.twin
-    reasons = ((e.id, similar(e, twin.robot.size).implausible()) for e in twin.effects)
+    reasons = ((e.id, e.implausible()) for e in found.model.twin.effects)
     said = [f"{effect.replace('_', ' ')}: {why}" for effect, why in reasons if why]
     for free, ended in zip(found.model.free, found.at_bound(), strict=True):
         p, value = free.parameter, found.model.value(free)
