@@ -499,7 +499,7 @@ def test_a_spring_that_is_not_driven_tells_nothing() -> None:
 def test_a_robot_without_springs_says_so() -> None:
     time = np.arange(0.0, 5.0)
     bare = load("continuum")
-    bare = type(bare)(**{**vars(bare), "parameters": tuple(p for p in bare.parameters if not p.name.startswith("springs."))})
+    bare = replace(bare, parameters=tuple(p for p in bare.parameters if not p.name.startswith("springs.")))
     with pytest.raises(DataError, match=r"no SMA springs.*displacements"):
         prepare(recording({f"sma_{i}_current": np.zeros(5) for i in (1, 2, 3)}, time), bare)
 
