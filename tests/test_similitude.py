@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 
 from tools.similitude import factor, resized
 from twin.bench import prepare
@@ -48,7 +50,7 @@ def test_the_nominal_robot_has_size_one_and_a_similar_one_its_factors(tmp_path: 
     assert load(str(tmp_path / "robot")).size == Size(LENGTHS, MASSES)
 
 
-# One value a law of the nominal robot that moves it by millimetres; laws of time alone grow with nothing.
+# One value a law of the nominal robot that moves it by 0.3 mm and more; laws of time alone grow with nothing.
 MOVING = {
     "actuator_saturation": {"loss": 0.4, "limit": 1.5, "corner": 0.2},
     "backbone_precurvature": {"about_x": 1.0, "slope": 0.5},
@@ -69,8 +71,8 @@ def tips(twin: Twin, folder: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("effect", MOVING)
 def test_a_similar_robot_under_a_similar_law_moves_alike(effect: str, tmp_path: Path) -> None:
-    """Every marker at three times the place, to 2e-5 of the robot's length: what the solver is asked for. What is not given, such
-    as the travel over which friction reverses, grows too."""
+    """The last disk at three times the place, to 2e-5 of the robot's length, twenty times what the solver is asked for. What is not
+    given, such as the travel over which friction reverses, grows too."""
     day = resized(FRIDAY, tmp_path, LENGTHS, MASSES)
     size, law, values = Size(LENGTHS, MASSES), named(effect), MOVING[effect]
     units = {p.name: p.unit for p in law.declared(3)}
@@ -112,7 +114,7 @@ def test_a_value_that_some_robot_has_is_taken_and_one_that_none_has_is_not() -> 
 
 def test_a_strong_robots_load_cell_is_off_by_newtons(tmp_path: Path) -> None:
     """3.2 N of 60, written into the readings of the bundled sample made twenty times as strong: beyond the range of the nominal
-    robot's cells. Found to 0.2 N, five times what it is uncertain by beside friction of another law."""
+    robot's cells. Found to 0.2 N, a sixteenth: the bench's friction is of another law."""
     day = resized(FRIDAY, tmp_path, LENGTHS, MASSES)
     for file in day.glob("*.csv"):
         rows = list(csv.reader(file.open(newline="")))
@@ -129,6 +131,11 @@ def test_a_strong_robots_load_cell_is_off_by_newtons(tmp_path: Path) -> None:
     assert found.model.twin.effects[-1]["bias_2"] == pytest.approx(3.2, abs=0.2)
 
 
-def test_a_factor_below_zero_is_refused(tmp_path: Path) -> None:
+def test_a_factor_below_zero_and_a_condition_that_is_not_grown_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="positive"):
         resized(FRIDAY, tmp_path, -1.0, 1.0)
+    told = tomllib.loads((FRIDAY / "measurements.toml").read_text())
+    told["trial"][1]["tip_force"] = [0.1, 0.0, 0.0]
+    (tmp_path / "measurements.toml").write_text(tomli_w.dumps(told))
+    with pytest.raises(DataError, match=r"fast_3\.csv.*tip_force"):
+        resized(tmp_path, tmp_path / "out", 2.0, 1.0)

@@ -165,3 +165,15 @@ def test_names_cannot_steer_the_terminal(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     simulated = read(tmp_path / "elsewhere/simulated")
     assert load(simulated.robot, simulated.folder).folder == folder.resolve()
+
+
+@pytest.mark.parametrize("name", ["continuum", "cable_tool", "hand"])
+def test_the_picture_holds_all_of_a_robot_at_one_scale(name: str) -> None:
+    picture = draw(load(name))
+    scene = picture.layout.scene
+    for axis in "xyz":
+        low, high = scene[f"{axis}axis"].range
+        every = np.concatenate([np.array(t[axis], float) for t in picture.data])
+        assert low <= np.nanmin(every)
+        assert np.nanmax(every) <= high
+        assert (high - low) / scene.aspectratio[axis] == pytest.approx(np.ptp(scene.zaxis.range) / scene.aspectratio.z)

@@ -7,7 +7,8 @@ Every length is multiplied by `--lengths` (lambda), every mass by `--masses` (mu
 stays what it is: forces go with mu, moduli with mu / lambda^2. By dimensional analysis (Buckingham 1914) the new set is what the
 same experiment gives on that robot. Temperatures, currents and angles stay.
 
-Writes OUT/robot and OUT/day. Errors: TwinError for a factor that is not positive or a set that cannot be read.
+Writes OUT/robot and OUT/day, of trials in CSV. Raises DataError for a factor that is not positive, and for a condition of a trial
+that it does not know how to grow.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from twin.errors import DataError
 from twin.robots.robot import models_folder
 
 _UNITS = pint.UnitRegistry()
+KNOWN = {"file", "start", "tip_payload", "ambient_temperature", "gravity"}  # of a trial; the last two stay
 
 
 def factor(unit: str, lengths: float, masses: float) -> float:
@@ -59,6 +61,8 @@ def resized(folder: Path, out: Path, lengths: float, masses: float) -> Path:
         if "noise" in channel:
             channel["noise"] *= by(channel["unit"])
     for trial in told["trial"]:
+        if other := trial.keys() - KNOWN:
+            raise DataError(f"{trial['file']}: not known how to grow {', '.join(sorted(other))}; leave the trial out")
         if "start" in trial:
             trial["start"] *= by("s")
         if "tip_payload" in trial:

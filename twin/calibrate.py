@@ -19,7 +19,7 @@ from scipy.optimize import lsq_linear
 from twin.bench import Bench
 from twin.body import TOLERANCE
 from twin.effects import Drive, Effect, named
-from twin.effects.similar import declared
+from twin.effects.similar import declared, on
 from twin.errors import SolveError
 from twin.information import scatter, solve, untold
 from twin.quantities import Fitted, Parameter
@@ -90,7 +90,7 @@ class Model:
         """This model plus an effect, its named parameters free."""
         law = named(identifier)
         table = {p.name: p for p in declared(law, n_tendon, self.twin.robot.size)}
-        effects = (*self.twin.effects, law({**{n: p.value for n, p in table.items()}, **values}, n_tendon))
+        effects = (*self.twin.effects, on(law, values, n_tendon, self.twin.robot.size))
         return Model(replace(self.twin, effects=effects), (*self.free, *(Free(identifier, table[n]) for n in names)))
 
     def without_effect(self, identifier: str) -> Model:

@@ -3,7 +3,7 @@ says of another is what it says of the similar one of that size, by dimensional 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from twin.effects.effect import Effect, Signals, Start
@@ -13,6 +13,11 @@ from twin.quantities import Parameter, Size
 def declared(law: type[Effect], n_tendon: int, size: Size) -> tuple[Parameter, ...]:
     """`Effect.declared` of a robot of this size: values, bounds and steps."""
     return tuple(p.on(size) for p in law.declared(n_tendon))
+
+
+def on(law: type[Effect], values: Mapping[str, float], n_tendon: int, size: Size) -> Effect:
+    """The effect of these values on a robot of this size; what is not given is as such a robot has it."""
+    return law({**{p.name: p.value for p in declared(law, n_tendon, size)}, **values}, n_tendon)
 
 
 def starts(law: type[Effect], predicted: list[Signals], n_tendon: int, size: Size) -> Iterator[Start]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from twin.effects import Effect, catalogue
-from twin.effects.similar import declared
+from twin.effects.similar import declared, on
 from twin.errors import DataError, UnknownNameError
 from twin.measurements.files import is_file
 from twin.quantities import Parameter
@@ -92,7 +92,7 @@ def draw(twin: Twin, spread: Spread, ranges: Mapping[str, tuple[float, float]], 
             continue
         if effect not in catalogue():
             raise UnknownNameError("parameter to draw", name, [*own, *(f"{e}.{p.name}" for e in catalogue() for p in _of(e, twin))])
-        effects.setdefault(effect, catalogue()[effect]({}, twin.robot.n_tendon))
+        effects.setdefault(effect, on(catalogue()[effect], {}, twin.robot.n_tendon, twin.robot.size))
         if parameter not in effects[effect].values:
             raise UnknownNameError("parameter to draw", name, [f"{effect}.{n}" for n in effects[effect].values])
     return replace(twin, values=values, effects=tuple(_redrawn(e, twin, off, ranges, rng) for _, e in sorted(effects.items())))

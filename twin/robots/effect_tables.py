@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field
 
 from twin.effects import Effect, named
-from twin.effects.similar import declared
+from twin.effects.similar import declared, on
 from twin.errors import DataError, TwinError, did_you_mean, shown
 from twin.forms import Form, fill
 from twin.measurements.quantity_strings import number
@@ -47,10 +47,9 @@ def read_effects(entries: Sequence[object], n_tendon: int, size: Size, problems:
         if any(e.id == table.id for e in found):
             problems.append(f"effect {table.id} stands there twice; merge the two")
         before = len(problems)
-        parameters = declared(law, n_tendon, size)
-        values = read_values(table.parameters, parameters, f"effect {table.id}", problems)
+        values = read_values(table.parameters, declared(law, n_tendon, size), f"effect {table.id}", problems)
         if len(problems) == before:
-            found.append(law({**{p.name: p.value for p in parameters}, **values}, n_tendon))
+            found.append(on(law, values, n_tendon, size))
     return found
 
 
