@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from tools.bench.rod import Rod
-from twin.body import Problem
-from twin.effects import Loads
-from twin.equilibrium import Equilibrium
+from tools.simulators.rod.rod import Rod
+from twin.body import Loads, Problem
+from twin.mechanics.rod import Equilibrium
 from twin.robots import Robot, load
 from twin.robots.robot import models_folder
 

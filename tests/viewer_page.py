@@ -18,10 +18,10 @@ import pytest
 import viser
 from PIL import Image
 
-from twin.effects import named
+from twin.effects import effect_class
 from twin.measurements import Recording, read
-from twin.twin import Twin
-from twin.viewer import App
+from twin.prediction.twin import Twin
+from twin.viewer import TwinPanel
 from twin.viewer.panel import Panel
 
 SAMPLE = Path(__file__).parents[1] / "models/continuum/samples/friday"
@@ -31,7 +31,7 @@ SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftsha
 
 
 def rubbing() -> Twin:
-    return replace(Twin.of("continuum"), effects=(named("tendon_friction")({"mu": 0.21}),))
+    return replace(Twin.of("continuum"), effects=(effect_class("tendon_friction")({"mu": 0.21}),))
 
 
 def sample() -> Recording:
@@ -47,8 +47,8 @@ class Served(Generic[P]):
 
 def served(
     twins: Sequence[tuple[str, Twin]], recording: Recording | None = None, port: int = 8650
-) -> AbstractContextManager[Served[App]]:
-    return serving(lambda server: App(server, twins, recording), port)
+) -> AbstractContextManager[Served[TwinPanel]]:
+    return serving(lambda server: TwinPanel(server, twins, recording), port)
 
 
 @contextmanager

@@ -1,43 +1,36 @@
-"""The picture on the README's first screen: the bundled bench day before and after the diagnosis. Needs matplotlib.
+"""Draw the picture on the README's first screen: the bundled recording before and after the diagnosis. Needs matplotlib.
 
-python tools/figures.py
+python -m tools.figures
 """
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import matplotlib
-
-matplotlib.use("svg")
-import matplotlib.pyplot as plt
 import numpy as np
 
-from twin.diagnose import Settings, diagnose
+from tools.benchmarks.figure import FIGURES, axes, save
+from twin.diagnosis import Settings, diagnose
 from twin.measurements import read
-from twin.robots import load
+from twin.prediction.twin import Twin
 from twin.robots.robot import models_folder
-from twin.twin import Twin
 
-OUT = Path(__file__).parent / "figures" / "friday.svg"
 STAGES = {"calibrated": ("#b0413e", "calibrated"), "after": ("#1f6f8b", "with tendon friction")}
 
 
 def main() -> None:
+    """Diagnose the recording and draw."""
     recording = read(models_folder() / "continuum/samples/friday")
-    d = diagnose(recording, Twin.of(load("continuum")), Settings())
-    bench = d.bench
+    d = diagnose(recording, Twin.of("continuum"), Settings())
+    bench = d.prepared
     tip = [next(j for j, o in enumerate(bench.outputs) if o.channel.name == f"disk_8_{a}") for a in "xyz"]
-    pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].command, axis=0))) for k in d.sealed_trials}
+    pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].command, axis=0))) for k in d.held_out_trials}
     trial = max(pulls, key=lambda k: float(np.ptp(bench.inputs[k].command)))
     tension = bench.inputs[trial].command[:, pulls[trial]]
-    plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"})
-    figure, (loop, bars) = plt.subplots(1, 2, figsize=(8.0, 2.9), width_ratios=(1.7, 1.0), layout="constrained")
+    figure, (loop, bars) = axes(2, (8.0, 2.9), width_ratios=(1.7, 1.0))
     for stage, (colour, label) in STAGES.items():
         error = 1e3 * np.linalg.norm(bench.measured[trial][:, tip] - d.predictions[stage][trial][:, tip], axis=1)
         loop.plot(tension, error, ".-", color=colour, lw=0.7, ms=3, label=label)
     loop.set(xlabel=f"tension of tendon {pulls[trial] + 1}, N", ylabel="tip error, mm", ylim=(0, None))
-    loop.set_title(f"a sealed trial ({bench.inputs[trial].name.removesuffix('.csv')})", fontsize=9, loc="left")
+    loop.set_title(f"a held-out trial ({bench.inputs[trial].name.removesuffix('.csv')})", fontsize=9, loc="left")
     loop.legend(frameon=False)
     values = [1e3 * e["marker"] for e in (d.errors.nominal, d.errors.calibrated, d.errors.after)]
     bars.barh(["as described", "calibrated", "with friction"], values, color=["#999999", "#b0413e", "#1f6f8b"])
@@ -45,11 +38,9 @@ def main() -> None:
     bars.invert_yaxis()
     for y, v in enumerate(values):
         bars.text(v, y, f" {v:.2f}", va="center")
-    bars.set(xlabel="RMS error on sealed trials, mm", xlim=(0, 1.2 * max(values)))
+    bars.set(xlabel="RMS error on held-out trials, mm", xlim=(0, 1.2 * max(values)))
     bars.set_title("dashed: noise floor", fontsize=9, loc="left")
-    OUT.parent.mkdir(exist_ok=True)
-    figure.savefig(OUT, metadata={"Date": None})
-    print(OUT)
+    save(figure, FIGURES / "friday.svg")
 
 
 if __name__ == "__main__":

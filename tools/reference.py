@@ -1,4 +1,4 @@
-"""Makes models/README.md, the reference of the three files people write, from the schemas that check them.
+"""Write models/README.md, the reference of the three files people write, from the schemas that check them.
 
 python -m tools.reference
 """
@@ -6,20 +6,20 @@ python -m tools.reference
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from twin.forms import Form
-from twin.measurements.channels import KINDS
-from twin.measurements.conditions import SCALARS, VECTORS
+from tools.benchmarks.table import markdown
+from twin.foundation.file_schema import TableSchema
+from twin.foundation.units import UNIT_EXAMPLES
+from twin.measurements.channels import CHANNEL_KINDS
+from twin.measurements.conditions import SCALAR_CONDITIONS, VECTOR_CONDITIONS
 from twin.measurements.read import ChannelTable, SetFile
-from twin.robots.family import families, family
+from twin.prediction.storage import TwinFile
+from twin.robots.family import family_names, load_family
 from twin.robots.robot import RobotFile
-from twin.robots.schema import ROOM, Row, Schema
-from twin.storage import TwinFile
-from twin.units import EXAMPLES
+from twin.robots.schema import BOUND_STDS, Row, Schema
 
 PAGE = Path(__file__).resolve().parent.parent / "models" / "README.md"
 
@@ -28,22 +28,23 @@ HEAD = """\
 
 Made by `python -m tools.reference` from the schemas that check the files; do not edit it.
 
-Anything that is not on this page is refused, with all that is wrong in one message. `twin new NAME --family FAMILY` writes a folder
-to begin with, `twin robots FOLDER` draws it. A robot is named by its name, if it ships with the twin, or by the path to its folder:
-on the command line from where you are, in a file from that file's folder.
+Anything that is not on this page is refused; one message lists all faults. `twin new NAME --family FAMILY` writes a folder to
+begin with, `twin robots FOLDER` draws it. A robot that ships with the twin goes by its name, another by the path to its folder:
+relative to the working folder on the command line, relative to the file's folder in a file.
 
-Units are any of the right dimension ("mm", "inch"; an angle needs an angle's unit, temperatures may be in degC or degF). Values are
-numbers, not text; `true` is no number.
+Units may be any of the right dimension ("mm", "inch"; an angle needs an angle's unit, temperatures may be in degC or degF).
+Values are numbers, not text; `true` is no number.
 """
 
 
 def main() -> None:
+    """Write the page."""
     PAGE.write_text(page(), "utf-8")
 
 
 def page() -> str:
-    """The whole page."""
-    parts = [HEAD, _robot(), *(_family(name, family(name).SCHEMA) for name in families()), _set(), _twin()]
+    """Return the whole page."""
+    parts = [HEAD, _robot(), *(_family(name, load_family(name).SCHEMA) for name in family_names()), _set(), _twin()]
     return "\n".join(parts)
 
 
@@ -57,13 +58,13 @@ Each number is an entry `"name" = {{ value = ..., unit = "...", source = "..." }
 | `unit` | the unit of `value`, `std`, `low` and `high` |
 | `source` | where the number comes from |
 | `std` | one standard deviation of what a built robot may differ by; such numbers are fitted to data. Left out: exact |
-| `low`, `high` | hard bounds of a fit. Left out: {ROOM:g} `std` to either side, within the range below |
+| `low`, `high` | hard bounds of a fit. Left out: {BOUND_STDS:g} `std` to either side, within the range below |
 """
     return "\n## robot.toml\n\n" + _keys(RobotFile) + entry
 
 
 def _family(name: str, schema: Schema) -> str:
-    out = [f'\n### family = "{name}"\n', "```", schema.picture.rstrip("\n"), "```", "", "[structure]", "", _keys(schema.structure)]
+    out = [f'\n### family = "{name}"\n', "```", schema.diagram.rstrip("\n"), "```", "", "[structure]", "", _keys(schema.structure)]
     out += ["[parameters]", "", "| name | unit | one | range | default | of | meaning |", "|---|---|---|---|---|---|---|"]
     out += [_row(row) for row in (*schema.rows, schema.accuracy)]
     if any(row.group for row in schema.rows):
@@ -72,22 +73,23 @@ def _family(name: str, schema: Schema) -> str:
 
 
 def _row(row: Row) -> str:
-    one = " and ".join(f"for each {kind}" for kind in row.shape) + (", or for all" if row.shape and row.for_all else "")
-    if row.stated:
+    one = " and ".join(f"for each {kind}" for kind in row.shape) + (", or for all" if row.shape and row.one_for_all else "")
+    if row.checked_only:
         default = "not checked"
     elif row.default is not None:
         default = f"{row.default:g}"
     else:
         default = f"none ({row.group})" if row.group else "required"
-    kinds = ", ".join(f"`{kind}`" for kind in sorted(row.only)) or "all"
+    kinds = ", ".join(f"`{kind}`" for kind in sorted(row.for_kinds)) or "all"
     name = f"`[{row.name}]`" if row.name == "accuracy" else f"`{row.name}`"
-    return f"| {name} | {row.usual} | {one or 'number'} | {row.range()} | {default} | {kinds} | {row.meaning} |"
+    return f"| {name} | {row.usual_unit} | {one or 'number'} | {row.range_text()} | {default} | {kinds} | {row.meaning} |"
 
 
 def _set() -> str:
-    units = [f"| `{pattern}` | {EXAMPLES.get(unit, unit)} |" for pattern, unit in KINDS.values()]
-    known = [f'| `{name}` | text with a unit, such as "10 {EXAMPLES[unit].split(", ")[-1]}" |' for name, unit in SCALARS.items()]
-    known += [f"| `{name}` | [x, y, z] in {unit}, base frame |" for name, unit in VECTORS.items()]
+    units = [f"| `{pattern}` | {UNIT_EXAMPLES.get(unit, unit)} |" for pattern, unit in CHANNEL_KINDS.values()]
+    scalars = {name: UNIT_EXAMPLES[unit].split(", ")[-1] for name, unit in SCALAR_CONDITIONS.items()}
+    known = [f'| `{name}` | text with a unit, such as "10 {unit}" |' for name, unit in scalars.items()]
+    known += [f"| `{name}` | [x, y, z] in {unit}, base frame |" for name, unit in VECTOR_CONDITIONS.items()]
     return "\n".join(
         [
             "\n## measurements.toml\n", _keys(SetFile), "[[channel]]", "", _keys(ChannelTable),
@@ -105,54 +107,40 @@ def _set() -> str:
 
 def _twin() -> str:
     text = """
-A parameter is a number in SI, or `{ value = ..., unit = "...", std = ... }`; `std` is its standard error, for people; in a
-robot's file what is believed of it, and it is fitted with the robot's own. An effect is
+A parameter is a number in SI, or `{ value = ..., unit = "...", std = ... }`. In twin.toml `std` is its standard error, for
+information; in a robot's file it is the prior standard deviation, and the parameter is fitted with the robot's own. An effect is
 `id` and `parameters`; `twin effects` lists them.
 """
     return "\n## twin.toml\n\n" + _keys(TwinFile) + text
 
 
-def _keys(form: type[Form]) -> str:
-    lines = ["| key | what | default | meaning |", "|---|---|---|---|"]
-    lines += [
-        f"| `{name}` | {_what(field)} | {_default(field)} | {field.description or ''} |"
-        for name, field in form.model_fields.items()
-    ]
-    return "\n".join(lines) + "\n"
+def _keys(form: type[TableSchema]) -> str:
+    rows = [(f"`{name}`", _what(f), _default(f), f.description or "") for name, f in form.model_fields.items()]
+    return markdown(("key", "what", "default", "meaning"), rows) + "\n"
 
 
 def _default(field: FieldInfo) -> str:
-    if field.default is PydanticUndefined:
+    value = field.default
+    if value is PydanticUndefined:
         return "required"
-    return (
-        ""
-        if field.default in (None, [], {})
-        else f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
-    )
+    return "" if value in (None, [], {}) else f"`{str(value).lower() if isinstance(value, bool) else value}`"
 
 
 def _what(field: FieldInfo) -> str:
     """A field's type in words."""
-    text = str(field.annotation)
-    words: list[str] = []
-    for found, word in (
-        ("bool", "true or false"),
-        ("dict", "table"),
-        ("list", "list"),
-        ("int", "whole number"),
-        ("str", "text"),
-    ):
-        if found in text:
-            words.append("whole number or list" if word == "list" and not text.startswith("list") else word)
-            break
+    text, kinds = (
+        str(field.annotation),
+        {"bool": "true or false", "dict": "table", "list": "list", "int": "whole number", "str": "text"},
+    )
+    word = next((words for kind, words in kinds.items() if kind in text), "as below")
+    if word == "list" and not text.startswith("list"):
+        word = "whole number or list"
     if "Literal" in text:
-        choices: Any = field.annotation
-        options = [a for a in getattr(choices, "__args__", ()) if isinstance(a, str | int)]
-        words = [", ".join(f"`{o!r}`".replace("'", '"') for o in options)] if options else ["text or list"]
+        options = [a for a in getattr(field.annotation, "__args__", ()) if isinstance(a, str | int)]
+        word = ", ".join(f"`{o!r}`".replace("'", '"') for o in options) or "text or list"
     low = next((m.ge for m in field.metadata if hasattr(m, "ge")), None)
     high = next((m.le for m in field.metadata if hasattr(m, "le")), None)
-    span = f", {low} to {high}" if low is not None else ""
-    return (words[0] if words else "as below") + span
+    return word + (f", {low} to {high}" if low is not None else "")
 
 
 if __name__ == "__main__":

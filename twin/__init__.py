@@ -22,12 +22,12 @@ cli           the command line
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from twin.errors import TwinError
+from twin.foundation.errors import TwinError
 
 if TYPE_CHECKING:
     from twin.measurements import Recording, read, write
-    from twin.storage import read_twin
-    from twin.twin import Twin
+    from twin.prediction.storage import read_twin
+    from twin.prediction.twin import Twin
 
 __all__ = ["Recording", "Twin", "TwinError", "read", "read_twin", "write"]
 

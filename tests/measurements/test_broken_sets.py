@@ -15,7 +15,7 @@ import pyarrow.parquet
 import pytest
 from measurement_sets import edit, write_clouds, write_set
 
-from twin.errors import DataError
+from twin.foundation.errors import DataError
 from twin.measurements import read
 
 Break = Callable[[Path], object]

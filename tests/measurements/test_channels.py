@@ -8,24 +8,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.errors import DataError
-from twin.measurements import KINDS, Channel, Meaning, meaning
+from twin.foundation.errors import DataError
+from twin.measurements import CHANNEL_KINDS, Channel, ChannelName, parse_channel_name
 
 INDEX = st.integers(1, 9999)
 
 
-@given(st.sampled_from(sorted(KINDS)), INDEX, st.sampled_from("xyz"), st.none() | INDEX)
+@given(st.sampled_from(sorted(CHANNEL_KINDS)), INDEX, st.sampled_from("xyz"), st.none() | INDEX)
 def test_names_say_what_they_were_made_of(kind: str, index: int, axis: str, finger: int | None) -> None:
-    pattern, _ = KINDS[kind]
+    pattern, _ = CHANNEL_KINDS[kind]
     name = (f"finger_{finger}_" if finger else "") + pattern.replace("#", str(index)).replace("@", axis)
-    assert meaning(name) == Meaning(kind, index if "#" in pattern else None, axis if "@" in pattern else None, finger)
+    assert parse_channel_name(name) == ChannelName(kind, index if "#" in pattern else None, axis if "@" in pattern else None, finger)
 
 
 @given(st.text("tendo_1289xyzkispamr", max_size=24) | st.text(max_size=12))
 def test_no_other_text_has_a_meaning(name: str) -> None:
     with contextlib.suppress(DataError):
-        said = meaning(name)  # drawn by luck: then it is spelled as its meaning spells it
-        pattern, _ = KINDS[said.kind]
+        said = parse_channel_name(name)  # drawn by luck: then it is spelled as its meaning spells it
+        pattern, _ = CHANNEL_KINDS[said.kind]
         assert name.endswith(pattern.replace("#", str(said.index)).replace("@", str(said.axis)))
 
 
@@ -37,7 +37,7 @@ def test_no_other_text_has_a_meaning(name: str) -> None:
 )  # fmt: skip
 def test_near_misses_are_refused(name: str) -> None:
     with pytest.raises(DataError, match="allowed: tendon_I_tension"):
-        meaning(name)
+        parse_channel_name(name)
 
 
 @pytest.mark.parametrize(

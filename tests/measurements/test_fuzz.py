@@ -14,10 +14,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measurement_sets import CSV, TOML, write_set
 
-from twin.errors import DataError
+from twin.foundation.errors import DataError
 from twin.measurements import read
-from twin.measurements.quantity_strings import quantity, unit_scale
-from twin.measurements.tables import _fast_columns, _slow_columns
+from twin.measurements.parsing.quantity_strings import parse_quantity, unit_scale
+from twin.measurements.parsing.tables import _fast_columns, _slow_columns
 
 MANY = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 
@@ -111,5 +111,5 @@ def test_fast_and_slow_reader_agree(rows: list[tuple[str, str]], last_line_ends:
 @MANY
 @given(st.text(max_size=30) | st.text("0123456789.+-*/^()² mkgNsdeC", max_size=30))
 def test_quantities_and_units(text: str) -> None:
-    for call in (lambda: quantity(text, "kg"), lambda: quantity("1 " + text, "K"), lambda: unit_scale(text, "m")):
+    for call in (lambda: parse_quantity(text, "kg"), lambda: parse_quantity("1 " + text, "K"), lambda: unit_scale(text, "m")):
         one_line_or_fine(call)

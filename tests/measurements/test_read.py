@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from measurement_sets import CSV, edit, write_set
 
-from twin.errors import DataError, UnknownNameError
+from twin.foundation import files as bounds
+from twin.foundation.errors import DataError, UnknownNameError
 from twin.measurements import Channel, Clouds, Recording, Trial, read
-from twin.measurements import files as bounds
 
 GRAM_FORCE = 9.80665e-3  # N, by definition
 
@@ -173,7 +173,7 @@ def test_a_strong_robots_cell_may_be_off_by_a_twentieth_of_its_largest_reading(f
 
 def test_a_file_over_the_limit_is_not_read(folder: Path) -> None:
     with (folder / "a.csv").open("wb") as sparse:
-        sparse.truncate(bounds.LARGEST_TRIAL + 1)
+        sparse.truncate(bounds.MAX_TRIAL_BYTES + 1)
     with pytest.raises(DataError, match=r"a\.csv: 100663297 bytes; at most"):
         read(folder)
 

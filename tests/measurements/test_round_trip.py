@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measurement_sets import write_set
 
-from twin.errors import DataError
+from twin.foundation.errors import DataError
 from twin.measurements import Channel, Clouds, Recording, Trial, read, write
-from twin.measurements.toml_text import toml_lines
+from twin.measurements.parsing.toml_text import toml_lines
 
 FEW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 UNITS = {

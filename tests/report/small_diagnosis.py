@@ -7,18 +7,19 @@ from dataclasses import replace
 import numpy as np
 
 from twin import robots
-from twin.bench import ROOM, Inputs, prepare
-from twin.diagnose import Claim, Diagnosis, Errors, Settings
-from twin.diagnose.experiment import Experiment
-from twin.diagnose.identifiability import Visibility
-from twin.diagnose.loops import Loop, Loops
-from twin.diagnose.null import Thresholds
-from twin.diagnose.suspicions import Suspicion
-from twin.effects import Drive, Loads, named
+from twin.body import Drive, Loads
+from twin.diagnosis import Claim, Diagnosis, Errors, Settings
+from twin.diagnosis.checks.identifiability import Visibility
+from twin.diagnosis.checks.loops import Loop, Loops
+from twin.diagnosis.checks.suspicions import Suspicion
+from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
+from twin.diagnosis.explain.next_experiment import Experiment
+from twin.diagnosis.noise.model import Noise
+from twin.effects import effect_class
+from twin.foundation.parameters import FittedValue
 from twin.measurements import Channel, Recording, Trial
-from twin.noise import Noise
-from twin.quantities import Fitted
-from twin.twin import Twin
+from twin.prediction.prepared import ROOM_TEMPERATURE, Inputs, prepare
+from twin.prediction.twin import Twin
 
 LOOP = 2e-3  # m: half width of the loop that tendon 2 leaves in disk_8_x
 SIGMA = 2.5e-4  # m
@@ -26,7 +27,13 @@ SETTINGS = Settings(seed=3, jobs=1)
 
 
 PULL = Inputs(
-    "pull", np.zeros(1), np.zeros(1), np.zeros((1, 3)), (Drive.TENSION,) * 3, np.full(1, ROOM), Loads(np.array([0, 0, 9.81]))
+    "pull",
+    np.zeros(1),
+    np.zeros(1),
+    np.zeros((1, 3)),
+    (Drive.TENSION,) * 3,
+    np.full(1, ROOM_TEMPERATURE),
+    Loads(np.array([0, 0, 9.81])),
 )
 EXPERIMENT = Experiment("pull tendon 3 to 2.0 N and release it", PULL, 10.0, 3, (("tendon_friction",), ("backbone_creep",)))
 
@@ -71,21 +78,23 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         nominal.append(noisy + 2.0 * loop)
     found = verdict in ("explained", "partly_explained")
     friction = Claim(
-        "tendon_friction", {"mu": Fitted(0.103, 0.0013, "1"), "presliding": Fitted(6e-4, 2e-5, "m")}, 7.8e-4, 0.99, 0.53
+        "tendon_friction", {"mu": FittedValue(0.103, 0.0013, "1"), "presliding": FittedValue(6e-4, 2e-5, "m")}, 7.8e-4, 0.99, 0.53
     )
-    creep = Claim("backbone_creep", {"amplitude": Fitted(0.04, 0.001, "1"), "time": Fitted(12.0, float("nan"), "s")}, 7.6e-4, 0.006)
-    small = Claim("time_delay", {"delay": Fitted(0.01, 0.004, "s")}, float("nan"), 0.0, 0.03)
+    creep = Claim(
+        "backbone_creep", {"amplitude": FittedValue(0.04, 0.001, "1"), "time": FittedValue(12.0, float("nan"), "s")}, 7.6e-4, 0.006
+    )
+    small = Claim("time_delay", {"delay": FittedValue(0.01, 0.004, "s")}, float("nan"), 0.0, 0.03)
     values = {"backbone.youngs_modulus": 7.6e10, "disks.mass": 5.02e-3}
     groups = list(dict.fromkeys(o.group for o in bench.outputs))
     last = 4.9e-4 if found else 7.8e-4
     made = Diagnosis(
         verdict=verdict,
-        twin=Twin(robot, values, (named("tendon_friction")({"mu": 0.103, "presliding": 6e-4}),) if found else ()),
+        twin=Twin(robot, values, (effect_class("tendon_friction")({"mu": 0.103, "presliding": 6e-4}),) if found else ()),
         calibrated=Twin(robot, values),
         claims=(friction,) if found else (),
         runners_up=(creep,),
         below_materiality=(small,),
-        parameters={"backbone.youngs_modulus": Fitted(7.6e10, 2e8, "Pa"), "disks.mass": Fitted(5.02e-3, 1.4e-4, "kg")},
+        parameters={"backbone.youngs_modulus": FittedValue(7.6e10, 2e8, "Pa"), "disks.mass": FittedValue(5.02e-3, 1.4e-4, "kg")},
         unfixed=("disks.mass",),
         correlation=(("backbone.youngs_modulus", "tendon_friction.mu"), np.array([[1.0, -0.8], [-0.8, 1.0]])),
         errors=Errors(
@@ -102,7 +111,7 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         structure_before=0.42,
         structure_after=0.21 if verdict == "partly_explained" else 0.02,
         structure_unseen=0.05,
-        bars=Thresholds(),
+        limits=AcceptanceLimits(),
         structure={"static": 0.01, "direction": 0.2, "rate": 0.0},
         strongest=(("direction of T2", 0.2), ("T1 T2", 0.01)),
         line=(2.0, 0.1),
@@ -117,9 +126,10 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         ),
         ambiguous=(("tendon_routing", "time_delay"),) if found else (),
         experiment=EXPERIMENT if verdict != "noise" else None,
-        bench=bench,
+        recording=of,
+        prepared=bench,
         fitted_trials=(0, 1, 3),
-        sealed_trials=(2, 4),
+        held_out_trials=(2, 4),
         folds=(),
         loops=Loops("marker", "disk_8", (Loop(0, LOOP, 2e-5, 40, 0.0), Loop(1, LOOP, 2e-5, 40, 0.0))),
         suspicions=(Suspicion("sign", "tendon_1_displacement falls", "the other sign"),),

@@ -12,12 +12,12 @@ import pytest
 from plotly.offline import get_plotlyjs
 from small_diagnosis import SETTINGS, diagnosis, recording
 
-from twin.diagnose.identifiability import Visibility
+from twin.diagnosis.checks.identifiability import Visibility
 from twin.effects import catalogue
 from twin.report import provenance, sentence
-from twin.report.giveaway import giveaways, kind_of
 from twin.report.page import page
-from twin.report.plots import MOST_POINTS
+from twin.report.plots.effect_plot import choose_residual_plots, variable_kind
+from twin.report.plots.figures import MOST_POINTS
 
 SECTIONS = (
     "before-after",
@@ -29,7 +29,7 @@ SECTIONS = (
     "left",
     "attribution",
     "next",
-    "tell",
+    "identifiability",
     "parameters",
     "noise",
     "notices",
@@ -69,7 +69,7 @@ class Scripts(HTMLParser):
 
 
 def render(d) -> str:
-    return page(d, provenance(d.bench.recording, SETTINGS, "twin diagnose here"))
+    return page(d, provenance(d.prepared.recording, SETTINGS, "twin diagnose here"))
 
 
 def figures(html: str) -> list[dict]:
@@ -99,15 +99,15 @@ def test_every_verdict_has_its_sentence_sections_source_and_figures(verdict):
 
 
 def test_the_trial_in_time_is_one_in_which_its_marker_was_seen():
-    """Markers may be put on anew: of the outermost one that any sealed trial shows, the trial that shows it."""
-    d = diagnosis(sealed_trials=(1, 4))
+    """Markers may be put on anew: of the outermost one that any held-out trial shows, the trial that shows it."""
+    d = diagnosis(held_out_trials=(1, 4))
     assert "circle_4" in shown(d)  # pulled further, so further apart
-    columns = {m: [j for j, o in enumerate(d.bench.outputs) if o.channel.name.startswith(m)] for m in ("disk_7", "disk_8")}
+    columns = {m: [j for j, o in enumerate(d.prepared.outputs) if o.channel.name.startswith(m)] for m in ("disk_7", "disk_8")}
     for gone, trial, marker in (([(4, "disk_8")], "circle_1", "disk_8"), ([(1, "disk_8"), (4, "disk_8")], "circle", "disk_7")):
-        measured = [y.copy() for y in d.bench.measured]
+        measured = [y.copy() for y in d.prepared.measured]
         for k, m in gone:
             measured[k][:, columns[m]] = np.nan
-        said = shown(replace(d, bench=replace(d.bench, measured=tuple(measured))))
+        said = shown(replace(d, prepared=replace(d.prepared, measured=tuple(measured))))
         assert trial in said
         assert marker in said
 
@@ -165,18 +165,18 @@ def test_missing_values_and_few_channels_are_no_obstacle():
 
 def test_the_loop_is_found_where_it_is():
     d = diagnosis()
-    (g,) = giveaways(d)
-    assert d.bench.outputs[g.column].channel.name == "disk_8_x"
-    assert g.variable.words == "tension of tendon 2 (N)"
-    assert g.variable.loop
-    (left,) = giveaways(diagnosis("unexplained"))
-    assert left.variable.loop
-    assert left.variable.words == g.variable.words
+    (g,) = choose_residual_plots(d)
+    assert d.prepared.outputs[g.column].channel.name == "disk_8_x"
+    assert g.variable.title == "tension of tendon 2 (N)"
+    assert g.variable.is_loop
+    (left,) = choose_residual_plots(diagnosis("unexplained"))
+    assert left.variable.is_loop
+    assert left.variable.title == g.variable.title
 
 
 def told(d) -> list[list[str]]:
     """The cells of the table on what the data can tell, row by row."""
-    body = render(d).partition('<section id="tell">')[2].partition("</table>")[0]
+    body = render(d).partition('<section id="identifiability">')[2].partition("</table>")[0]
     return [[unescape(re.sub("<[^>]*>", "", cell)) for cell in re.findall("<td.*?</td>", row)] for row in body.split("<tr")[2:]]
 
 
@@ -184,15 +184,17 @@ def test_what_the_data_can_tell_is_a_row_an_effect():
     assert told(diagnosis()) == [
         ["tendon friction", "0.10", "0.10", "backbone creep, 20 %", "mu 0.0040", ""],
         ["time delay", "0.10", "0.30", "actuator lag, 94 %", "delay 0.010 s", "two rates of pull, ten times apart"],
-        ["tendon elasticity (stretch)", "never: needs tendon displacements"],
+        ["tendon elasticity (stretch)", "not detectable: needs tendon displacements"],
     ]
 
 
 def test_an_effect_hidden_for_no_known_reason_says_so():
     hidden = Visibility("tendon_elasticity", np.inf, np.inf, 0.0, "", ("stretch", np.inf, "m/N"), ())
-    assert told(diagnosis(identifiability=(hidden,))) == [["tendon elasticity", "never: nothing measured here answers to it"]]
+    assert told(diagnosis(identifiability=(hidden,))) == [
+        ["tendon elasticity", "not detectable: no measured channel responds to it"]
+    ]
 
 
 @pytest.mark.parametrize("law", sorted(catalogue()))
 def test_every_law_names_something_to_plot_against(law):
-    assert kind_of(catalogue()[law].moves_with) is not None
+    assert variable_kind(catalogue()[law].moves_with) is not None

@@ -8,15 +8,16 @@ import pytest
 from rich.console import Console
 from small_diagnosis import diagnosis, recording
 
-from twin.diagnose import Claim, Fold
-from twin.diagnose.loops import Loop, Loops
-from twin.quantities import Fitted
-from twin.report import console, sentence, widths
-from twin.report.loops import advice, loop_words
-from twin.report.numbers import column, number, percent, plus_minus, rough
-from twin.report.sections import before_after
-from twin.report.sentence import blind, claim_words, verdict_words
-from twin.wording import in_words
+from twin.diagnosis import Claim, Fold
+from twin.diagnosis.checks.loops import Loop, Loops
+from twin.foundation.display_names import display_name
+from twin.foundation.parameters import FittedValue
+from twin.report import render_diagnosis, sentence
+from twin.report.numbers import format_column, format_number, format_percent, format_with_error, two_significant_digits
+from twin.report.plots import loop_widths as widths
+from twin.report.plots.loops import advise_repeat, describe_loops
+from twin.report.sections.answer import before_after
+from twin.report.sentence import describe_claim, describe_undetectable, describe_verdict
 
 
 def test_explained_says_what_how_much_and_where_it_was_measured():
@@ -24,65 +25,65 @@ def test_explained_says_what_how_much_and_where_it_was_measured():
     assert words.startswith(
         "Missing effect: tendon friction, mu = 0.1030 ± 0.0013. It explains 95 % of the structured error. These "
     )
-    assert "data cannot tell it from tendon routing with time delay. On 2 sealed trials the error " in words
+    assert "data cannot distinguish it from tendon routing with time delay. On 2 held-out trials the error " in words
     assert words.endswith("falls from 0.78 to 0.49 mm (noise floor 0.44 mm).")
 
 
-def test_a_twin_that_does_worse_on_sealed_trials_says_so():
+def test_a_twin_that_does_worse_on_held_out_trials_says_so():
     d = diagnosis()
     worse = replace(d.errors, after={"marker": 8.6e-4}, ci_after={"marker": (8e-4, 9e-4)})
     words = sentence(replace(d, errors=worse))
-    assert "the error goes from 0.78 to 0.86 mm" in words
+    assert "the error changes from 0.78 to 0.86 mm" in words
     assert words.endswith("worse than the calibrated one in position, by 10 %.")
     assert "worse" not in sentence(d)
 
 
-def test_a_sealed_trial_that_is_missed_is_named_where_all_seems_explained():
+def test_a_held_out_trial_that_is_missed_is_named_where_all_seems_explained():
     d = diagnosis()
     floor = d.errors.floor["marker"]  # 0.44 mm, sqrt(3) times the noise of a coordinate
     after = list(d.predictions["after"])
     after[4] = after[4] + 2.5 * floor / np.sqrt(3.0)  # with the noise itself 2.7 floors, 1.2 mm, in that trial alone
     missed = replace(d, predictions={**d.predictions, "after": after})
     assert sentence(missed).endswith(
-        "But it misses sealed circle_4 by 1.2 mm in position (noise floor 0.44 mm): the fitted trials do not show all that "
-        "happens there."
+        "But it misses held-out circle_4 by 1.2 mm in position (noise floor 0.44 mm): the fitted trials do not show everything "
+        "that happens there."
     )
     assert "misses" not in sentence(d)
-    assert "misses" not in sentence(replace(missed, verdict="partly_explained"))  # nobody says there that all is explained
-    inside = replace(missed, sealed_trials=(2,), fitted_trials=(0, 1, 3, 4))
+    assert "misses" not in sentence(replace(missed, verdict="partly_explained"))  # there the fitted trials are not all explained
+    inside = replace(missed, held_out_trials=(2,), fitted_trials=(0, 1, 3, 4))
     assert "misses" not in sentence(inside)
 
 
-def test_a_sealed_trial_without_equilibrium_is_named():
+def test_a_held_out_trial_without_equilibrium_is_named():
     d = diagnosis()
     words = sentence(replace(d, errors=replace(d.errors, lost=(4,))))
-    assert "On 1 sealed trial the error" in words
-    assert words.endswith("It has no equilibrium for sealed circle_4, which counts for nothing here.")
+    assert "On 1 held-out trial the error" in words
+    assert words.endswith("The twin has no equilibrium for held-out circle_4, so the errors leave it out.")
 
 
 def test_few_trials_say_how_stable_the_claims_were_and_what_that_took():
     folds = (Fold(0, "explained", ("tendon_friction",)), Fold(1, "noise", ()), Fold(2, "explained", ("tendon_friction",)))
     words = sentence(diagnosis(folds=folds))
-    assert words.endswith("the diagnosis was made 4 times; 2 of the 3 with one trial sealed come to the same effects.")
+    assert words.endswith("the diagnosis was run 4 times; 2 of the 3 runs with one trial held out find the same effects.")
 
 
 def test_what_cannot_be_told_apart_is_said_where_nothing_is_claimed():
     words = sentence(diagnosis("unexplained", ambiguous=(("tendon_friction",), ("backbone_creep",))))
-    assert "It could be tendon friction or backbone creep: these data cannot tell which, so neither is claimed." in words
+    assert "It could be tendon friction or backbone creep; these data cannot tell which, so neither is claimed." in words
 
 
 def test_a_name_that_is_as_good_as_another_does_not_stand_alone():
     d = diagnosis(ambiguous=(("tendon_friction",), ("backbone_creep",)))
     unsure = replace(d, claims=(replace(d.claims[0], probability=0.5),))
     assert sentence(unsure).startswith(
-        "Missing effect: tendon friction or backbone creep, these data cannot tell which. The twin has tendon friction, "
-        "mu = 0.1030 ± 0.0013. It explains 95 % of the structured error. On 2 sealed trials"
+        "Missing effect: tendon friction or backbone creep, these data cannot tell which. The twin uses tendon friction, "
+        "mu = 0.1030 ± 0.0013. It explains 95 % of the structured error. On 2 held-out trials"
     )
     assert sentence(d).startswith("Missing effect: tendon friction, mu = ")  # 0.99
 
 
 def test_other_explanations_that_contain_the_claim_are_no_rivals():
-    assert "cannot tell" not in sentence(diagnosis(ambiguous=(("tendon_friction", "time_delay"),)))
+    assert "cannot distinguish" not in sentence(diagnosis(ambiguous=(("tendon_friction", "time_delay"),)))
 
 
 @pytest.mark.parametrize(
@@ -92,11 +93,11 @@ def test_other_explanations_that_contain_the_claim_are_no_rivals():
         (
             "partly_explained",
             "Partly explained: tendon friction",
-            "direction of pull. On 2 sealed trials the error falls from 0.78 to 0.49 mm (noise floor 0.44 mm).",
+            "direction of pull. On 2 held-out trials the error falls from 0.78 to 0.49 mm (noise floor 0.44 mm).",
         ),
         (
             "unexplained",
-            "Unexplained: after calibration a structured error of 0.42 sigma is left that no known effect may claim",
+            "Unexplained: after calibration a structured error of 0.42 sigma is left that no known effect explains",
             ".",
         ),
     ],
@@ -109,17 +110,19 @@ def test_the_other_verdicts(verdict, start, end):
 
 def test_a_name_in_doubt_that_leaves_little_is_not_said_to_leave_much():
     d = diagnosis("partly_explained", structure_after=0.05)
-    assert verdict_words(d).endswith("Little is left, but something speaks against it: see what is left, and the notices.")
+    assert describe_verdict(d).endswith(
+        "Little error is left, but the result is in doubt: see the remaining error and the notices."
+    )
 
 
 def test_a_spectral_line_alone_is_named():
     words = sentence(diagnosis("unexplained", structure={"static": 0.01}, line=(50.0, 3.2)))
-    assert "moves mostly with a line at 3.20 Hz" in words
+    assert "varies mostly with a line at 3.20 Hz" in words
 
 
 def test_two_effects_share_a_sentence():
     d = diagnosis()
-    other = replace(d.claims[0], effect="base_tilt", parameters={"about_y": Fitted(0.05, 0.001, "rad")})
+    other = replace(d.claims[0], effect="base_tilt", parameters={"about_y": FittedValue(0.05, 0.001, "rad")})
     words = sentence(replace(d, claims=(*d.claims, other)))
     assert words.startswith(
         "Missing effects: tendon friction, mu = 0.1030 ± 0.0013 and base tilt, about y = 2.865 ± 0.057°. Together they"
@@ -127,49 +130,49 @@ def test_two_effects_share_a_sentence():
 
 
 def test_a_loop_is_told_in_millimetres_with_its_sign_and_noise():
-    words = loop_words(diagnosis().loops)
+    words = describe_loops(diagnosis().loops)
     assert "release and pull differ by 2.00 mm (disk_8, 2 trials, noise 0.01 mm); the robot lags" in words
     assert "look alike" not in words
-    assert advice(diagnosis()) is None
+    assert advise_repeat(diagnosis()) is None
 
 
 def test_a_loop_that_time_could_make_asks_for_another_order():
     once = Loops("marker", "disk_8", (Loop(0, -2e-3, 2e-5, 40, None), Loop(1, -1e-3, 2e-5, 40, None)))
     d = diagnosis("noise", loops=once)
-    assert "differ by \N{MINUS SIGN}1.50 mm" in loop_words(d.loops)
-    assert "the robot leads" in loop_words(d.loops)
-    assert "friction, creep and drift look alike here" in loop_words(d.loops)
-    assert (advice(d) or "").startswith("run circle_0 again with its pull interrupted")
+    assert "differ by \N{MINUS SIGN}1.50 mm" in describe_loops(d.loops)
+    assert "the robot leads" in describe_loops(d.loops)
+    assert "friction, creep and drift look alike here" in describe_loops(d.loops)
+    assert (advise_repeat(d) or "").startswith("run circle_0 again with its pull interrupted")
 
 
 def test_a_loop_of_noise_is_none():
     still = Loops("marker", "disk_8", (Loop(0, 3e-5, 2e-5, 40, None),))
-    assert "differ by no more than noise (0.03 mm" in loop_words(still)
-    assert advice(diagnosis(loops=still)) is None
-    assert "cannot be compared" in loop_words(Loops("marker", "disk_8", ()))
+    assert "differ by no more than noise (0.03 mm" in describe_loops(still)
+    assert advise_repeat(diagnosis(loops=still)) is None
+    assert "cannot be compared" in describe_loops(Loops("marker", "disk_8", ()))
 
 
 def test_numbers_follow_their_error():
-    assert plus_minus(Fitted(0.10312, 0.0011, "1")) == "0.1031 ± 0.0011"
-    assert plus_minus(Fitted(6.4e-4, None, "m")) == "0.6400 mm"
-    assert plus_minus(Fitted(7.333e10, 2e8, "Pa")) == "73.33 ± 0.20 GPa"
-    assert plus_minus(Fitted(1.2345e5, 300.0, "Pa")) == "123.45 ± 0.30 kPa"
-    assert plus_minus(Fitted(-4.097e-5, 3.9e-7, "1/s")) == "\N{MINUS SIGN}14.75 ± 0.14 %/h"
-    assert number(float("nan")) == "\N{EN DASH}"
-    assert number(-0.001) == "0.00"
-    assert column([0.0123, 1.5, None]) == ["0.01", "1.50", "\N{EN DASH}"]
-    assert rough(Fitted(2.034e-5, None, "m/N")) == "0.020 mm/N"
-    assert rough(Fitted(2e-5, 1e-6, "N/s")) == "0.072 N/h"
-    assert rough(Fitted(0.0253, None, "rad")) == "1.4°"
-    assert rough(Fitted(312.0, None, "N/m")) == "312 N/m"
-    assert [percent(p) for p in (0.0, 0.5, 1.0)] == ["less than 1 %", "50 %", "more than 99 %"]
+    assert format_with_error(FittedValue(0.10312, 0.0011, "1")) == "0.1031 ± 0.0011"
+    assert format_with_error(FittedValue(6.4e-4, None, "m")) == "0.6400 mm"
+    assert format_with_error(FittedValue(7.333e10, 2e8, "Pa")) == "73.33 ± 0.20 GPa"
+    assert format_with_error(FittedValue(1.2345e5, 300.0, "Pa")) == "123.45 ± 0.30 kPa"
+    assert format_with_error(FittedValue(-4.097e-5, 3.9e-7, "1/s")) == "\N{MINUS SIGN}14.75 ± 0.14 %/h"
+    assert format_number(float("nan")) == "\N{EN DASH}"
+    assert format_number(-0.001) == "0.00"
+    assert format_column([0.0123, 1.5, None]) == ["0.01", "1.50", "\N{EN DASH}"]
+    assert two_significant_digits(FittedValue(2.034e-5, None, "m/N")) == "0.020 mm/N"
+    assert two_significant_digits(FittedValue(2e-5, 1e-6, "N/s")) == "0.072 N/h"
+    assert two_significant_digits(FittedValue(0.0253, None, "rad")) == "1.4°"
+    assert two_significant_digits(FittedValue(312.0, None, "N/m")) == "312 N/m"
+    assert [format_percent(p) for p in (0.0, 0.5, 1.0)] == ["less than 1 %", "50 %", "more than 99 %"]
 
 
 @pytest.mark.parametrize("verdict", ["noise", "explained", "partly_explained", "unexplained"])
 def test_console_prints_the_sentence_and_reads_no_markup_in_data(verdict):
     d = diagnosis(verdict, of=replace(recording(), source="hardware: [red]desk[/red]"))
     out = Console(width=400, record=True, quiet=False, file=open("/dev/null", "w"))  # noqa: SIM115
-    out.print(console(d))
+    out.print(render_diagnosis(d))
     text = out.export_text()
     assert sentence(d) in text
     assert "[red]desk[/red]" in text
@@ -185,16 +188,16 @@ def test_effects_hidden_for_one_reason_share_it_and_a_full_design_is_silent():
     words = (
         "These data cannot show: tendon elasticity, tendon backlash (needs tendon displacements); temperature softening (needs a"
     )
-    assert blind(diagnosis(identifiability=(*of, toe, backlash, warm))) == f"{words} log of the room)."
-    assert blind(diagnosis(identifiability=of[:2])) is None
-    assert blind(diagnosis(identifiability=(of[2], replace(toe, seen=0.1)))) is None, "one of its laws would show"
+    assert describe_undetectable(diagnosis(identifiability=(*of, toe, backlash, warm))) == f"{words} log of the room)."
+    assert describe_undetectable(diagnosis(identifiability=of[:2])) is None
+    assert describe_undetectable(diagnosis(identifiability=(of[2], replace(toe, seen=0.1)))) is None, "one of its laws would show"
 
 
 def test_of_many_numbers_of_a_kind_the_surest_are_said() -> None:
     """A gain of 1 is none: cords 2 and 5 read wrongly, the others as they should, however exactly that is known."""
     gains = {1: (1.0, 1e-4), 2: (0.5, 0.01), 3: (1.02, 0.02), 4: (0.99, 0.02), 5: (1.3, 0.02)}
-    claim = Claim("sensor_gain", {f"gain_{i}": Fitted(v, s, "1") for i, (v, s) in gains.items()}, 0.0, 0.9)
-    words = claim_words(claim)
+    claim = Claim("sensor_gain", {f"gain_{i}": FittedValue(v, s, "1") for i, (v, s) in gains.items()}, 0.0, 0.9)
+    words = describe_claim(claim)
     assert "gain 2 = 0.50" in words
     assert "gain 5 = 1.30" in words
     assert "gain 1 =" not in words
@@ -204,16 +207,16 @@ def test_of_many_numbers_of_a_kind_the_surest_are_said() -> None:
 def test_what_the_budget_left_untried_stands_beside_the_verdict():
     d = replace(diagnosis("unexplained"), untried=("tendon_friction", "backbone_creep", "tendon_friction + base_tilt", "contact"))
     words = sentence(d)
-    assert "no effect tried may claim" in words
-    assert "before tendon friction, backbone creep, tendon friction + base tilt and 1 more." in words
+    assert "that no effect tried explains" in words
+    assert "these were tried: tendon friction, backbone creep, tendon friction + base tilt and 1 more." in words
     assert "budget" not in sentence(diagnosis("unexplained"))
 
 
 def test_loop_widths_are_drawn_against_the_load_measured_and_predicted() -> None:
     d = diagnosis()
     assert widths.plot(d) is None, "one load"
-    held = [replace(i, loads=replace(i.loads, torque=np.full(len(i.time), 0.1 * k))) for k, i in enumerate(d.bench.inputs)]
-    drawn = widths.plot(replace(d, bench=replace(d.bench, inputs=tuple(held))))
+    held = [replace(i, loads=replace(i.loads, torque=np.full(len(i.time), 0.1 * k))) for k, i in enumerate(d.prepared.inputs)]
+    drawn = widths.plot(replace(d, prepared=replace(d.prepared, inputs=tuple(held))))
     assert drawn is not None
     data: Any = drawn.figure.data
     measured, calibrated, after = data
@@ -230,18 +233,18 @@ def test_loop_widths_are_drawn_against_the_load_measured_and_predicted() -> None
 def test_loop_widths_are_drawn_of_loads_that_differ_whatever_their_size(size: float, apart: float, two: bool) -> None:
     """A load set twice comes back within some per cent; two loads are a tenth of the larger apart or more: mN m or 100 N m."""
     d = diagnosis()
-    torques = size * np.linspace(1.0 - apart, 1.0, len(d.bench.inputs))
+    torques = size * np.linspace(1.0 - apart, 1.0, len(d.prepared.inputs))
     held = [
-        replace(i, loads=replace(i.loads, torque=np.full(len(i.time), x))) for i, x in zip(d.bench.inputs, torques, strict=True)
+        replace(i, loads=replace(i.loads, torque=np.full(len(i.time), x))) for i, x in zip(d.prepared.inputs, torques, strict=True)
     ]
-    assert (widths.plot(replace(d, bench=replace(d.bench, inputs=tuple(held)))) is not None) == two
+    assert (widths.plot(replace(d, prepared=replace(d.prepared, inputs=tuple(held)))) is not None) == two
 
 
 @pytest.mark.parametrize(
     ("identifier", "words"), [("tendon_friction", "tendon friction"), ("sma_cooling", "SMA cooling"), ("creep", "creep")]
 )
 def test_identifiers_are_said_as_people_say_them(identifier: str, words: str) -> None:
-    assert in_words(identifier) == words
+    assert display_name(identifier) == words
 
 
 def test_small_numbers_keep_their_digits() -> None:

@@ -6,9 +6,9 @@ from importlib import import_module
 import pytest
 from small_diagnosis import SETTINGS, diagnosis
 
-from twin.errors import DataError
+from twin.foundation.errors import DataError
+from twin.prediction.storage import read_twin
 from twin.report import provenance, write
-from twin.storage import read_twin
 
 FILES = {"report.json", "report.html", "twin.toml"}
 
@@ -16,7 +16,7 @@ FILES = {"report.json", "report.html", "twin.toml"}
 @pytest.fixture(scope="module")
 def found():
     d = diagnosis()
-    return d, provenance(d.bench.recording, SETTINGS, "twin diagnose here")
+    return d, provenance(d.prepared.recording, SETTINGS, "twin diagnose here")
 
 
 def test_all_three_are_written_and_the_twin_reads_back(tmp_path, found):
@@ -40,19 +40,29 @@ def test_an_earlier_report_is_replaced_and_other_files_stay(tmp_path, found):
     assert {p.name for p in tmp_path.iterdir()} == FILES | {"notes.txt"}
 
 
-@pytest.mark.parametrize("where", ["page", "write_twin"])
+@pytest.mark.parametrize("where", ["page", "twin_text"])
 def test_a_failure_leaves_the_folder_as_it_was(tmp_path, found, monkeypatch, where):
     d, made = found
     (tmp_path / "report.json").write_text("old")
 
     def fail(*arguments):
-        raise OSError("no space left") if where == "write_twin" else RuntimeError("a template broke")
+        raise RuntimeError("a template broke")
 
     monkeypatch.setattr(import_module("twin.report.write"), where, fail)
-    with pytest.raises(DataError if where == "write_twin" else RuntimeError):
+    with pytest.raises(RuntimeError):
         write(d, tmp_path, made)
     assert (tmp_path / "report.json").read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
+
+
+def test_a_full_disk_leaves_the_folder_as_it_was(tmp_path, found):
+    d, made = found
+    (tmp_path / "report.json").write_text("old")
+    (tmp_path / "twin.toml.part").mkdir()  # the last of the three cannot be written
+    with pytest.raises(DataError, match=r"twin\.toml: cannot be written"):
+        write(d, tmp_path, made)
+    assert (tmp_path / "report.json").read_text() == "old"
+    assert {p.name for p in tmp_path.iterdir()} == {"report.json", "twin.toml.part"}
 
 
 def test_a_file_in_the_way_is_refused(tmp_path, found):

@@ -43,7 +43,7 @@ class Tree:
         """
         path = self.folder / mutant.file
         text, stat = path.read_text(), path.stat()
-        compiled = "twin.compiled" in text and not _in_class(text, mutant.number)
+        compiled = "twin.foundation.compiled" in text and not _in_class(text, mutant.number)
         store = Path(tempfile.mkdtemp(dir=self.folder)) if compiled else None
         try:
             path.write_text(mutant.applied(text))

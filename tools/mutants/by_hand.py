@@ -7,22 +7,30 @@ from tools.mutants.mutant import Mutant
 CHANGES = (  # (file, what a line holds, what it is to hold)
     # creep keeps what it had through the pause between trials
     (
-        "twin/twin.py",
+        "twin/prediction/simulate.py",
         "delayed *= np.exp(-pause / np.array(creep.time))[:, None]",
         "delayed *= np.exp(-0.0 * np.array(creep.time))[:, None]",
     ),
-    ("twin/twin.py", "rested = float(inputs.clock[-1])", "rested = float(inputs.clock[0])"),
+    ("twin/prediction/simulate.py", "end = float(inputs.clock[-1])", "end = float(inputs.clock[0])"),
     # trials without a start all begin at zero
-    ("twin/bench.py", "now = float(clocks[-1][-1])", "now = 0.0"),
-    ("twin/bench.py", "now = trial.start if trial.start is not None else now", "now = now if trial.start is not None else now"),
+    ("twin/prediction/prepared.py", "now = float(clocks[-1][-1])", "now = 0.0"),
+    (
+        "twin/prediction/prepared.py",
+        "now = trial.start if trial.start is not None else now",
+        "now = now if trial.start is not None else now",
+    ),
     # a gap is filled with zero
-    ("twin/bench.py", "values = np.interp(trial.time, trial.time[known], values[known])", "values = np.where(known, values, 0.0)"),
+    (
+        "twin/prediction/prepared.py",
+        "values = np.interp(trial.time, trial.time[known], values[known])",
+        "values = np.where(known, values, 0.0)",
+    ),
     # softening in kinematics the wrong way round
-    ("twin/kinematics/robot.py", "self.softness = 1.0 / float(", "self.softness = 1.0 * float("),
+    ("twin/prediction/kinematics/loaded_robot.py", "self.softness = 1.0 / float(", "self.softness = 1.0 * float("),
     # the error bar without the load cells
-    ("twin/shape/tensions.py", "+ self.tension_noise**2 * (G**2).sum(axis=0)", "+ 0.0 * (G**2).sum(axis=0)"),
+    ("twin/shape/estimators/tension_shape.py", "+ self.tension_noise**2 * (G**2).sum(axis=0)", "+ 0.0 * (G**2).sum(axis=0)"),
     # radians called degrees
-    ("twin/evaluate.py", '"angle": ("deg", 180.0 / np.pi)', '"angle": ("deg", 1.0)'),
+    ("twin/prediction/evaluate.py", '"angle": OutputGroup("deg", 180.0 / np.pi', '"angle": OutputGroup("deg", 1.0'),
     # a drift ten times as fast
     ("twin/effects/load_cell_drift.py", 'self.each("rate") * levelled(', '10.0 * self.each("rate") * levelled('),
     ("twin/report/numbers.py", '"N/s": ("N/h", 3600.0)', '"N/s": ("N/h", 36000.0)'),
@@ -30,22 +38,26 @@ CHANGES = (  # (file, what a line holds, what it is to hold)
     ("twin/effects/time_delay.py", "current=self._heating(reported))", "current=reported.current)"),
     ("twin/effects/time_delay.py", "np.interp(edges - self", "np.interp(edges + self"),
     # markers on the other side of their disks
-    ("twin/robots/continuum.py", "pos=[*offset[:2], at + offset[2]]", "pos=[*offset[:2], at - offset[2]]"),
+    ("twin/robots/families/continuum.py", "pos=[*offset[:2], at + offset[2]]", "pos=[*offset[:2], at - offset[2]]"),
     # the noise model's bar and what it takes out
-    ("twin/residual.py", "sure = CLEAR * spread", "sure = 0.1 * CLEAR * spread"),
-    ("twin/residual.py", "sure = CLEAR * spread", "sure = 10.0 * CLEAR * spread"),
-    ("twin/residual.py", "return out - moved @ np.linalg.lstsq", "return out - 0.0 * moved @ np.linalg.lstsq"),
-    ("twin/residual.py", "both -= basis[ok] @", "both -= 0.0 * basis[ok] @"),
+    ("twin/diagnosis/noise/estimate.py", "sure = CLEAR * spread", "sure = 0.1 * CLEAR * spread"),
+    ("twin/diagnosis/noise/estimate.py", "sure = CLEAR * spread", "sure = 10.0 * CLEAR * spread"),
+    ("twin/diagnosis/noise/estimate.py", "return out - moved @ np.linalg.lstsq", "return out - 0.0 * moved @ np.linalg.lstsq"),
+    ("twin/diagnosis/noise/estimate.py", "both -= basis[ok] @", "both -= 0.0 * basis[ok] @"),
     # machine code numbered, as numba does
-    ("twin/compiled.py", "super()._data_name(uuid4().int)", "super()._data_name(number)"),
+    ("twin/foundation/compiled.py", "super()._data_name(uuid4().int)", "super()._data_name(number)"),
     # a second robot for nothing
-    ("twin/diagnose/rigs.py", "- len(own) * np.log(n) - 2.0", "- 2.0"),
-    ("twin/diagnose/rigs.py", "- 2.0 * len(trials) * np.log(2.0)", "- 0.0 * len(trials) * np.log(2.0)"),
+    ("twin/diagnosis/checks/mixed_robots.py", "- len(own) * np.log(n) - 2.0", "- 2.0"),
+    ("twin/diagnosis/checks/mixed_robots.py", "- 2.0 * len(trials) * np.log(2.0)", "- 0.0 * len(trials) * np.log(2.0)"),
     # standard errors half and twice as large, and without their inflation
-    ("twin/calibrate.py", "return spread * np.array(", "return 0.5 * spread * np.array("),
-    ("twin/calibrate.py", "return spread * np.array(", "return 2.0 * spread * np.array("),
-    ("twin/calibrate.py", "np.linalg.pinv(self.information())), 0.0) * inflation)", "np.linalg.pinv(self.information())), 0.0))"),
-    ("twin/diagnose/seal.py", "np.quantile(values, [0.025, 0.975])", "np.quantile(values, [0.25, 0.75])"),
+    ("twin/diagnosis/calibration/fit.py", "return spread * np.array(", "return 0.5 * spread * np.array("),
+    ("twin/diagnosis/calibration/fit.py", "return spread * np.array(", "return 2.0 * spread * np.array("),
+    (
+        "twin/diagnosis/calibration/fit.py",
+        "np.linalg.pinv(self.information())), 0.0) * inflation)",
+        "np.linalg.pinv(self.information())), 0.0))",
+    ),
+    ("twin/diagnosis/held_out.py", "np.quantile(values, [0.025, 0.975])", "np.quantile(values, [0.25, 0.75])"),
 )
 
 

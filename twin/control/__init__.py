@@ -1,38 +1,34 @@
-"""From a wanted tip to heating voltages, and from a soft finger's wanted shape to tendon shortenings, from sensors alone.
+"""Controllers: from a wanted tip to heating voltages, and from a soft finger's wanted shape to tendon shortenings.
 
-paths.py     tip paths on the surface that tendons reach
-tip.py       wanted tip -> tensions: inverse kinematics, corrected by shape sensing
-tension.py   wanted tensions -> voltages: heat feed-forward, PI, RBF network
-pi.py        a PI law with limits, and the plain tension loop it makes
-rbf.py       the network that learns what neither foresees
-guard.py     what no spring may exceed: its voltage and its temperature
-shape.py     a soft finger's wanted points -> tendon shortenings; shape_baselines.py: what that is held against
-held.py      the twin of that finger as its tendons hold it, and what each of them changes
+tip_paths.py         tip paths on the surface that tendons reach tip_controller.py    wanted tip -> tensions: inverse kinematics,
+corrected by shape sensing tension_loop.py      wanted tensions -> voltages: heat feed-forward, PI, RBF network pi_controller.py
+PI with limits                  rbf_network.py      network that learns the loop's errors online heating_guard.py     limits of
+voltage and temperature of springs shape_controller.py  a soft finger's wanted points -> tendon shortenings strain_tracking.py   the
+same steps, tracking strains instead of points held_finger.py       equilibria of a finger with held tendons, and their response to
+tensions
 
-Nothing here steps a robot or reads more of it than its sensors say.
+Nothing here steps a robot or reads more of it than its sensors.
 """
 
 from __future__ import annotations
 
-from twin.control.guard import Guard
-from twin.control.pi import PI, PlainLoop
-from twin.control.rbf import RBF
-from twin.control.shape import Limits, ShapeController, Step
-from twin.control.shape_baselines import ConstantDirections, StrainTracking, TipTracking
-from twin.control.tension import TensionLoop
-from twin.control.tip import TipController
+from twin.control.heating_guard import HeatingGuard
+from twin.control.pi_controller import PIController
+from twin.control.rbf_network import RBFNetwork
+from twin.control.shape_controller import ControlStep, ShapeController, TensionLimits
+from twin.control.strain_tracking import BendTracking, StrainTracking
+from twin.control.tension_loop import TensionLoop
+from twin.control.tip_controller import TipController
 
 __all__ = [
-    "PI",
-    "RBF",
-    "ConstantDirections",
-    "Guard",
-    "Limits",
-    "PlainLoop",
+    "BendTracking",
+    "ControlStep",
+    "HeatingGuard",
+    "PIController",
+    "RBFNetwork",
     "ShapeController",
-    "Step",
     "StrainTracking",
+    "TensionLimits",
     "TensionLoop",
     "TipController",
-    "TipTracking",
 ]

@@ -1,7 +1,11 @@
-"""What a description may lack: one physical law per file, found by itself.
+"""Effects that a robot's description may lack: one a file, found automatically.
 
-An effect's identifier is its file's name. A new file with a subclass of `Effect` is in the catalogue, in the fit, in the reports
-and under test without any list to edit.
+An effect's identifier is its file's name, and its class has the same name in CamelCase: tendon_friction.py has TendonFriction. A
+new file is in the catalogue, in the fits, in the reports and under test; there is no list to edit.
+
+>>> from twin.effects import TendonFriction, effect_class
+>>> TendonFriction(mu=0.2) == effect_class("tendon_friction")(mu=0.2)
+True
 """
 
 from __future__ import annotations
@@ -9,46 +13,41 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cache
+from typing import Any
 
-from twin.effects.effect import ROPES, Bearing, Creep, Drive, Drives, Effect, Loads, Push, Route, Signals, Start, driven_by
-from twin.errors import UnknownNameError
+from twin.effects.base.effect import Effect, FitStart
+from twin.foundation.errors import UnknownNameError
 
-__all__ = [
-    "ROPES",
-    "Bearing",
-    "Creep",
-    "Drive",
-    "Drives",
-    "Effect",
-    "Loads",
-    "Push",
-    "Route",
-    "Signals",
-    "Start",
-    "catalogue",
-    "driven_by",
-    "named",
-]
-
-
-NO_LAWS = ("effect", "levelling", "similar")  # what laws share
+__all__ = ["Effect", "FitStart", "catalogue", "effect_class"]
 
 
 @cache
 def catalogue() -> dict[str, type[Effect]]:
-    """All laws by identifier."""
-    laws = {}
-    for module in pkgutil.iter_modules(__path__):
-        if module.name in NO_LAWS:
-            continue
-        members = vars(importlib.import_module(f"{__name__}.{module.name}")).values()
-        laws[module.name] = next(m for m in members if isinstance(m, type) and issubclass(m, Effect) and m is not Effect)
-    return laws
+    """Return all effects by identifier."""
+    names = [module.name for module in pkgutil.iter_modules(__path__) if not module.ispkg]
+    return {name: getattr(importlib.import_module(f"{__name__}.{name}"), _class_name(name)) for name in names}
 
 
-def named(identifier: str) -> type[Effect]:
-    """The law with this identifier. Raises UnknownNameError, listing those that exist."""
+def effect_class(identifier: str) -> type[Effect]:
+    """Return the effect with this identifier. Raises UnknownNameError, listing those that exist."""
     try:
         return catalogue()[identifier]
     except KeyError:
         raise UnknownNameError("effect", identifier, list(catalogue())) from None
+
+
+def _class_name(identifier: str) -> str:
+    return "".join(word.capitalize() for word in identifier.split("_"))
+
+
+def __getattr__(name: str) -> Any:
+    """Import an effect's class by its name."""
+    if name[:1].isupper():
+        for identifier, effect in catalogue().items():
+            if name == _class_name(identifier):
+                return effect
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *map(_class_name, catalogue())])

@@ -1,4 +1,4 @@
-"""Actuator lag: the drive follows its command late."""
+"""Actuator lag: the drive follows its command gradually."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.compiled import jit
-from twin.effects.effect import Effect, Signals, Start, between_rows
-from twin.quantities import Parameter
+from twin.body import Signals, interpolate_commands
+from twin.effects.base.effect import Effect, FitStart
+from twin.foundation.compiled import jit
+from twin.foundation.parameters import Parameter
 
 
 @jit
-def follow(time, cubics, lag, inertia, delivered):
-    """inertia lag^2 x'' + lag x' + x = c, exact, from rest at the first of `time` (n,), for commands that are `cubics` from row to
-    row (4, n - 1, m), coefficients from the third power down; x to `delivered` (n, m).
+def lag_response(time, cubics, lag, inertia, delivered):
+    """Solve inertia lag^2 x'' + lag x' + x = c exactly, from rest at the first of `time` (n,), and write x to `delivered` (n, m).
 
-    Behind what a drive settles to, p = c - a c' + (a^2 - b) c'' - (a^3 - 2 a b) c''' with a = lag and b = inertia lag^2, it is e:
-    of exp(-t / a) in first order, in second order of exp(-s t) (e C + (e' + s e) S) with s = a / (2 b), w^2 = s^2 - 1 / b,
+    Between rows the commands c are `cubics` (4, n - 1, m), coefficients from the third power down. With a = lag and
+    b = inertia lag^2, the particular solution is p = c - a c' + (a^2 - b) c'' - (a^3 - 2 a b) c'''. The difference e = x - p decays
+    as exp(-t / a) in first order, and in second order as exp(-s t) (e C + (e' + s e) S) with s = a / (2 b), w^2 = s^2 - 1 / b,
     C = cosh(w t), S = sinh(w t) / w.
     """
     b = inertia * lag * lag
@@ -38,7 +39,7 @@ def follow(time, cubics, lag, inertia, delivered):
             else:
                 s = 0.5 * lag / b
                 w = np.sqrt(abs(s * s - 1.0 / b))
-                if w * t < 1e-6:  # critically damped: the error is the square of it
+                if w * t < 1e-6:  # critically damped: the error is of the order of its square
                     C, S = np.exp(-s * t), t * np.exp(-s * t)
                 elif s * s > 1.0 / b:
                     fast, slow = np.exp(-(s + w) * t), np.exp(-t / (b * (s + w)))
@@ -52,11 +53,11 @@ def follow(time, cubics, lag, inertia, delivered):
 
 
 @jit
-def held(time, command, lag, delivered):
-    """lag x' + x = c, exact, from none at the first of `time` (n,), for commands (n, m) that hold from row to row; to `delivered`
-    (n, m) the root mean square of x until the next row, which heats a spring as x does.
+def lag_held_current(time, command, lag, delivered):
+    """Solve lag x' + x = c exactly, from zero at the first of `time` (n,), for commands (n, m) constant from row to row.
 
-    With d = x - c at a row and a = dt / lag the square's mean is c^2 + 2 c d (1 - exp(-a)) / a + d^2 (1 - exp(-2 a)) / (2 a).
+    `delivered` (n, m) gets the root mean square of x until the next row, which heats a spring as much as x. With d = x - c at a row
+    and a = dt / lag the mean square is c^2 + 2 c d (1 - exp(-a)) / a + d^2 (1 - exp(-2 a)) / (2 a).
     """
     for j in range(command.shape[1]):
         x = 0.0
@@ -72,13 +73,13 @@ def held(time, command, lag, delivered):
 class ActuatorLag(Effect):
     """Lag between command and delivery, of first order: time x' = c - x; of second, inertia time^2 x'' + time x' + x = c.
 
-    Damping ratio 1 / (2 sqrt(inertia)): up to 0.25 two first-order lags in series, beyond it the drive overshoots. Behind a steady
-    ramp it is late by `time` whatever its inertia.
+    The damping ratio is 1 / (2 sqrt(inertia)). Up to an inertia of 0.25 it is two first-order lags in series, above it the drive
+    overshoots. Behind a steady ramp the drive is late by `time`, whatever its inertia.
 
-    Acts on whatever drives the tendons. Between two rows a tension or displacement is as `Signals.smooth` says; a current holds,
-    was none before the trial, follows in first order whatever the inertia, and counts by its mean square.
+    It acts on the drives' commands. Between rows a tension or displacement follows `Signals.smooth`. A current is constant until
+    the next row, zero before the trial, follows in first order whatever the inertia, and counts by its mean square.
 
-    Source: linear system theory; a valve, a motor's current loop, a gearbox: 10 ms to 1 s; a supply that ramps its current, a
+    Source: linear system theory. A valve, a motor's current loop, a gearbox: 10 ms to 1 s; a supply that ramps its current, a
     spring that is heated through its mount: seconds.
 
     >>> t = np.array([0.0, 1.0, 2.0])
@@ -92,30 +93,30 @@ class ActuatorLag(Effect):
         Parameter("time", 0.0, "s", 0.0, 20.0, "time constant; what a bench log's rows can show", scale=0.05),
         Parameter("inertia", 0.0, "1", 0.0, 10.0, "1 / (4 damping ratio^2); 0: first order", scale=0.2),
     )
-    richer = ("inertia",)
-    akin = ("time_delay",)
+    extended_parameters = ("inertia",)
+    confusable_with = ("time_delay",)
     moves_with = "the rate of change of the pull"
 
     @classmethod
-    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Where currents drive, some of the seconds in which a spring warms; else less than a row of most logs."""
-        for time in (0.5, 4.0) if any(s.by_current.any() for s in predicted) else (0.1,):
-            yield Start({"time": time}, ("time",))
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        """Start at seconds, the time in which a spring warms, if currents drive; else at less than a row of most logs."""
+        for time in (0.5, 4.0) if any(s.driven_by_current.any() for s in predicted) else (0.1,):
+            yield FitStart({"time": time}, ("time",))
 
-    def fuller_starts(self, predicted: list[Signals]) -> Iterator[Start]:
-        if not any(s.by_current.all() for s in predicted):
-            yield from super().fuller_starts(predicted)
+    def extended_starts(self, predicted: list[Signals]) -> Iterator[FitStart]:
+        if not any(s.driven_by_current.all() for s in predicted):
+            yield from super().extended_starts(predicted)
 
     def drive(self, command: Signals) -> Signals:
         if self["time"] > 0.0 and len(command.time) > 1:
             tension, displacement = (self._lagged(command, c) for c in (command.tension, command.displacement))
             current = np.zeros_like(command.current)
-            if command.by_current.any():
-                held(np.asarray(command.time, float), np.ascontiguousarray(command.current), self["time"], current)
-            return command.with_(tension=tension, displacement=displacement, current=current)
+            if command.driven_by_current.any():
+                lag_held_current(np.asarray(command.time, float), np.ascontiguousarray(command.current), self["time"], current)
+            return command.with_changes(tension=tension, displacement=displacement, current=current)
         return command
 
     def _lagged(self, signals: Signals, command: np.ndarray) -> np.ndarray:
         out = np.empty_like(command)
-        follow(np.asarray(signals.time, float), between_rows(signals, command).c, self["time"], self["inertia"], out)
+        lag_response(np.asarray(signals.time, float), interpolate_commands(signals, command).c, self["time"], self["inertia"], out)
         return out

@@ -6,20 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.effects.effect import Effect, Signals, Start
-from twin.effects.levelling import levelled, levelled_starts
-from twin.quantities import Parameter
-
-SOFTEST = 0.05  # of the stiffness at first: what is left of a body that is all but broken
+from twin.body import Signals
+from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.saturating_drift import saturated_time, saturating_starts
+from twin.effects.temperature_softening import MIN_STIFFNESS_SHARE
+from twin.foundation.parameters import Parameter
 
 
 class BackboneAgeing(Effect):
-    """Stiffness K(t) = K_0 (1 - rate (1 - exp(-levelling t)) / levelling), t the time since the first trial: at first by `rate`,
-    and ever less, to K_0 (1 - rate / levelling); without levelling K_0 (1 - rate t). A negative rate stiffens (curing, hardening
-    by work).
+    """Stiffness K(t) = K_0 (1 - rate (1 - exp(-levelling t)) / levelling), t the time since the first trial.
 
-    Source: superelastic NiTi loses plateau stress over its first hundred cycles, by ever less (functional fatigue); filled silicone
-    softens while it is worked, towards what it then keeps (Mullins effect). That both go with cycles, evenly made, is assumed.
+    It changes by `rate` at first and levels off at K_0 (1 - rate / levelling); without levelling it is K_0 (1 - rate t). A negative
+    rate stiffens (curing, work hardening).
+
+    Source: superelastic NiTi loses plateau stress over its first hundred cycles, less in each (functional fatigue); filled silicone
+    softens in its first cycles and then keeps its stiffness (Mullins effect). Cycles are assumed to be evenly spread over time.
 
     >>> BackboneAgeing(rate=1e-5).soften(np.zeros(2), np.array([0.0, 3600.0])).round(3).tolist()
     [1.0, 0.964]
@@ -40,14 +41,14 @@ class BackboneAgeing(Effect):
         ),
         Parameter("levelling", 0.0, "1/s", 0.0, 2e-2, "the first cycles: from a minute's to an hour's", scale=1e-4),
     )
-    shape = ("levelling",)
+    inactive_when_off = ("levelling",)
     needs = frozenset({"elasticity"})
     moves_with = "the time of day"
 
     @classmethod
-    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """All through the session alike, and levelled off by its end."""
-        yield from levelled_starts(iter((Start({"rate": 1e-5}, ("rate",)),)), predicted, cls.parameters[1].high)
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        """Start with a constant rate, and with a change that levels off by the end of the session."""
+        yield from saturating_starts(iter((FitStart({"rate": 1e-5}, ("rate",)),)), predicted, cls.parameters[1].high)
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
-        return np.maximum(SOFTEST, 1.0 - self["rate"] * levelled(clock, self["levelling"]))
+        return np.maximum(MIN_STIFFNESS_SHARE, 1.0 - self["rate"] * saturated_time(clock, self["levelling"]))

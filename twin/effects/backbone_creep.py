@@ -1,28 +1,29 @@
-"""Creep: part of the body's strain comes late."""
+"""Creep: part of the body's strain is delayed."""
 
 from __future__ import annotations
 
 import math
 
-from twin.compiled import jit
-from twin.effects.effect import Creep, Effect
-from twin.quantities import Parameter
+from twin.body import Creep
+from twin.effects.base.effect import Effect
+from twin.foundation.compiled import jit
+from twin.foundation.parameters import Parameter
 
 
 @jit
-def retard(delayed, instant, amplitude, time, dt):
-    """Delayed strain after dt (s) under a constant instant strain: the exact step of time * d' = amplitude * instant - d."""
+def delayed_strain(delayed, instant, amplitude, time, dt):
+    """Return the delayed strain after dt (s) under a constant instant strain: the exact step of time d' = amplitude instant - d."""
     return delayed + (1.0 - math.exp(-dt / time)) * (amplitude * instant - delayed)
 
 
 class BackboneCreep(Effect):
     """Delayed (viscoelastic) strain: eps = eps_e + eps_c, time * eps_c' = amplitude * eps_e - eps_c.
 
-    eps_e = moment / (E I) is the instant strain, eps_c the delayed one (a Kelvin-Voigt element in series; with `amplitude_2` two of
-    them, a two-term Prony series). It carries over from one trial to the next and fades while the robot rests unloaded.
+    eps_e = moment / (E I) is the instant strain, eps_c the delayed one: a Kelvin-Voigt element in series, with `amplitude_2` two of
+    them (a two-term Prony series). It carries over from one trial to the next and fades while the robot rests unloaded.
 
-    Source: standard linear solid (Kelvin-Voigt chain). Polymers creep by 5-50 % over seconds
-    to hours; a NiTi wire by a few per cent.
+    Source: standard linear solid (Kelvin-Voigt chain). Polymers creep by 5-50 % over seconds to hours; a NiTi wire by a few per
+    cent.
 
     >>> round(retard(0.0, 1.0, 0.3, 10.0, 10.0), 4)   # 0.3 (1 - 1/e)
     0.1896
@@ -35,8 +36,8 @@ class BackboneCreep(Effect):
         Parameter("amplitude_2", 0.0, "1", 0.0, 2.0, "second term of the Prony series", scale=0.03),
         Parameter("time_2", 100.0, "s", 0.3, 10000.0, "second retardation time", scale=30.0),
     )
-    shape = ("time", "time_2")
-    richer = ("amplitude_2", "time_2")
+    inactive_when_off = ("time", "time_2")
+    extended_parameters = ("amplitude_2", "time_2")
     guesses = ({"amplitude": 0.06, "time": 3.0}, {"amplitude": 0.06, "time": 15.0}, {"amplitude": 0.06, "time": 80.0})
     needs = frozenset({"viscosity"})
     moves_with = "time held under load"

@@ -1,4 +1,4 @@
-"""Base tilt: gravity points elsewhere than declared."""
+"""Base tilt: gravity points in another direction than declared."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ from dataclasses import replace
 
 from scipy.spatial.transform import Rotation
 
-from twin.effects.effect import Effect, Loads
-from twin.quantities import Parameter
+from twin.body import Loads
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
-ABOUT = ("about_x", "about_y", "about_z")
+ROTATION_NAMES = ("about_x", "about_y", "about_z")
 
 
 class BaseTilt(Effect):
     """Gravity in the base frame turned by the rotation vector (about_x, about_y, about_z): g' = R g.
 
-    Only the part across the declared gravity shows; a rotation about gravity itself does nothing.
+    A rotation about gravity itself has no effect.
 
     Source: rigid-body kinematics. A robot clamped by eye is a few degrees off.
 
@@ -26,11 +27,13 @@ class BaseTilt(Effect):
     """
 
     id = "base_tilt"
-    parameters = tuple(Parameter(a, 0.0, "rad", -0.6, 0.6, "clamped by eye: a few degrees", std=0.1, scale=0.02) for a in ABOUT)
+    parameters = tuple(
+        Parameter(a, 0.0, "rad", -0.6, 0.6, "clamped by eye: a few degrees", std=0.1, scale=0.02) for a in ROTATION_NAMES
+    )
     guesses = ({"about_x": 0.02, "about_y": 0.02, "about_z": 0.02},)
     needs = frozenset({"weight"})
     moves_with = "payload"
 
     def surround(self, loads: Loads) -> Loads:
-        turn = Rotation.from_rotvec([self[a] for a in ABOUT]).as_matrix()
+        turn = Rotation.from_rotvec([self[a] for a in ROTATION_NAMES]).as_matrix()
         return replace(loads, gravity=turn @ loads.gravity)

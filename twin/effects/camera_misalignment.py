@@ -1,17 +1,18 @@
-"""Camera misalignment: the marker frame is turned and shifted against the base."""
+"""Camera misalignment: the markers' frame is turned and shifted against the base frame."""
 
 from __future__ import annotations
 
 from scipy.spatial.transform import Rotation
 
-from twin.effects.effect import Effect, Signals
-from twin.quantities import Parameter
+from twin.body import Signals
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
-TURN, SHIFT = ("turn_x", "turn_y", "turn_z"), ("shift_x", "shift_y", "shift_z")
+TURN_NAMES, SHIFT_NAMES = ("turn_x", "turn_y", "turn_z"), ("shift_x", "shift_y", "shift_z")
 
 
 class CameraMisalignment(Effect):
-    """Reported marker = R(turn) x + shift, with turn a rotation vector about the base frame's origin.
+    """Reported marker = R(turn) x + shift, turn a rotation vector about the base frame's origin.
 
     Source: rigid-body kinematics. A hand-made registration is good to a degree or two and a millimetre or two.
 
@@ -24,13 +25,13 @@ class CameraMisalignment(Effect):
 
     id = "camera_misalignment"
     parameters = (
-        *(Parameter(a, 0.0, "rad", -0.5, 0.5, "registration by hand", std=0.1, scale=0.01) for a in TURN),
-        *(Parameter(a, 0.0, "m", -0.03, 0.03, "registration by hand", std=5e-3, scale=1e-3) for a in SHIFT),
+        *(Parameter(a, 0.0, "rad", -0.5, 0.5, "registration by hand", std=0.1, scale=0.01) for a in TURN_NAMES),
+        *(Parameter(a, 0.0, "m", -0.03, 0.03, "registration by hand", std=5e-3, scale=1e-3) for a in SHIFT_NAMES),
     )
-    guesses = ({**dict.fromkeys(TURN, 0.01), **dict.fromkeys(SHIFT, 1e-3)},)
+    guesses = ({**dict.fromkeys(TURN_NAMES, 0.01), **dict.fromkeys(SHIFT_NAMES, 1e-3)},)
     needs = frozenset({"markers"})
     moves_with = "the marker's position itself"
 
     def sense(self, true: Signals) -> Signals:
-        turn = Rotation.from_rotvec([self[a] for a in TURN]).as_matrix()
-        return true.with_(markers=true.markers @ turn.T + [self[a] for a in SHIFT])
+        turn = Rotation.from_rotvec([self[a] for a in TURN_NAMES]).as_matrix()
+        return true.with_changes(markers=true.markers @ turn.T + [self[a] for a in SHIFT_NAMES])

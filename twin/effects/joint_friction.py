@@ -1,9 +1,10 @@
-"""Joint friction: a bearing, a seal or a sheath rubs with a torque of its own, whatever the tendons pull."""
+"""Joint friction: a bearing, a seal or a sheath rubs with a torque that does not depend on the tendons' tension."""
 
 from __future__ import annotations
 
-from twin.effects.effect import Bearing, Effect, Route
-from twin.quantities import Parameter
+from twin.body import Bearing, Route
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
 
 class JointFriction(Effect):
@@ -11,19 +12,18 @@ class JointFriction(Effect):
 
         F(v) = torque + breakaway exp(-(v / stribeck)^2) + viscous v,
 
-    v the rate (rad/s) at which its drive would turn it. By the fuller law it rubs more where it hardly moves, until a film carries
-    it, and more again where that is sheared fast: only runs at different rates show it. The joint's own rate is the drive's but
-    where it sticks.
+    v the rate (rad/s) of its drive, which is the joint's own unless it sticks. The extended law has more friction near rest, until
+    a lubricating film forms, and again at high rates, where the film is sheared; only runs at different rates show it.
 
-    Constant, where the capstan's loss (`tendon_friction`) is in proportion to the sum of both tendons' tension. That sum is twice
-    the pretension until one of them falls slack, and grows with the load from there: below, data cannot tell one from the other,
-    and never both are claimed. A bearing whose friction goes with what presses on it, both tendons together, is the capstan's law.
+    The torque is constant. The capstan's loss (`tendon_friction`) is proportional to the sum of both tensions, which is twice the
+    pretension until one tendon is slack, and grows with the load from there. Below that load data cannot separate the two effects,
+    and both are never claimed together. A bearing whose friction grows with the tendons' tension follows the capstan's law.
 
     Source: Coulomb, with Dahl's pre-sliding (1968) in its linear limit, Stribeck's curve (1902) and viscous friction as
     Armstrong-Helouvry, Dupont and Canudas de Wit (Automatica 30, 1994) write them. Miniature bearings and lip seals: 0.1-10 mN m; a
     wrist's pins and sheath more.
 
-    >>> float(JointFriction(torque=0.01, viscous=0.002).route().bearing.at(3.0).round(3))
+    >>> float(JointFriction(torque=0.01, viscous=0.002).route().bearing.friction_torque(3.0).round(3))
     0.016
     """
 
@@ -35,9 +35,9 @@ class JointFriction(Effect):
         Parameter("stribeck", 0.2, "rad/s", 0.01, 10.0, "films form at some mm/s; of pulleys of a few mm; ours", scale=0.1),
         Parameter("viscous", 0.0, "N*m*s/rad", 0.0, 1.0, "grease: some of `torque` at some rad/s; ours", scale=5e-4),
     )
-    shape = ("presliding", "stribeck")
-    richer = ("breakaway", "stribeck", "viscous")
-    akin = ("tendon_friction",)
+    inactive_when_off = ("presliding", "stribeck")
+    extended_parameters = ("breakaway", "stribeck", "viscous")
+    confusable_with = ("tendon_friction",)
     needs = frozenset({"antagonists"})
     guesses = ({"torque": 0.01},)
     moves_with = "the direction of travel (hysteresis loop), alike at every load"

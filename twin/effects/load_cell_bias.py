@@ -1,22 +1,23 @@
-"""Load cell bias: the cell reads a constant too much."""
+"""Load cell bias: the cell's reading has a constant offset."""
 
 from __future__ import annotations
 
-from twin.effects.effect import Effect, Signals
-from twin.quantities import Parameter
+from twin.body import Signals
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
 
 class LoadCellBias(Effect):
     """Reading of cell i = tension_i + bias_i.
 
-    Where tensions drive the twin, the true ones are found by inverting this.
+    Where tensions drive the twin, the true ones are found by inverting it.
 
     Source: linear sensor calibration; a cell not zeroed after mounting.
 
     >>> import numpy as np
-    >>> law, z = LoadCellBias(bias_1=0.1), np.zeros
-    >>> seen = Signals(z(2), np.array([0.0, 3600.0]), np.ones((2, 3)), z((2, 3)), z((2, 1, 3)), z(2))
-    >>> bool(np.allclose(law.sense(law.command(seen)).tension, 1.0))
+    >>> effect, z = LoadCellBias(bias_1=0.1, n_tendon=3), np.zeros
+    >>> reported = Signals(z(2), np.array([0.0, 3600.0]), np.ones((2, 3)), z((2, 3)), z((2, 1, 3)), z(2))
+    >>> bool(np.allclose(effect.sense(effect.command(reported)).tension, 1.0))
     True
     """
 
@@ -26,7 +27,7 @@ class LoadCellBias(Effect):
     moves_with = "the pull of one tendon, mostly where the others are slack"
 
     def sense(self, true: Signals) -> Signals:
-        return true.with_(tension=true.tension + self.each("bias"))
+        return true.with_changes(tension=true.tension + self.per_tendon_values("bias"))
 
     def command(self, reported: Signals) -> Signals:
-        return reported.with_(tension=reported.tension - self.each("bias"))
+        return reported.with_changes(tension=reported.tension - self.per_tendon_values("bias"))

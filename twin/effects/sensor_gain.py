@@ -1,15 +1,16 @@
-"""Sensor gain: a strain sensor reads a constant factor too much or too little."""
+"""Sensor gain: a strain sensor's reading is off by a constant factor."""
 
 from __future__ import annotations
 
-from twin.effects.effect import Effect, Signals
-from twin.quantities import Parameter
+from twin.body import Signals
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
 
 class SensorGain(Effect):
     """Resistance of sensor i = scale_i R0 (1 + gain_i a)^2, a = sqrt(R / R0) - 1 its apparent strain, R0 at no strain.
 
-    A built finger's R0 and kappa are its own: what they may be is in its description, and only what lies beyond is a gain.
+    The description gives the spread of R0 and kappa of built fingers; only a deviation beyond it is a gain.
 
     Source: linear calibration of the amplifier (`scale`) and of the cord's gauge factor (`gain`).
 
@@ -33,4 +34,9 @@ class SensorGain(Effect):
             return true
         R, rest = true.others["sensor"], true.others["sensor_rest"]
         apparent = (R / rest) ** 0.5 - 1.0
-        return true.with_(others={**true.others, "sensor": self.each("scale") * rest * (1.0 + self.each("gain") * apparent) ** 2})
+        return true.with_changes(
+            others={
+                **true.others,
+                "sensor": self.per_tendon_values("scale") * rest * (1.0 + self.per_tendon_values("gain") * apparent) ** 2,
+            }
+        )

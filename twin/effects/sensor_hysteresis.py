@@ -1,4 +1,4 @@
-"""Sensor hysteresis: a strain sensor's resistance depends on where its strain came from."""
+"""Sensor hysteresis: a strain sensor's resistance depends on its strain before."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.compiled import jit
-from twin.effects.effect import Effect, Signals, Start
-from twin.effects.tendon_backlash import lead
-from twin.quantities import Parameter
+from twin.body import Signals
+from twin.effects.base.effect import Effect, FitStart
+from twin.effects.tendon_backlash import play_side
+from twin.foundation.compiled import jit
+from twin.foundation.parameters import Parameter
 
 
 @jit
-def behind(a, time, tau, out):
-    """First-order lag of a (n, s) over `tau` (s), in `out`: exact for a that stays constant from one time to the next."""
+def first_order_lag(a, time, tau, out):
+    """Write the first-order lag of a (n, s) with time constant `tau` (s) to `out`, exact for a constant between samples."""
     for j in range(a.shape[1]):
         y = a[0, j]
         out[0, j] = y
@@ -26,8 +27,8 @@ def behind(a, time, tau, out):
 class SensorHysteresis(Effect):
     """Apparent strain read = a - width z - share (a - lag(a)), a = sqrt(R / R0) - 1 and lag(a) its first-order lag over `time`.
 
-    z in [-1, 1] is the side of a play operator: it follows a and is crossed over the strain `swap`. The play stands still when the
-    strain does, the lag creeps back. Every trial starts from z = 0 and lag(a) = a.
+    z in [-1, 1] is the side of a play operator: it follows a and changes side over the strain `swap`. At constant strain the play
+    is constant, while the lag decays. Every trial starts from z = 0 and lag(a) = a.
 
     Source: play operator (Krasnosel'skii and Pokrovskii); a Maxwell element. Carbon-filled rubber shows both.
 
@@ -45,16 +46,16 @@ class SensorHysteresis(Effect):
         Parameter("share", 0.0, "1", -0.9, 0.9, "of a sudden strain that comes late; carbon-filled rubber: a tenth", scale=0.02),
         Parameter("time", 2.0, "s", 0.05, 500.0, "relaxation time of that", scale=0.5),
     )
-    shape = ("swap", "time")
+    inactive_when_off = ("swap", "time")
     needs = frozenset({"strain sensors"})
     moves_with = "the direction of strain"
 
     @classmethod
-    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """A play, a short lag, a long one."""
-        yield Start({"width": 1e-3}, ("width", "swap"))
-        yield Start({"share": 0.05, "time": 2.0}, ("share", "time"))
-        yield Start({"share": 0.05, "time": 20.0}, ("share", "time"))
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        """Start with a play, with a short lag and with a long one."""
+        yield FitStart({"width": 1e-3}, ("width", "swap"))
+        yield FitStart({"share": 0.05, "time": 2.0}, ("share", "time"))
+        yield FitStart({"share": 0.05, "time": 20.0}, ("share", "time"))
 
     def sense(self, true: Signals) -> Signals:
         if "sensor" not in true.others or not (self["width"] or self["share"]):
@@ -62,7 +63,7 @@ class SensorHysteresis(Effect):
         rest = true.others["sensor_rest"]
         a = np.ascontiguousarray((true.others["sensor"] / rest) ** 0.5 - 1.0)
         side, late = np.empty_like(a), np.empty_like(a)
-        lead(a - a[0], np.full(a.shape[1], self["swap"]), side)
-        behind(a, true.time, self["time"], late)
+        play_side(a - a[0], np.full(a.shape[1], self["swap"]), side)
+        first_order_lag(a, true.time, self["time"], late)
         read = a - self["width"] * side - self["share"] * (a - late)
-        return true.with_(others={**true.others, "sensor": rest * (1.0 + read) ** 2})
+        return true.with_changes(others={**true.others, "sensor": rest * (1.0 + read) ** 2})

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from twin.effects.effect import Effect
-from twin.quantities import Parameter
+from twin.body import Body
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
 
 class StiffnessGradient(Effect):
-    """EI(s) = EI (1 + gradient (s/L - 1/2)), and GJ (and EA, where it stretches) alike; s is the distance from the base.
+    """EI(s) = EI (1 + gradient (s/L - 1/2)), and GJ (and EA of a body that stretches) likewise; s is the distance from the base.
 
     Source: first-order Taylor expansion of EI(s) about the middle. A ground or tempered wire; a casting that cured from one end.
 
@@ -21,5 +22,5 @@ class StiffnessGradient(Effect):
     needs = frozenset({"length"})
     moves_with = "the place along the body"
 
-    def edit(self, body) -> None:
-        body.grade(self["gradient"])
+    def edit(self, body: Body) -> None:
+        body.set_stiffness_gradient(self["gradient"])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.effects.effect import Effect
-from twin.quantities import Parameter
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
-REFERENCE = 296.15  # K, 23 degC: where stiffness is quoted
-SOFTEST = 0.05  # of the stiffness there: what is left of a body that has all but melted
+REFERENCE_TEMPERATURE = 296.15  # K, 23 degC: to which the described stiffness refers
+MIN_STIFFNESS_SHARE = 0.05  # of the described stiffness: the least that softening and ageing leave
 
 
 class TemperatureSoftening(Effect):
@@ -27,4 +27,4 @@ class TemperatureSoftening(Effect):
     moves_with = "the room's temperature"
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
-        return np.maximum(SOFTEST, 1.0 - self["rate"] * (temperature - REFERENCE))
+        return np.maximum(MIN_STIFFNESS_SHARE, 1.0 - self["rate"] * (temperature - REFERENCE_TEMPERATURE))

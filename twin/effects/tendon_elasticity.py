@@ -6,27 +6,30 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from twin.effects.effect import ROPES, Effect, Route, Signals, Start
-from twin.quantities import Parameter
+from twin.body import ROPE_FEATURES, Route, Signals
+from twin.effects.base.effect import Effect, FitStart
+from twin.foundation.parameters import Parameter
 
-SHARES = (0.1, 0.3)  # of the largest tension, over which tendons may bed in
+TOE_TENSION_SHARES = (0.1, 0.3)  # of the largest tension: tensions of the toe from which fits start
 
 
 class TendonElasticity(Effect):
-    """Under T a tendon is longer by e = stretch T + toe (1 - exp(-(T - T_0) / toe_tension)); T_0 is the tension of its rest, which
-    of a backbone's tendons is none. Displacement at the motor = shortening of the path + e.
+    """Under tension T a tendon is longer by e = stretch T + toe (1 - exp(-(T - T_0) / toe_tension)), T_0 its tension at rest.
 
-    Driven by displacement the robot gets less of it the harder it is to bend, and lags at the start of each pull; driven by
-    tension only the displacement shows it. Of two antagonists under a load F of the joint, in tension, the toe alone is
-    toe tanh(F / (2 toe_tension)): soft where the load changes sides, and used up beyond, where the stretch stays. So a loop that
-    friction makes is wide under loads smaller than the friction, and narrows under larger ones to what stretch makes of it, not
-    to nothing. An SMA spring was put on as long as it is described, under its first tension, which stretched the tendon already
-    (`hooked`, 1), or it has been drawn in by that since (0).
+    T_0 is zero for a backbone's tendons. Displacement at the motor = shortening of the path + e. A robot driven by displacement
+    bends less the stiffer it is, and lags at the start of each pull; if tension drives it, only the displacement shows the effect.
+
+    For two antagonists under a load F of the joint, as a tension, the toe is toe tanh(F / (2 toe_tension)): it is soft where the
+    load changes its sign and taken up beyond, where the stretch remains. So the loop made by friction is wide under loads smaller
+    than the friction, and narrows under larger loads to a width that stretch determines, not to zero.
+
+    The first tension of an SMA spring had stretched the tendon when the spring was mounted (`hooked` 1), or stretched it afterwards
+    (0).
 
     Source: Hooke; stretch = length / (E A) of tendon and mount. Steel rope of 0.3 mm and 0.5 m: 0.05 mm/N; braided line: ten times.
-    The toe is what manufacturers of wire rope call constructional stretch: gaps between wires close under the first load, and sag
-    straightens (carlstahl-technocables.de, "Elongation"); it is below 1 % of the length, and prestretching takes most of it out
-    (Strand Core, "Wire rope stretch"). The exponential is ours: the least law that has an amount and a tension.
+    The toe is called constructional stretch by manufacturers of wire rope: gaps between wires close under the first load, and sag
+    straightens (carlstahl-technocables.de, "Elongation"). It is below 1 % of the length, and prestretching removes most of it
+    (Strand Core, "Wire rope stretch"). The exponential is ours: the simplest law with an amount and a tension.
 
     >>> TendonElasticity(stretch=5e-5).route().stretch
     5e-05
@@ -41,26 +44,31 @@ class TendonElasticity(Effect):
         Parameter("toe_tension", 2.0, "N", 0.3, 20.0, "a small part of the pretension; ours", scale=0.5),
         Parameter("hooked", 1.0, "1", 0.0, 1.0, "share of the first stretch there when SMA springs were put on", scale=1.0),
     )
-    shape = ("toe_tension", "hooked")
-    richer = ("stretch",)  # of a toe; alone it is the plain law
+    inactive_when_off = ("toe_tension", "hooked")
+    extended_parameters = ("stretch",)  # of a toe; alone it is the plain law
     moves_with = "tension against displacement, a pull's first newtons most; between antagonists loops that narrow under load"
 
     @classmethod
-    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Stretch alone; or the toe alone, of antagonists below their pretension, of a backbone's over shares of the largest
-        pull of the day; where springs pull, either put on. Stretch beside a toe is sought where the toe is in force."""
-        antagonists, sprung = (any(x) for x in ([s.antagonists for s in predicted], [s.by_current.any() for s in predicted]))
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        """Start with stretch alone and with the toe alone; where springs pull, with both ways of mounting them.
+
+        The toe starts below the pretension of antagonists, or at shares of the largest tension of a backbone's tendons. Stretch is
+        added to a toe by `extended_starts`.
+        """
+        antagonists, sprung = (any(x) for x in ([s.antagonists for s in predicted], [s.driven_by_current.any() for s in predicted]))
         largest = max((float(s.tension.max(initial=0.0)) for s in predicted), default=0.0)
-        shares = [(5e-4, float(np.clip(share * largest, 0.3, 20.0))) for share in SHARES if largest > 0.0]
+        shares = [(5e-4, float(np.clip(share * largest, 0.3, 20.0))) for share in TOE_TENSION_SHARES if largest > 0.0]
         toes = ((1e-3, 1.0), (4e-4, 2.0)) if antagonists else shares
         for hooked in ({"hooked": 1.0}, {"hooked": 0.0}) if sprung else ({},):
-            yield Start({"stretch": 5e-5, **hooked}, ("stretch",))
+            yield FitStart({"stretch": 5e-5, **hooked}, ("stretch",))
             for toe, tension in toes:
-                yield Start({"toe": toe, "toe_tension": tension, **hooked}, ("toe", "toe_tension"), ROPES)
+                yield FitStart({"toe": toe, "toe_tension": tension, **hooked}, ("toe", "toe_tension"), ROPE_FEATURES)
 
     @classmethod
     def form(cls, free: Collection[str]) -> str:
         return "toe" if "toe" in free else "stretch"
 
     def route(self) -> Route:
-        return Route(stretch=self["stretch"], bedding=self["toe"], bedding_tension=self["toe_tension"], hooked=self["hooked"])
+        return Route(
+            stretch=self["stretch"], bedding=self["toe"], bedding_tension=self["toe_tension"], initial_stretch_share=self["hooked"]
+        )

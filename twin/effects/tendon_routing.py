@@ -1,13 +1,14 @@
-"""Tendon routing: a tendon's holes sit at another angle or radius than described."""
+"""Tendon routing: a tendon's holes are at another angle or radius than described."""
 
 from __future__ import annotations
 
-from twin.effects.effect import Effect
-from twin.quantities import Parameter
+from twin.body import Body
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
 
 class TendonRouting(Effect):
-    """All holes of tendon i moved: azimuth' = azimuth + angle_i about the backbone, radius' = radius + radius_i.
+    """All holes of tendon i are moved: azimuth' = azimuth + angle_i about the backbone, radius' = radius + radius_i.
 
     Source: geometry. A disk glued on with a twist, a hole drilled at the wrong mark.
 
@@ -23,8 +24,8 @@ class TendonRouting(Effect):
     needs = frozenset({"holes"})
     moves_with = "the pull of one tendon"
 
-    def edit(self, body) -> None:
+    def edit(self, body: Body) -> None:
         for i in range(1, self.n_tendon + 1):
             angle, further = self[f"angle_{i}"], self[f"radius_{i}"]
             if angle or further:
-                body.reroute(i - 1, angle, further)
+                body.move_tendon_holes(i - 1, angle, further)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.effects.effect import Effect, Signals, between_rows
-from twin.quantities import Parameter
+from twin.body import Signals, interpolate_commands
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
 
 
 class TimeDelay(Effect):
-    """Outputs logged late: y_logged(t) = y(t - delay), driven by T(t - delay), between rows as `Signals.smooth` says.
+    """Outputs logged late: y_logged(t) = y(t - delay), driven by T(t - delay), interpolated between rows as `Signals.smooth` says.
 
-    The input is shifted, not the predicted output: a shape between two samples is one the robot can take; a straight line between
-    two shapes is not. Before the log starts the first value holds.
+    The input is shifted, not the predicted output: a shape predicted between two samples is one the robot can take, a straight line
+    between two shapes is not. Before the log starts the input is its first value.
 
     Source: two loggers without a common clock; a camera's exposure and transfer (20-200 ms).
 
@@ -24,7 +25,7 @@ class TimeDelay(Effect):
 
     id = "time_delay"
     parameters = (Parameter("delay", 0.0, "s", -3.0, 3.0, "positive: outputs come late", scale=0.05),)
-    akin = ("actuator_lag",)
+    confusable_with = ("actuator_lag",)
     guesses = ({"delay": 0.1},)
     moves_with = "the rate of change of the pull"
 
@@ -32,12 +33,12 @@ class TimeDelay(Effect):
         t = reported.time
         if self["delay"] == 0.0 or len(t) < 2:
             return reported
-        then = np.clip(t - self["delay"], t[0], t[-1])
-        pull, travel = (between_rows(reported, c)(then) for c in (reported.tension, reported.displacement))
-        return reported.with_(tension=pull, displacement=travel, current=self._heating(reported))
+        earlier = np.clip(t - self["delay"], t[0], t[-1])
+        tension, displacement = (interpolate_commands(reported, c)(earlier) for c in (reported.tension, reported.displacement))
+        return reported.with_changes(tension=tension, displacement=displacement, current=self._heating(reported))
 
     def _heating(self, reported: Signals) -> np.ndarray:
-        """Currents, which hold from row to row, as shifted: over each row the one that heats as much. None flows before the log."""
+        """Return the shifted currents, constant over each row, that heat as much; zero before the log."""
         t = reported.time
         edges = np.append(t, 2 * t[-1] - t[-2])
         heat = np.cumsum(np.diff(edges)[:, None] * reported.current**2, axis=0)

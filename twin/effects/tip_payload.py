@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from twin.effects.effect import Effect, Loads, Signals, Start
-from twin.quantities import Parameter
+from twin.body import Loads, Signals
+from twin.effects.base.effect import Effect, FitStart
+from twin.foundation.parameters import Parameter
 
 
 class TipPayload(Effect):
     """A point mass at the centre of the tip disk, added to what each trial declares: m' = m + mass.
 
-    Silicone it stretches, and tendons' lengths with it: `zeroed` is 1 where it hung there already when these were set to zero.
+    It stretches silicone and with it the tendons' lengths: `zeroed` is 1 if the mass hung there when these were set to zero.
 
-    Source: statics. A gripper, a cable or a marker body that nobody weighed.
+    Source: statics. A gripper, a cable or a marker body that was not weighed.
 
     >>> import numpy as np
     >>> round(TipPayload(mass=0.005).surround(Loads(np.zeros(3), payload=0.01)).payload, 4)
@@ -26,15 +27,17 @@ class TipPayload(Effect):
         Parameter("mass", 0.0, "kg", 0.0, 0.1, "undeclared mass at the tip", scale=1e-3),
         Parameter("zeroed", 0.0, "1", 0.0, 1.0, "share of it that hung there when lengths were set to zero", scale=1.0),
     )
-    shape = ("zeroed",)
+    inactive_when_off = ("zeroed",)
     needs = frozenset({"weight"})
     moves_with = "the bending of the body under its weight"
 
     @classmethod
-    def starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[Start]:
-        """Either way of setting lengths to zero, where the body hangs then."""
-        yield Start({"mass": 2e-3, "zeroed": 0.0}, ("mass",))
-        yield Start({"mass": 2e-3, "zeroed": 1.0}, ("mass",), frozenset({"hanging zero"}))
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        """Start without and with the mass when lengths are set to zero, the latter for a body that hangs then."""
+        yield FitStart({"mass": 2e-3, "zeroed": 0.0}, ("mass",))
+        yield FitStart({"mass": 2e-3, "zeroed": 1.0}, ("mass",), frozenset({"hanging zero"}))
 
     def surround(self, loads: Loads) -> Loads:
-        return replace(loads, payload=loads.payload + self["mass"], at_zero=loads.at_zero + self["zeroed"] * self["mass"])
+        return replace(
+            loads, payload=loads.payload + self["mass"], payload_at_zero=loads.payload_at_zero + self["zeroed"] * self["mass"]
+        )

@@ -1,4 +1,4 @@
-"""Conditions of a trial: those the twin understands, in SI, and the others, kept by name."""
+"""Conditions of a trial: known ones in SI, other ones as written."""
 
 from __future__ import annotations
 
@@ -6,42 +6,37 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twin.errors import DataError, did_you_mean, shown
-from twin.measurements.files import located
-from twin.measurements.quantity_strings import quantity, vector
+from twin.foundation.errors import DataError, did_you_mean, short_repr
+from twin.foundation.files import prefix_errors
+from twin.measurements.parsing.quantity_strings import parse_quantity, parse_vector
 
-SCALARS = {"tip_payload": "kg", "ambient_temperature": "K"}
-VECTORS = {"gravity": "m/s^2", "tip_force": "N"}  # base frame
-LARGEST = {
-    "tip_payload": 100.0,
-    "ambient_temperature": 1000.0,
-    "gravity": 50.0,
-    "tip_force": 1e4,
-}  # SI: what robots meet, with room
-_TRIAL_KEYS = ("file", "start", "cloud")  # what a [[trial]] says besides its conditions
+SCALAR_CONDITIONS = {"tip_payload": "kg", "ambient_temperature": "K"}
+VECTOR_CONDITIONS = {"gravity": "m/s^2", "tip_force": "N"}  # base frame
+MAX_CONDITION = {"tip_payload": 100.0, "ambient_temperature": 1000.0, "gravity": 50.0, "tip_force": 1e4}  # SI, plausible at most
+_TRIAL_KEYS = ("file", "start", "cloud")  # keys of a [[trial]] that are no conditions
 
 
 def read_conditions(trial: Mapping[str, object]) -> tuple[dict[str, float | np.ndarray], dict[str, object]]:
-    """Understood conditions in SI, and the others as written, of one [[trial]] table.
+    """Return the known conditions of a [[trial]] table in SI, and the other ones as written.
 
-    Raises DataError, naming the condition, for a wrong dimension, an unreadable quantity, a negative mass or temperature, and
-    a name that is almost one of these.
+    Raises DataError, naming the condition, for a wrong dimension, an unreadable quantity, a negative mass or temperature, and a
+    name that is almost a known one.
     """
     known: dict[str, float | np.ndarray] = {}
     other: dict[str, object] = {}
     for name, written in trial.items():
-        with located(name):
-            if name in SCALARS:
-                known[name] = quantity(written, SCALARS[name])
+        with prefix_errors(name):
+            if name in SCALAR_CONDITIONS:
+                known[name] = parse_quantity(written, SCALAR_CONDITIONS[name])
                 if known[name] < 0.0:
-                    raise DataError(f"{shown(written)} is below zero {SCALARS[name]}; write what was really there")
-            elif name in VECTORS:
-                known[name] = vector(written, VECTORS[name])
+                    raise DataError(f"{short_repr(written)} is below zero {SCALAR_CONDITIONS[name]}; write the true value")
+            elif name in VECTOR_CONDITIONS:
+                known[name] = parse_vector(written, VECTOR_CONDITIONS[name])
             elif name not in _TRIAL_KEYS:
-                if close := did_you_mean(name, (*SCALARS, *VECTORS, *_TRIAL_KEYS)):
+                if close := did_you_mean(name, (*SCALAR_CONDITIONS, *VECTOR_CONDITIONS, *_TRIAL_KEYS)):
                     raise DataError(f"no such condition{close} A name of your own must differ more")
                 other[name] = written
-            if name in known and not np.all(np.abs(known[name]) <= LARGEST[name]):
-                unit = SCALARS.get(name) or VECTORS[name]
-                raise DataError(f"{shown(written)} is not plausible; at most {LARGEST[name]:g} {unit}")
+            if name in known and not np.all(np.abs(known[name]) <= MAX_CONDITION[name]):
+                unit = SCALAR_CONDITIONS.get(name) or VECTOR_CONDITIONS[name]
+                raise DataError(f"{short_repr(written)} is not plausible; at most {MAX_CONDITION[name]:g} {unit}")
     return known, other

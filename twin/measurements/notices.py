@@ -1,4 +1,4 @@
-"""Notices: what a user should know about a set that is otherwise in order, one plain sentence a kind of finding."""
+"""Notices about a set that is otherwise in order, one sentence for each kind of finding."""
 
 from __future__ import annotations
 
@@ -7,47 +7,47 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from twin.errors import shown
+from twin.foundation.errors import short_repr
 from twin.measurements.channels import Channel
-from twin.measurements.plausible import SLACK_SIGMAS
-from twin.measurements.recording import CONTACT, Trial
-from twin.measurements.tables import Table
+from twin.measurements.parsing.plausible import MAX_SLACK_SIGMAS
+from twin.measurements.parsing.tables import Table
+from twin.measurements.recording import EXTERNAL_CONTACT, Trial
 
-MOST_NAMED = 5  # undeclared columns
+MAX_COLUMNS_NAMED = 5  # undeclared columns
 
 
-def notices_of(channels: Sequence[Channel], trials: Sequence[Trial], tables: Sequence[Table]) -> list[str]:
-    """Undeclared columns, conditions that are not understood, inputs with gaps or below zero, and channels empty in a trial."""
+def collect_notices(channels: Sequence[Channel], trials: Sequence[Trial], tables: Sequence[Table]) -> list[str]:
+    """Return notices on undeclared columns, unknown conditions, inputs with gaps or below zero, and channels empty in a trial."""
     notices = []
-    extra = _where((table.path.name, table.extra) for table in tables)
-    if len(extra) > MOST_NAMED:
-        named = ", ".join(map(shown, list(extra)[:MOST_NAMED]))
+    extra = _files_by_name((table.path.name, table.extra) for table in tables)
+    if len(extra) > MAX_COLUMNS_NAMED:
+        named = ", ".join(map(short_repr, list(extra)[:MAX_COLUMNS_NAMED]))
         files = list(dict.fromkeys(itertools.chain.from_iterable(extra.values())))
         notices.append(
-            f"{len(extra)} columns are not declared in measurements.toml and not read: {named} and others ({_listed(files)})"
+            f"{len(extra)} columns are not declared in measurements.toml and not read: {named} and others ({_list_files(files)})"
         )
     else:
         for name, files in extra.items():
-            notices.append(f"column {shown(name)} is not declared in measurements.toml and not read ({_listed(files)})")
-    for name, files in _where((trial.name, trial.other.keys() - {CONTACT}) for trial in trials).items():
-        notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_listed(files)})")
+            notices.append(f"column {short_repr(name)} is not declared in measurements.toml and not read ({_list_files(files)})")
+    for name, files in _files_by_name((trial.name, trial.other.keys() - {EXTERNAL_CONTACT}) for trial in trials).items():
+        notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_list_files(files)})")
     for channel in channels:
         gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}
         empty = [trial.name for trial in trials if gaps[trial.name] == len(trial.time)]
         holed = [name for name, count in gaps.items() if count and name not in empty]
         lowest = min((float(np.nanmin(t.values[channel.name])) for t in trials if t.name not in empty), default=0.0)
-        if channel.role == "input" and channel.kind == "tendon_tension" and lowest < -SLACK_SIGMAS * (channel.noise or 0.01):
+        if channel.role == "input" and channel.kind == "tendon_tension" and lowest < -MAX_SLACK_SIGMAS * (channel.noise or 0.01):
             notices.append(f"input {channel.name} falls to {lowest:.3g} N, below what its noise explains: a zero offset?")
         if empty:
-            notices.append(f"{channel.role} {channel.name} has no value in {_listed(empty)}")
+            notices.append(f"{channel.role} {channel.name} has no value in {_list_files(empty)}")
         if holed and channel.role == "input":
             count = sum(gaps[name] for name in holed)
-            notices.append(f"input {channel.name} misses {count} values, which are not filled in ({_listed(holed)})")
+            notices.append(f"input {channel.name} misses {count} values, which are not filled in ({_list_files(holed)})")
     return notices
 
 
-def _where(found: Iterable[tuple[str, Iterable[str]]]) -> dict[str, list[str]]:
-    """File and the names found in it -> name and the files it stands in."""
+def _files_by_name(found: Iterable[tuple[str, Iterable[str]]]) -> dict[str, list[str]]:
+    """Turn pairs of a file and the names found in it into a map from each name to its files."""
     files: dict[str, list[str]] = {}
     for file, names in found:
         for name in names:
@@ -55,5 +55,6 @@ def _where(found: Iterable[tuple[str, Iterable[str]]]) -> dict[str, list[str]]:
     return files
 
 
-def _listed(files: Sequence[str]) -> str:
+def _list_files(files: Sequence[str]) -> str:
+    """Return up to three names, or two and the number of the others."""
     return ", ".join(files) if len(files) <= 3 else f"{files[0]}, {files[1]} and {len(files) - 2} more"

@@ -1,6 +1,6 @@
-"""Reading a measurement set: measurements.toml and its trials -> Recording, or one clear line about what is wrong.
+"""Reading of a measurement set: measurements.toml and its trials become a Recording, or one error in a clear line.
 
-Nothing read is changed or repaired in silence: what is left out, missing or not understood becomes a notice.
+Nothing is changed or repaired silently: trials left out, missing values and unknown keys become notices.
 """
 
 from __future__ import annotations
@@ -13,29 +13,38 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import Field
 
-from twin.errors import DataError, listed, shown
-from twin.forms import Form, Text, fill
-from twin.measurements.channels import MADE, Channel, Role
+from twin.foundation.errors import DataError, join_problems, short_repr
+from twin.foundation.file_schema import TableSchema, Text, validate_table
+from twin.foundation.files import (
+    MAX_SET_NUMBERS,
+    MAX_SET_TOML_BYTES,
+    check_file_name,
+    is_file,
+    parse_toml,
+    prefix_errors,
+    read_utf8,
+    resolve_in_folder,
+)
+from twin.measurements.channels import DERIVED_KINDS, Channel, Role
 from twin.measurements.clouds import read_clouds
-from twin.measurements.conditions import LARGEST, read_conditions
-from twin.measurements.files import LARGEST_SET, LARGEST_TOML, check_name, inside, is_file, located, parse_toml, read_text
-from twin.measurements.notices import notices_of
-from twin.measurements.plausible import check_roles, check_table, check_trials, why_unusable
-from twin.measurements.quantity_strings import number, vector
+from twin.measurements.conditions import MAX_CONDITION, read_conditions
+from twin.measurements.notices import collect_notices
+from twin.measurements.parsing.plausible import check_roles, check_table, check_trials, unusable_reason
+from twin.measurements.parsing.quantity_strings import parse_number, parse_vector
+from twin.measurements.parsing.tables import Table, read_table
 from twin.measurements.recording import Recording, Trial
-from twin.measurements.tables import Table, read_table
 
-FORMAT = "twin-measurements/1"
-FILE = "measurements.toml"
-_SOURCES = ("hardware", "simulation")
+SET_FORMAT = "twin-measurements/1"
+SET_FILE = "measurements.toml"
+_SOURCE_KINDS = ("hardware", "simulation")
 _SUFFIXES = (".csv", ".parquet")
-LATEST = 1e9  # s: thirty years
+MAX_START = 1e9  # s since the first trial: thirty years
 
 
-class SetFile(Form):
+class SetFile(TableSchema):
     """The top of a `measurements.toml`."""
 
-    format: str = Field(description=f'"{FORMAT}"')
+    format: str = Field(description=f'"{SET_FORMAT}"')
     robot: Text = Field(description="a robot's name, or the path to its folder from this file")
     title: Text = Field("", description="one line for people")
     source: Text = Field("not stated", description='"hardware" or "simulation"; free text may follow after a colon')
@@ -44,7 +53,7 @@ class SetFile(Form):
     trial: list[Any] = Field([], description="[[trial]] tables: the files, one a run")
 
 
-class ChannelTable(Form):
+class ChannelTable(TableSchema):
     """One [[channel]]."""
 
     name: str = Field(description="the column, a name of the grammar below")
@@ -54,44 +63,44 @@ class ChannelTable(Form):
 
 
 def read(path: str | Path, *, least_trials: int = 2) -> Recording:
-    """The measurement set in folder `path`, or whose measurements.toml is `path`; values in SI, arrays read-only.
+    """Read the measurement set in folder `path`, or whose measurements.toml is `path`; values in SI, arrays read-only.
 
-    Trials of fewer than 3 samples or without one finite output are left out, with a notice.
+    Trials of fewer than 3 samples or without a finite output value are left out, with a notice.
 
-    Raises DataError, naming file, row and column, for everything that breaks the contract, and for fewer than `least_trials`
-    usable trials: two are needed to keep one away from every fit. All that is wrong with measurements.toml is told at once.
+    Raises DataError, naming file, row and column, for a set that breaks the contract, and for fewer than `least_trials` usable
+    trials: two are needed to hold one out of every fit. All problems of measurements.toml are reported together.
     """
-    file = Path(path) if Path(path).name == FILE else Path(path) / FILE
-    declared, gravity, channels, written = _declared(file)
-    notes = []
-    if declared.source.partition(":")[0].strip() not in _SOURCES:
-        notes.append(
-            f"source is {shown(declared.source)}; the contract knows {' and '.join(_SOURCES)}, with free text after a colon"
+    file = Path(path) if Path(path).name == SET_FILE else Path(path) / SET_FILE
+    declared, gravity, channels, declared_trials = _read_declarations(file)
+    notices = []
+    if declared.source.partition(":")[0].strip() not in _SOURCE_KINDS:
+        notices.append(
+            f"source is {short_repr(declared.source)}; known are {' and '.join(_SOURCE_KINDS)}, with free text after a colon"
         )
     trials: list[Trial] = []
     tables: list[Table] = []
     left_out: list[str] = []
-    room = LARGEST_SET
-    for each in written:
-        trial, table = _read_trial(file.parent, each, channels)
-        room -= table.columns["time"].size * len(table.columns)
-        if room < 0:
-            raise DataError(f"{file}: more than {LARGEST_SET} numbers in all; split the set, or thin its trials out")
+    numbers_left = MAX_SET_NUMBERS
+    for declared_trial in declared_trials:
+        trial, table = _read_trial(file.parent, declared_trial, channels)
+        numbers_left -= table.columns["time"].size * len(table.columns)
+        if numbers_left < 0:
+            raise DataError(f"{file}: more than {MAX_SET_NUMBERS} numbers in all; split the set, or thin its trials out")
         tables.append(replace(table, columns={}))  # its numbers are in the trial
-        if reason := why_unusable(trial, channels):
+        if reason := unusable_reason(trial, channels):
             left_out.append(f"{trial.name} is left out: {reason}")
         else:
             trials.append(trial)
-    with located(file):
+    with prefix_errors(file):
         check_trials(channels, trials, left_out, least_trials)
-    notes += left_out + notices_of(channels, trials, tables)
-    about = (declared.robot, declared.title, declared.source, gravity, channels)
-    return Recording(*about, tuple(trials), file.parent, tuple(notes))
+    notices += left_out + collect_notices(channels, trials, tables)
+    head = (declared.robot, declared.title, declared.source, gravity, channels)
+    return Recording(*head, tuple(trials), file.parent, tuple(notices))
 
 
 @dataclass(frozen=True)
-class Written:
-    """A [[trial]] as declared: its table and clouds, start (s), conditions that are understood (SI) and others."""
+class DeclaredTrial:
+    """A [[trial]] as declared: its files, start (s), known conditions (SI) and others."""
 
     table: Path
     cloud: Path | None
@@ -100,23 +109,26 @@ class Written:
     other: dict[str, object]
 
 
-def _declared(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Channel, ...], list[Written]]:
-    """What measurements.toml says. Raises DataError with all that is wrong with it."""
+def _read_declarations(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Channel, ...], list[DeclaredTrial]]:
+    """Read measurements.toml. Raises DataError with all its problems."""
     if not is_file(file):
-        raise DataError(f"{shown(str(file), 300)}: no such file; a measurement set is a folder with a {FILE}")
+        raise DataError(f"{short_repr(str(file), 300)}: no such file; a measurement set is a folder with a {SET_FILE}")
     problems: list[str] = []
-    with located(file):
-        table = parse_toml(read_text(file, LARGEST_TOML))
-        if table.get("format") != FORMAT:
-            raise DataError(f'format is {shown(table.get("format"))}; write format = "{FORMAT}"')
-        declared = fill(SetFile, table, "", problems)
+    with prefix_errors(file):
+        table = parse_toml(read_utf8(file, MAX_SET_TOML_BYTES))
+        if table.get("format") != SET_FORMAT:
+            raise DataError(f'format is {short_repr(table.get("format"))}; write format = "{SET_FORMAT}"')
+        declared = validate_table(SetFile, table, "", problems)
         if declared is None:
-            raise DataError(listed(problems))
+            raise DataError(join_problems(problems))
         if not declared.robot.strip():
-            problems.append(f"robot is {shown(declared.robot)}; name one, or a path to its folder")
-        gravity = _told(problems, "gravity", lambda: _gravity(declared.gravity)) if "gravity" in table else None
-        found = [_told(problems, f"channel {n}", lambda each=each: _channel(each)) for n, each in enumerate(declared.channel, 1)]
-        channels = tuple(c for c in found if c is not None)
+            problems.append(f"robot is {short_repr(declared.robot)}; name one, or a path to its folder")
+        gravity = _collect_fault(problems, "gravity", lambda: _parse_gravity(declared.gravity)) if "gravity" in table else None
+        parsed = [
+            _collect_fault(problems, f"channel {n}", lambda each=each: _parse_channel(each))
+            for n, each in enumerate(declared.channel, 1)
+        ]
+        channels = tuple(c for c in parsed if c is not None)
         names = [c.name for c in channels]
         problems += [
             f"channel {name} is declared twice; declare it once" for name in sorted({n for n in names if names.count(n) > 1})
@@ -124,23 +136,24 @@ def _declared(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Channel, ..
         if not problems:
             check_roles(channels)
         trials = [
-            _told(problems, f"trial {n}", lambda each=each: _trial(file.parent, each)) for n, each in enumerate(declared.trial, 1)
+            _collect_fault(problems, f"trial {n}", lambda each=each: _parse_trial(file.parent, each))
+            for n, each in enumerate(declared.trial, 1)
         ]
-        written = [t for t in trials if t is not None]
-        labels = [_label(t.table) for t in written]
-        for n, t in enumerate(written):
+        declared_trials = [t for t in trials if t is not None]
+        labels = [_trial_label(t.table) for t in declared_trials]
+        for n, t in enumerate(declared_trials):
             if labels[n] in labels[:n]:
-                problems.append(f"trial {n + 1}: file {shown(t.table.name)} is there twice; list every trial once")
+                problems.append(f"trial {n + 1}: file {short_repr(t.table.name)} is there twice; list every trial once")
         if problems:
-            raise DataError(listed(problems))
-    return declared, gravity, channels, written
+            raise DataError(join_problems(problems))
+    return declared, gravity, channels, declared_trials
 
 
-Told = TypeVar("Told")
+Result = TypeVar("Result")
 
 
-def _told(problems: list[str], where: str, call: Callable[[], Told]) -> Told | None:
-    """What `call` returns, or None with its DataError added to `problems`."""
+def _collect_fault(problems: list[str], where: str, call: Callable[[], Result]) -> Result | None:
+    """Return the result of `call`, or None with its DataError added to `problems`."""
     try:
         return call()
     except DataError as fault:
@@ -148,63 +161,63 @@ def _told(problems: list[str], where: str, call: Callable[[], Told]) -> Told | N
         return None
 
 
-def _gravity(value: object) -> np.ndarray:
-    pull = vector(value, "m/s^2")
-    if not np.all(np.abs(pull) <= LARGEST["gravity"]):
-        raise DataError(f"{shown(value)} is not plausible; at most {LARGEST['gravity']:g} m/s^2 along each axis")
+def _parse_gravity(value: object) -> np.ndarray:
+    pull = parse_vector(value, "m/s^2")
+    if not np.all(np.abs(pull) <= MAX_CONDITION["gravity"]):
+        raise DataError(f"{short_repr(value)} is not plausible; at most {MAX_CONDITION['gravity']:g} m/s^2 along each axis")
     return pull
 
 
-def _channel(table: object) -> Channel:
+def _parse_channel(table: object) -> Channel:
     problems: list[str] = []
-    found = fill(ChannelTable, table, "", problems)
+    found = validate_table(ChannelTable, table, "", problems)
     if found is None:
         raise DataError("; ".join(problems))
     channel = Channel(found.name, found.role, found.unit)
-    if channel.kind in MADE:
+    if channel.kind in DERIVED_KINDS:
         raise DataError(f"{found.name} is made from point clouds, not read; give the trial's clouds as `cloud`")
     if found.noise is None:
         return channel
-    with located(f"noise of {found.name}"):
-        noise = channel.scale.difference().to_si(number(found.noise))
+    with prefix_errors(f"noise of {found.name}"):
+        noise = channel.scale.without_offset().to_si(parse_number(found.noise))
     return Channel(found.name, found.role, found.unit, noise)
 
 
-def _trial(folder: Path, entry: object) -> Written:
+def _parse_trial(folder: Path, entry: object) -> DeclaredTrial:
     if not isinstance(entry, dict):
-        raise DataError(f"it is {shown(entry)}; write one [[trial]] table for each")
+        raise DataError(f"it is {short_repr(entry)}; write one [[trial]] table for each")
     table = _trial_file(folder, entry)
-    cloud = inside(folder, entry["cloud"]) if "cloud" in entry else None
+    cloud = resolve_in_folder(folder, entry["cloud"]) if "cloud" in entry else None
     start = None
     if "start" in entry:
-        with located("start"):
-            start = number(entry["start"])
-            if not abs(start) <= LATEST:
-                raise DataError(f"{start:g} s is not plausible; at most {LATEST:g} s since the first trial")
-    return Written(table, cloud, start, *read_conditions(entry))
+        with prefix_errors("start"):
+            start = parse_number(entry["start"])
+            if not abs(start) <= MAX_START:
+                raise DataError(f"{start:g} s is not plausible; at most {MAX_START:g} s since the first trial")
+    return DeclaredTrial(table, cloud, start, *read_conditions(entry))
 
 
-def _label(path: Path) -> Path:
-    """What tells trials apart: two files that differ in their ending alone are one trial."""
+def _trial_label(path: Path) -> Path:
+    """Return the path without its ending: two files that differ only in the ending are one trial."""
     return path.with_suffix("")
 
 
-def _read_trial(folder: Path, written: Written, channels: Sequence[Channel]) -> tuple[Trial, Table]:
-    table = read_table(written.table, ["time", *(channel.name for channel in channels)])
+def _read_trial(folder: Path, declared: DeclaredTrial, channels: Sequence[Channel]) -> tuple[Trial, Table]:
+    table = read_table(declared.table, ["time", *(channel.name for channel in channels)])
     check_table(table, channels)
     values = {channel.name: channel.scale.to_si(table.columns[channel.name]) for channel in channels}
     for column in values.values():
-        column.setflags(write=False)  # a trial need not copy it then
-    clouds = read_clouds(written.cloud) if written.cloud else None
-    name = written.table.relative_to(folder).as_posix()
-    return Trial(name, table.columns["time"], values, written.conditions, written.other, written.start, clouds), table
+        column.setflags(write=False)  # so that the trial need not copy it
+    clouds = read_clouds(declared.cloud) if declared.cloud else None
+    name = declared.table.relative_to(folder).as_posix()
+    return Trial(name, table.columns["time"], values, declared.conditions, declared.other, declared.start, clouds), table
 
 
 def _trial_file(folder: Path, entry: Mapping[str, object]) -> Path:
-    name = check_name(entry.get("file"))
+    name = check_file_name(entry.get("file"))
     if not name.lower().endswith(_SUFFIXES):
         found = [suffix for suffix in _SUFFIXES if (folder / (name + suffix)).is_file()]
         if len(found) != 1:
-            raise DataError(f"file {shown(name)} ends neither in .csv nor in .parquet; name one that does")
+            raise DataError(f"file {short_repr(name)} ends neither in .csv nor in .parquet; name one that does")
         name += found[0]
-    return inside(folder, name)
+    return resolve_in_folder(folder, name)

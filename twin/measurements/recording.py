@@ -1,6 +1,6 @@
-"""Recording: trials of a robot, measured, simulated or predicted, in SI units and read-only.
+"""Recordings: trials of a robot, measured, simulated or predicted, in SI units and read-only.
 
-It is the only thing that travels through the program; what it is worth stands in `source`.
+All parts of the program exchange data as recordings; `source` says where one comes from.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from twin.errors import DataError, UnknownNameError
+from twin.foundation.errors import DataError, UnknownNameError
 from twin.measurements.channels import Channel, Role
-from twin.measurements.fingerprint import fingerprint
+from twin.measurements.fingerprint import recording_hash
 
 Condition = float | np.ndarray  # a scalar or (3,), SI
 
-CONTACT = "external_contact"  # a trial's condition: something, a hand mostly, pushes the robot with a force nobody knows
+EXTERNAL_CONTACT = "external_contact"  # a trial's condition: something, mostly a hand, pushes the robot with an unknown force
 
 
 def read_only(values: Any, dtype: type = float) -> np.ndarray:
-    """`values` as an array nobody can write to; copied unless it is one already."""
+    """Return `values` as a read-only array, copied unless it is one already."""
     array = np.asarray(values, dtype)
     if array.flags.writeable or array.base is not None:
         array = array.copy()
@@ -31,8 +31,8 @@ def read_only(values: Any, dtype: type = float) -> np.ndarray:
     return array
 
 
-class _Rebuilt:
-    """Pickles and copies through the constructor, so that a copy in another process is read-only too."""
+class _PickledByConstructor:
+    """Base that pickles and copies through the constructor, so that a copy in another process is read-only too."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = (getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]
@@ -40,10 +40,10 @@ class _Rebuilt:
 
 
 @dataclass(frozen=True, eq=False)
-class Clouds(_Rebuilt):
-    """Point clouds of one trial; frame f is `points[offsets[f]:offsets[f + 1]]`.
+class Clouds(_PickledByConstructor):
+    """The point clouds of one trial; frame f is `points[offsets[f]:offsets[f + 1]]`.
 
-    Raises DataError for shapes or offsets that do not fit together, non-finite points, or time that does not increase.
+    Raises DataError for shapes or offsets that do not match, non-finite points, or time that does not increase.
     """
 
     points: np.ndarray  # (M, 3) m, base frame
@@ -67,8 +67,8 @@ class Clouds(_Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Trial(_Rebuilt):
-    """One run from rest: samples of every channel over time, and under which conditions.
+class Trial(_PickledByConstructor):
+    """One run from rest: samples of every channel over time, and the conditions.
 
     Raises DataError unless time increases and every channel has one value a sample.
     """
@@ -76,10 +76,8 @@ class Trial(_Rebuilt):
     name: str  # its file, relative to the set's folder, with forward slashes
     time: np.ndarray  # (n,) s, strictly increasing
     values: Mapping[str, np.ndarray]  # channel -> (n,) SI; NaN is a missing value
-    conditions: Mapping[str, Condition] = field(
-        default_factory=dict
-    )  # tip_payload kg, ambient_temperature K, gravity (3,), tip_force (3,)
-    other: Mapping[str, object] = field(default_factory=dict)  # conditions the twin does not understand, as written
+    conditions: Mapping[str, Condition] = field(default_factory=dict)  # SI: tip_payload, ambient_temperature, gravity, tip_force
+    other: Mapping[str, object] = field(default_factory=dict)  # unknown conditions, as written
     start: float | None = None  # s since the first trial
     clouds: Clouds | None = None
 
@@ -105,20 +103,20 @@ class Trial(_Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(_Rebuilt):
+class Recording(_PickledByConstructor):
     """Trials of one robot with the same channels.
 
-    Raises DataError for a channel declared twice and for a trial whose values are not exactly the channels.
+    Raises DataError for a channel declared twice and for a trial whose values are not those of the channels.
     """
 
     robot: str
     title: str
     source: str  # "hardware", "simulation", free text after a colon
-    gravity: np.ndarray | None  # (3,) m/s^2 in the base frame; None means the robot's own
+    gravity: np.ndarray | None  # (3,) m/s^2 in the base frame; None: the robot's own
     channels: tuple[Channel, ...]
     trials: tuple[Trial, ...]
-    folder: Path | None = None  # where it was read
-    notices: tuple[str, ...] = ()  # what a reader should know, in plain language
+    folder: Path | None = None  # from which it was read
+    notices: tuple[str, ...] = ()  # remarks for the user
 
     def __post_init__(self) -> None:
         names = [channel.name for channel in self.channels]
@@ -134,15 +132,15 @@ class Recording(_Rebuilt):
                 raise DataError(f"gravity {self.gravity.tolist()} is no three-vector of finite numbers, in m/s^2")
 
     def inputs(self) -> tuple[Channel, ...]:
-        """Channels that drive the twin."""
+        """Return the channels that drive the twin."""
         return self._with_role("input")
 
     def outputs(self) -> tuple[Channel, ...]:
-        """Channels that are compared with the twin."""
+        """Return the channels that are compared with the twin."""
         return self._with_role("output")
 
     def contexts(self) -> tuple[Channel, ...]:
-        """Known surroundings."""
+        """Return the channels of known surroundings."""
         return self._with_role("context")
 
     def _with_role(self, role: Role) -> tuple[Channel, ...]:
@@ -150,13 +148,13 @@ class Recording(_Rebuilt):
 
     @property
     def n_samples(self) -> int:
-        """Samples of all trials together."""
+        """The number of samples of all trials together."""
         return sum(len(trial.time) for trial in self.trials)
 
     def select(self, trials: Iterable[int | str]) -> Recording:
-        """The same recording with these trials only, by index, file name or label, in the order given.
+        """Return the recording with these trials only, by index, file name or label, in the given order.
 
-        Raises UnknownNameError for a trial that is not there.
+        Raises UnknownNameError for a trial that does not exist.
         """
         by_name = {key: trial for trial in self.trials for key in (trial.label, trial.name)}
         chosen = []
@@ -171,9 +169,9 @@ class Recording(_Rebuilt):
         return replace(self, trials=tuple(chosen))
 
     def with_values(self, values: Sequence[Mapping[str, np.ndarray]], source: str) -> Recording:
-        """A recording of the same trials with other values: one mapping channel -> (n,) SI a trial; channels not named stay.
+        """Return the recording with other values: one mapping channel -> (n,) SI for each trial; other channels keep theirs.
 
-        Raises UnknownNameError for a name that is no channel, DataError unless there is one mapping a trial.
+        Raises UnknownNameError for a name that is no channel, DataError unless there is one mapping for each trial.
         """
         if len(values) != len(self.trials):
             raise DataError(f"values for {len(values)} trials, but the recording has {len(self.trials)}")
@@ -184,5 +182,5 @@ class Recording(_Rebuilt):
         return replace(self, source=source, trials=tuple(changed))
 
     def data_hash(self) -> str:
-        """SHA-256 of channels, gravity and trials; title, folder, source and notices do not count."""
-        return fingerprint(self)
+        """Return the SHA-256 of channels, gravity and trials; title, folder, source and notices do not count."""
+        return recording_hash(self)

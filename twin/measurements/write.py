@@ -1,4 +1,4 @@
-"""Writing a measurement set: whole or not at all, in the units its channels declare."""
+"""Writing of a measurement set, whole or not at all, in the units its channels declare."""
 
 from __future__ import annotations
 
@@ -12,28 +12,27 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from twin.errors import DataError, shown
-from twin.measurements.conditions import SCALARS
-from twin.measurements.files import check_name
-from twin.measurements.read import FILE, FORMAT
+from twin.foundation.errors import DataError, short_repr
+from twin.foundation.files import check_file_name
+from twin.measurements.conditions import SCALAR_CONDITIONS
+from twin.measurements.parsing.toml_text import toml_lines
+from twin.measurements.read import SET_FILE, SET_FORMAT
 from twin.measurements.recording import Recording, Trial
-from twin.measurements.toml_text import toml_lines
 
 FileFormat = Literal["csv", "parquet"]
 
 
 def write(recording: Recording, folder: str | Path, *, file_format: FileFormat = "csv") -> None:
-    """Writes measurements.toml, one table a trial and its clouds; `read` gives the same values back.
+    """Write measurements.toml, and a table and the clouds of each trial; `read` returns the same values.
 
-    The files appear together: they are written beside `folder` and moved there at the end.
+    The files are written next to `folder` and renamed at the end, so that they appear together.
 
-    Raises DataError for a folder that holds something already, for trial names that clash or lead out of it, and if the disk
-    does not take it.
+    Raises DataError for a folder that is not empty, for trial names that clash or lead out of it, and if the disk refuses it.
     """
     folder = Path(folder)
     if file_format not in ("csv", "parquet"):
         raise DataError(f"file format {file_format!r}; allowed: csv, parquet")
-    labels = [check_name(trial.label) for trial in recording.trials]
+    labels = [check_file_name(trial.label) for trial in recording.trials]
     if len(set(labels)) < len(labels):
         raise DataError(f"{folder}: two trials have the same name; give each its own")
     draft = folder.absolute().parent / f".{folder.absolute().name}.{os.getpid()}.writing"
@@ -42,7 +41,7 @@ def write(recording: Recording, folder: str | Path, *, file_format: FileFormat =
             raise DataError(f"{folder}: holds something already and is not overwritten; name a new folder or empty this one")
         draft.mkdir(parents=True)
         try:
-            (draft / FILE).write_text(_toml(recording, file_format), encoding="utf-8")
+            (draft / SET_FILE).write_text(_toml(recording, file_format), encoding="utf-8")
             for trial in recording.trials:
                 _write_trial(recording, trial, draft, file_format)
             if folder.exists():
@@ -52,16 +51,16 @@ def write(recording: Recording, folder: str | Path, *, file_format: FileFormat =
             shutil.rmtree(draft, ignore_errors=True)
             raise
     except (OSError, UnicodeError, pa.ArrowException) as fault:
-        raise DataError(f"{folder}: cannot be written ({shown(str(fault))}); choose another place") from None
+        raise DataError(f"{folder}: cannot be written ({short_repr(str(fault))}); choose another place") from None
 
 
 def _toml(recording: Recording, file_format: FileFormat) -> str:
     gravity = None if recording.gravity is None else recording.gravity.tolist()
     lines = toml_lines(
-        {"format": FORMAT, "robot": recording.robot, "title": recording.title, "source": recording.source, "gravity": gravity}
+        {"format": SET_FORMAT, "robot": recording.robot, "title": recording.title, "source": recording.source, "gravity": gravity}
     )
     for channel in recording.channels:
-        noise = None if channel.noise is None else float(channel.scale.difference().from_si(np.array([channel.noise]))[0])
+        noise = None if channel.noise is None else float(channel.scale.without_offset().from_si(np.array([channel.noise]))[0])
         declared = {"name": channel.name, "role": channel.role, "unit": channel.unit, "noise": noise}
         lines += ["", "[[channel]]", *toml_lines(declared)]
     for trial in recording.trials:
@@ -73,7 +72,7 @@ def _toml(recording: Recording, file_format: FileFormat) -> str:
 
 
 def _condition(name: str, value: float | np.ndarray) -> object:
-    return f"{float(value)!r} {SCALARS[name]}" if name in SCALARS else np.asarray(value).tolist()
+    return f"{float(value)!r} {SCALAR_CONDITIONS[name]}" if name in SCALAR_CONDITIONS else np.asarray(value).tolist()
 
 
 def _write_trial(recording: Recording, trial: Trial, folder: Path, file_format: FileFormat) -> None:

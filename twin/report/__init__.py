@@ -1,21 +1,21 @@
-"""What a diagnosis found, for people and for programs.
+"""Reports of a diagnosis, for people and for programs.
 
-write.py        report.json, report.html and twin.toml, whole or not at all
-contents.py     report.json: the contract other programs read
+write.py        writes report.json, report.html and twin.toml, all or none
+contents.py     report.json, a contract with other programs
 sentence.py     the verdict in one plain sentence
-page.py         report.html: one self-contained file made of sections/*.py and templates/*.html
-giveaway.py     what to plot a residual against, so that an effect shows itself; variables.py: all there is to choose from
-stages.py       the predictions that are compared: as described, calibrated, with the effects
-console.py      the same in a terminal
+page.py         report.html, one self-contained file made of sections/ and templates/
+console.py      the report in a terminal
+robot_page.py   a picture of a robot
+hand_check.py   sensors compared with measured shapes under a hand
 provenance.py   versions, seed, data hash, command, date
-numbers.py      values with units and errors, as people read them
-plots.py        the house style of the figures
+numbers.py      values with units and errors
+plots/          the figures and the predictions they compare
 """
 
-from twin.report.console import beforehand, console
+from twin.report.console import render_diagnosis, render_preview
 from twin.report.contents import contents
-from twin.report.provenance import provenance, stamp
+from twin.report.provenance import provenance, run_provenance
 from twin.report.sentence import sentence
 from twin.report.write import write
 
-__all__ = ["beforehand", "console", "contents", "provenance", "sentence", "stamp", "write"]
+__all__ = ["contents", "provenance", "render_diagnosis", "render_preview", "run_provenance", "sentence", "write"]

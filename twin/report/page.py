@@ -1,4 +1,7 @@
-"""report.html: one self-contained file. It loads nothing: scripts, styles and figures are inside, and a policy forbids the rest."""
+"""report.html, one self-contained file.
+
+Scripts, styles and figures are inside; a content security policy forbids to load anything else.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from twin.diagnose import Diagnosis
+from twin.diagnosis import Diagnosis
+from twin.foundation.display_names import display_name
 from twin.report.sections import SECTIONS, Story
 from twin.report.sentence import sentence
 
@@ -20,16 +24,16 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 @cache
 def environment() -> Environment:
-    """Templates with every value escaped; a name a template lacks is an error."""
+    """Return the template environment: every value is escaped, a missing name is an error."""
     return Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
 
 
 def page(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> str:
-    """The whole report as HTML."""
+    """Return the whole report as HTML."""
     story = Story(diagnosis, provenance)
-    recording = diagnosis.bench.recording
+    recording = diagnosis.prepared.recording
     common = {"source": recording.source, "title": recording.title}
     sections = []
     for make in SECTIONS:
@@ -42,10 +46,10 @@ def page(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> str:
         .get_template("page.html")
         .render(
             **common,
-            robot=diagnosis.bench.robot,
+            robot=diagnosis.prepared.robot,
             suspicions=diagnosis.suspicions,
             sentence=sentence(diagnosis),
-            verdict=diagnosis.verdict,
+            verdict=display_name(diagnosis.verdict),
             date=provenance.get("date", ""),
             sections=sections,
             plotly=Markup(get_plotlyjs()),

@@ -1,4 +1,4 @@
-"""Where a report comes from: versions, settings, data hash, command, date."""
+"""The origin of a result: versions, settings, data hash, command, date."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from twin.diagnose import Settings
+from twin.diagnosis import Settings
 from twin.measurements import Recording
 
 PACKAGES = ("mujoco", "numpy", "scipy", "numba")
 
 
 def provenance(recording: Recording, settings: Settings, command: str) -> dict[str, Any]:
-    """Everything needed to repeat a diagnosis, as TOML and JSON can hold it."""
-    asked = {name: value for name, value in asdict(settings).items() if value is not None}
-    return {**stamp(command, settings.seed, recording.data_hash()), "settings": asked}
+    """Return everything needed to repeat a diagnosis, in types of TOML and JSON."""
+    given = {name: value for name, value in asdict(settings).items() if value is not None}
+    return {**run_provenance(command, settings.seed, recording.data_hash()), "settings": given}
 
 
-def stamp(command: str, seed: int, data_hash: str, packages: tuple[str, ...] = ()) -> dict[str, Any]:
-    """What any result comes from, with the versions of `packages` besides; the date is UTC, ISO 8601."""
+def run_provenance(command: str, seed: int, data_hash: str, packages: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the origin of any result, with the versions of `packages` as well; the date is UTC, ISO 8601."""
     versions = {p: _version(p) for p in (*PACKAGES, *packages)}
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -1,10 +1,14 @@
-"""Robots and the families they are of: `robot.toml` gives the numbers, the family's module builds a body and names its solvers.
+"""Robots and their families: a `robot.toml` gives the numbers, the family's module builds a body and its solvers.
 
-A robot is a folder under `models/` (or any folder with a `robot.toml`); a family is a module here (family.py says what it holds)
-with a SCHEMA of every number it reads: unit, range, default and meaning (schema.py).
+robot.py          Robot: a folder under `models/`, or any folder with a `robot.toml`
+schema.py         rows of a `robot.toml`: unit, range, default and meaning
+family.py         what a family's module provides; the modules are in families/
+effect_tables.py  [[effect]] tables of robots and twins
+numbers.py        a robot's numbers in the units of its file
+starter.py        a folder to start one's own robot (`twin new`)
 """
 
-from twin.robots.family import Family, families, family
-from twin.robots.robot import Robot, available, load
+from twin.robots.family import Family, family_names, load_family
+from twin.robots.robot import Robot, load, robot_names
 
-__all__ = ["Family", "Robot", "available", "families", "family", "load"]
+__all__ = ["Family", "Robot", "family_names", "load", "load_family", "robot_names"]

@@ -1,4 +1,4 @@
-"""What a family of bodies is: a module here that builds them from a `robot.toml` and says how they are solved."""
+"""Families of bodies: modules that build bodies from a `robot.toml` and provide their solvers."""
 
 from __future__ import annotations
 
@@ -9,45 +9,49 @@ from functools import cache
 from typing import Any, Protocol, cast
 
 from twin.body import Body, Solver
-from twin.errors import UnknownNameError
-from twin.figure import Figure
-from twin.hinges import HingeChain
+from twin.body.drawable import Drawable
+from twin.body.hinge_chain import HingeChain
+from twin.foundation.errors import UnknownNameError
+from twin.mechanics.silicone import HandBody, SoftBody
 from twin.robots.schema import Schema
-from twin.soft import HandBody, SoftBody
 
 
 class Family(Protocol):
-    """A module of `twin.robots` with these names is a family, found by the name that `robot.toml` gives.
+    """The interface of a module of `twin.robots.families`, which is found by the name in `robot.toml`.
 
-    SCHEMA: all it reads of a file. What not every body can is None where it cannot: `dynamics` solves it in motion, `figure` draws
-    it; `chain`, `silicone` and `hand` give it as that mechanics knows it (a chain of hinges, one piece of silicone, silicone
-    fingers on a palm), to those who need more of a body than its solver: `Robot` asks for them.
+    SCHEMA declares what it reads of a file. The others are None for a family without them: `dynamics` simulates motion, `figure`
+    draws the body, and `chain`, `silicone` and `hand` return the body as a chain of hinges, as one piece of silicone, and as
+    silicone fingers on a palm (`Robot.chain`, ...).
     """
 
     SCHEMA: Schema
     dynamics: Callable[[Any], Solver] | None
-    figure: Callable[[Any], Figure] | None
+    figure: Callable[[Any], Drawable] | None
     chain: Callable[[Any], HingeChain] | None
     silicone: Callable[[Any], SoftBody] | None
     hand: Callable[[Any], HandBody] | None
 
     def build(self, structure: Mapping[str, object], values: Mapping[str, float]) -> Body:
-        """The robot of these counts and values (SI, by parameter name). Raises DataError for what cannot be built."""
+        """Build the body from counts and values (SI, by parameter name). Raises DataError if that is impossible."""
         ...
 
-    def statics(self, body: Any) -> Solver: ...
+    def statics(self, body: Any) -> Solver:
+        """Return the body's static solver."""
+        ...
 
 
 @cache
-def families() -> tuple[str, ...]:
-    """Names of the families there are."""
-    package = importlib.import_module("twin.robots")
+def family_names() -> tuple[str, ...]:
+    """Return the names of all families."""
+    package = importlib.import_module("twin.robots.families")
     names = [m.name for m in pkgutil.iter_modules(package.__path__)]
-    return tuple(n for n in names if {"SCHEMA", "build", "statics"} <= set(vars(importlib.import_module(f"twin.robots.{n}"))))
+    return tuple(
+        n for n in names if {"SCHEMA", "build", "statics"} <= set(vars(importlib.import_module(f"twin.robots.families.{n}")))
+    )
 
 
-def family(name: str) -> Family:
-    """The family called `name`. Raises UnknownNameError, listing those that exist."""
-    if name not in families():
-        raise UnknownNameError("family", name, families())
-    return cast(Family, importlib.import_module(f"twin.robots.{name}"))
+def load_family(name: str) -> Family:
+    """Return the family called `name`. Raises UnknownNameError, listing those that exist."""
+    if name not in family_names():
+        raise UnknownNameError("family", name, family_names())
+    return cast(Family, importlib.import_module(f"twin.robots.families.{name}"))

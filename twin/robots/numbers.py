@@ -1,4 +1,4 @@
-"""A robot's numbers as its file has them: in the units written there, lists together."""
+"""A robot's numbers as in its file: in the file's units, with lists together."""
 
 from __future__ import annotations
 
@@ -6,61 +6,63 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.quantities import Parameter
-from twin.robots.family import family
+from twin.foundation.parameters import Parameter
+from twin.foundation.units import unit_scale
+from twin.robots.family import load_family
 from twin.robots.robot import Robot
 from twin.robots.schema import Row
-from twin.units import unit_scale
 
 
-def as_written(parameter: Parameter, si: float) -> float:
-    """An SI value of `parameter` in the unit its robot's file gives it in; SI where none does."""
-    return float(unit_scale(parameter.written or parameter.unit, parameter.unit).from_si(np.array([si]))[0])
+def in_file_unit(parameter: Parameter, si: float) -> float:
+    """Convert an SI value of `parameter` to the unit of its robot's file, or keep SI if it has none."""
+    return float(unit_scale(parameter.file_unit or parameter.unit, parameter.unit).from_si(np.array([si]))[0])
 
 
-def spread_as_written(parameter: Parameter, si: float) -> float:
-    """An SI difference, such as a standard error, in that unit."""
-    return float(unit_scale(parameter.written or parameter.unit, parameter.unit).difference().from_si(np.array([si]))[0])
+def std_in_file_unit(parameter: Parameter, si: float) -> float:
+    """Convert an SI difference, such as a standard error, to the unit of the robot's file."""
+    return float(unit_scale(parameter.file_unit or parameter.unit, parameter.unit).without_offset().from_si(np.array([si]))[0])
 
 
 @dataclass(frozen=True)
-class Line:
-    """One entry of a `robot.toml`: its row, the parameters it became, and its numbers in the unit written there."""
+class FileEntry:
+    """One entry of a `robot.toml`: its row, its parameters, and its numbers in the file's unit."""
 
     row: Row
     parameters: tuple[Parameter, ...]
 
     @property
     def unit(self) -> str:
-        return self.parameters[0].written
+        """The file's unit."""
+        return self.parameters[0].file_unit
 
     @property
     def values(self) -> list[float]:
-        return [as_written(p, p.value) for p in self.parameters]
+        """The values in the file's unit."""
+        return [in_file_unit(p, p.value) for p in self.parameters]
 
     @property
-    def spread(self) -> float | None:
-        """One standard deviation of what is believed; None for a number taken as exact."""
+    def std(self) -> float | None:
+        """The prior standard deviation; None for an exact number."""
         p = self.parameters[0]
-        return None if p.std is None else spread_as_written(p, p.std)
+        return None if p.std is None else std_in_file_unit(p, p.std)
 
-    def words(self) -> str:
-        """Its numbers in one line; equal ones once."""
-        shown = [f"{v:.6g}" for v in self.values]
-        if len(shown) > 1 and len(set(shown)) == 1:
-            return f"{shown[0]} ({len(shown)} times)"
-        return ", ".join(shown)
+    def numbers_text(self) -> str:
+        """Return the numbers in one line; equal ones once."""
+        texts = [f"{v:.6g}" for v in self.values]
+        if len(texts) > 1 and len(set(texts)) == 1:
+            return f"{texts[0]} ({len(texts)} times)"
+        return ", ".join(texts)
 
 
-def lines(robot: Robot) -> list[Line]:
-    """All entries of a robot's file, in the schema's order."""
-    schema = family(robot.family).SCHEMA
-    taken = schema.taken(schema.structure.model_validate(dict(robot.structure)))
-    found = {p.name: p for p in robot.parameters}
-    out = []
-    for name, row in taken.items():
-        alone = (found[name],) if name in found else ()
-        many = tuple(p for n, p in found.items() if row.shape and n.startswith(f"{name}_") and n not in taken)
-        if alone or many:
-            out.append(Line(row, alone or many))
-    return out
+def file_entries(robot: Robot) -> list[FileEntry]:
+    """Return all entries of a robot's file, in the schema's order."""
+    schema = load_family(robot.family).SCHEMA
+    rows = schema.applicable_rows(schema.structure.model_validate(dict(robot.structure)))
+    parameters = {p.name: p for p in robot.parameters}
+    entries = []
+    for name, row in rows.items():
+        single = (parameters[name],) if name in parameters else ()
+        several = tuple(p for n, p in parameters.items() if row.shape and n.startswith(f"{name}_") and n not in rows)
+        if single or several:
+            entries.append(FileEntry(row, single or several))
+    return entries

@@ -1,4 +1,4 @@
-"""`Robot` is data: the numbers of a `robot.toml`, each with unit and source, and the name of the family that builds it."""
+"""Robots as data: the numbers of a `robot.toml`, each with unit and source, and the name of the family that builds it."""
 
 from __future__ import annotations
 
@@ -12,31 +12,40 @@ import numpy as np
 from pydantic import Field
 
 from twin.body import Body, Solver
-from twin.errors import DataError, TwinError, UnknownNameError, listed, shown
-from twin.forms import Form, Line, fill
-from twin.hinges import HingeChain
-from twin.measurements.files import is_file, read_text
-from twin.quantities import Parameter, Size, Values, overrides
+from twin.body.hinge_chain import HingeChain
+from twin.body.spring import Spring, build_springs
+from twin.foundation.errors import DataError, TwinError, UnknownNameError, join_problems, short_repr
+from twin.foundation.file_schema import TableSchema, TextLine, validate_table
+from twin.foundation.files import is_file, read_utf8
+from twin.foundation.parameters import Parameter, Size, Values, fill_defaults
+from twin.foundation.toml_file import MAX_TOML_BYTES, parse_toml_of_format
+from twin.mechanics.silicone import HandBody, SoftBody
 from twin.robots.effect_tables import read_effects, read_uncertain
-from twin.robots.family import family
-from twin.robots.schema import GRAVITY, Fact, Quantity, Row, Schema, Structure, absent, parameters, unknown
-from twin.robots.toml_file import LARGEST, checked
-from twin.soft import HandBody, SoftBody
-from twin.springs import Spring, springs_of
+from twin.robots.family import load_family
+from twin.robots.schema import (
+    GRAVITY_ROW,
+    ExactEntry,
+    Row,
+    Schema,
+    Structure,
+    UncertainEntry,
+    default_parameter,
+    row_parameters,
+    why_unknown,
+)
 
-FORMAT = "twin-robot/1"
-FILE = "robot.toml"
+ROBOT_FORMAT = "twin-robot/1"
+ROBOT_FILE = "robot.toml"
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A described robot; nothing in it is hidden in code. One read anew is another one.
+    """A described robot. Two robots are equal only if they are the same object.
 
-    `parameters` hold SI values; those with a `std` are uncertain in a built robot (the nuisance parameters). `effects` are
-    the laws the robot is known to have: (identifier, parameter values); `uncertain` those of their parameters that have a `std`,
-    which are fitted with the robot's own. `accuracy` is the description's own error,
-    m of its markers or rad of its jaw.
+    `parameters` are in SI; those with a `std` are uncertain in a built robot (the nuisance parameters). `effects` are the effects
+    the robot is known to have, as (identifier, values); `uncertain` are their parameters with a `std`, which are fitted together
+    with the robot's own. `accuracy` is the description's own error, in m of its markers or rad of its jaw.
     """
 
     name: str
@@ -52,100 +61,100 @@ class Robot:
 
     @property
     def n_tendon(self) -> int:
+        """The number of tendons."""
         return int(self.structure["tendons"])  # type: ignore[call-overload]
 
     @property
     def nuisance(self) -> tuple[Parameter, ...]:
-        """What a built robot may differ in from its description."""
+        """The parameters in which a built robot may differ from its description."""
         return tuple(p for p in self.parameters if p.std is not None)
 
     @cached_property
     def size(self) -> Size:
-        """How large it is, as described, beside the robots for which effects' numbers are written."""
+        """Its size, as described, relative to the reference robot, for which effects' numbers are written."""
         return self.build().size
 
     def build(self, values: Values | None = None) -> Body:
-        """The MuJoCo body at the given parameter values, nominal where none is given. Raises TwinError for a bad name."""
-        return family(self.family).build(self.structure, overrides(self.parameters, values or {}))
+        """Build the MuJoCo body at these parameter values, others nominal. Raises TwinError for an unknown name."""
+        return load_family(self.family).build(self.structure, fill_defaults(self.parameters, values or {}))
 
     def solver(self, body: Body, *, dynamic: bool = False) -> Solver:
-        """What solves a body of this robot's family, by statics or by MuJoCo steps. Raises DataError where it has no dynamics."""
-        made_by = family(self.family)
+        """Return the solver of a body of this robot: statics, or MuJoCo steps. Raises DataError if it has no dynamics."""
+        family = load_family(self.family)
         if not dynamic:
-            return made_by.statics(body)
-        if made_by.dynamics is None:
+            return family.statics(body)
+        if family.dynamics is None:
             raise DataError(f"robot {self.name!r} is predicted by statics only: a {self.family} has no dynamics here")
-        return made_by.dynamics(body)
+        return family.dynamics(body)
 
     def chain(self, body: Body) -> HingeChain:
-        """A body of this robot's family as the chain of hinges that it is. Raises DataError where it is none."""
-        return self._able(family(self.family).chain, "has no backbone: give a twin of one pulled by tendons")(body)
+        """Return a body of this robot as a chain of hinges. Raises DataError if it is none."""
+        return self._view(load_family(self.family).chain, "has no backbone: give a twin of one pulled by tendons")(body)
 
     def silicone(self, body: Body) -> SoftBody:
-        """A body of this robot's family as the one piece of silicone that it is. Raises DataError where it is none."""
-        return self._able(family(self.family).silicone, "is no soft body: give a twin of a single silicone finger")(body)
+        """Return a body of this robot as one piece of silicone. Raises DataError if it is none."""
+        return self._view(load_family(self.family).silicone, "is no soft body: give a twin of a single silicone finger")(body)
 
     def hand(self, body: Body) -> HandBody:
-        """A body of this robot's family as the fingers on a palm that it is. Raises DataError where it is none."""
-        return self._able(family(self.family).hand, "is no hand: give a twin of silicone fingers on a palm")(body)
+        """Return a body of this robot as fingers on a palm. Raises DataError if it is none."""
+        return self._view(load_family(self.family).hand, "is no hand: give a twin of silicone fingers on a palm")(body)
 
-    def _able(self, view: Callable[[Any], T] | None, lacking: str) -> Callable[[Any], T]:
+    def _view(self, view: Callable[[Any], T] | None, reason: str) -> Callable[[Any], T]:
         if view is None:
-            raise DataError(f"robot {self.name!r} {lacking}")
+            raise DataError(f"robot {self.name!r} {reason}")
         return view
 
-    def objections(self, values: Values) -> list[str]:
-        """What is wrong between this robot's numbers, at the given values, that are each in order."""
-        schema = family(self.family).SCHEMA
-        return schema.objections(schema.structure.model_validate(dict(self.structure)), overrides(self.parameters, values))
+    def find_conflicts(self, values: Values) -> list[str]:
+        """Return the contradictions between this robot's numbers at these values, each valid on its own."""
+        schema = load_family(self.family).SCHEMA
+        return schema.find_conflicts(schema.structure.model_validate(dict(self.structure)), fill_defaults(self.parameters, values))
 
     def springs(self, n: int, values: Values | None = None) -> Spring:
-        """The SMA springs of n tendons at the given parameter values. Raises DataError where the robot describes none."""
-        return springs_of(overrides(self.parameters, values or {}), n)
+        """Return the SMA springs of n tendons at these parameter values. Raises DataError if the robot describes none."""
+        return build_springs(fill_defaults(self.parameters, values or {}), n)
 
 
 def models_folder() -> Path:
-    """Where the robots lie: inside the wheel, or beside the package in a checkout."""
+    """Return the folder of the shipped robots: inside the wheel, or next to the package in a checkout."""
     package = Path(__file__).resolve().parent.parent
-    inside = package / "models"
-    return inside if inside.is_dir() else package.parent / "models"
+    in_wheel = package / "models"
+    return in_wheel if in_wheel.is_dir() else package.parent / "models"
 
 
-def available() -> list[str]:
-    """Names of the robots that ship with the twin."""
+def robot_names() -> list[str]:
+    """Return the names of the robots that ship with the twin."""
     return sorted(p.parent.name for p in models_folder().glob("*/robot.toml"))
 
 
 def load(name: str, relative_to: Path | None = None) -> Robot:
-    """The robot called `name`: a folder under `models/`, or a path to a folder, relative to `relative_to`.
+    """Load the robot called `name`: a folder under `models/`, or a path to a folder, relative to `relative_to`.
 
-    Raises UnknownNameError where there is no such robot, DataError where its `robot.toml` is broken.
+    Raises UnknownNameError if there is no such robot, DataError if its `robot.toml` is broken.
     """
     folder = models_folder() / name
-    if name not in available():
+    if name not in robot_names():
         folder = (relative_to or Path.cwd()) / name
-        if not is_file(folder / FILE):
-            besides = (
-                f", or a path from {shown(str(relative_to or Path.cwd()), 300)} to a folder with a {FILE} (`twin new` makes one)"
-            )
-            raise UnknownNameError("robot", name, available(), besides)
-    return _read(folder.resolve(), read_text(folder / FILE, LARGEST))
+        if not is_file(folder / ROBOT_FILE):
+            base = short_repr(str(relative_to or Path.cwd()), 300)
+            alternative = f", or a path from {base} to a folder with a {ROBOT_FILE} (`twin new` makes one)"
+            raise UnknownNameError("robot", name, robot_names(), alternative)
+    return _read_cached(folder.resolve(), read_utf8(folder / ROBOT_FILE, MAX_TOML_BYTES))
 
 
 @lru_cache(maxsize=16)
-def _read(folder: Path, data: bytes) -> Robot:
+def _read_cached(folder: Path, data: bytes) -> Robot:
     try:
-        return _robot(folder, checked(data, FORMAT))
+        return _build_robot(folder, parse_toml_of_format(data, ROBOT_FORMAT))
     except TwinError as error:
-        raise DataError(f"{folder / FILE}: {error}") from None
+        raise DataError(f"{folder / ROBOT_FILE}: {error}") from None
 
 
-class RobotFile(Form):
+class RobotFile(TableSchema):
     """The top of a `robot.toml`."""
 
-    format: str = Field(description=f'"{FORMAT}"')
-    family: Line = Field(description="what kind of body it is")
-    title: Line = Field(description="one line for people")
+    format: str = Field(description=f'"{ROBOT_FORMAT}"')
+    family: TextLine = Field(description="what kind of body it is")
+    title: TextLine = Field(description="one line for people")
     structure: dict[str, Any] = Field(description="whole numbers and choices")
     parameters: dict[str, Any] = Field(description="every number with unit and source")
     gravity: dict[str, Any] = Field(
@@ -155,72 +164,74 @@ class RobotFile(Form):
     effect: list[Any] = Field([], description="laws the robot is known to have, as in twin.toml; a std makes a parameter uncertain")
 
 
-def _robot(folder: Path, table: Mapping[str, Any]) -> Robot:
-    """The robot of a file's content. Raises DataError with all that is wrong with it."""
+def _build_robot(folder: Path, table: Mapping[str, Any]) -> Robot:
+    """Build the robot from a file's content. Raises DataError with all its problems."""
     problems: list[str] = []
-    file = fill(RobotFile, table, "", problems)
+    file = validate_table(RobotFile, table, "", problems)
     if file is None:
-        raise DataError(listed(problems))
-    schema = family(file.family).SCHEMA
-    structure = fill(schema.structure, file.structure, "structure", problems)
-    problems += structure.objections() if structure else []
+        raise DataError(join_problems(problems))
+    family = load_family(file.family)
+    schema = family.SCHEMA
+    structure = validate_table(schema.structure, file.structure, "structure", problems)
+    problems += structure.find_conflicts() if structure else []
     if structure is None or problems:
-        raise DataError(listed(problems))
-    found = _parameters(schema, structure, file.parameters, problems)
-    gravity = _read_fact(GRAVITY, file.gravity, {"axis": 3}, problems)
+        raise DataError(join_problems(problems))
+    parameters = _read_parameters(schema, structure, file.parameters, problems)
+    gravity = _read_fact(GRAVITY_ROW, file.gravity, {"axis": 3}, problems)
     accuracy = _read_fact(schema.accuracy, file.accuracy, {}, problems)
-    nominal = {p.name: p.value for p in found}
+    nominal = {p.name: p.value for p in parameters}
     if not problems:
-        problems += schema.objections(structure, nominal)
+        problems += schema.find_conflicts(structure, nominal)
     counts = structure.model_dump(exclude_none=True)
-    size = family(file.family).build(counts, nominal).size if file.effect and not problems else Size()
+    size = family.build(counts, nominal).size if file.effect and not problems else Size()
     effects = read_effects(file.effect, structure.counts()["tendon"], size, problems)
     if problems:
-        raise DataError(listed(problems))
-    pull = np.array([p.value for p in gravity])
-    pull.setflags(write=False)
+        raise DataError(join_problems(problems))
+    gravity_vector = np.array([p.value for p in gravity])
+    gravity_vector.setflags(write=False)
+    checked_only = {row.name for row in schema.rows if row.checked_only}
     return Robot(
         name=folder.name,
         family=file.family,
         title=file.title,
         folder=folder,
         structure=counts,
-        parameters=tuple(p for p in found if p.name not in {row.name for row in schema.rows if row.stated}),
-        gravity=pull,
+        parameters=tuple(p for p in parameters if p.name not in checked_only),
+        gravity=gravity_vector,
         accuracy=accuracy[0].value,
         effects=tuple((e.id, e.values) for e in effects),
         uncertain=read_uncertain(file.effect, effects, size),
     )
 
 
-def _parameters(schema: Schema, structure: Structure, table: Mapping[str, Any], problems: list[str]) -> list[Parameter]:
-    """All parameters of a robot, those its file leaves out at their defaults; all that is wrong is added to `problems`."""
-    taken = schema.taken(structure)
-    problems += [f"parameters: {unknown(name, schema, taken)}" for name in table if name not in taken]
-    written = {taken[name].group for name in table if name in taken}
-    found: list[Parameter] = []
+def _read_parameters(schema: Schema, structure: Structure, table: Mapping[str, Any], problems: list[str]) -> list[Parameter]:
+    """Read a robot's parameters, those not in its file at their defaults; problems are added to `problems`."""
+    rows = schema.applicable_rows(structure)
+    problems += [f"parameters: {why_unknown(name, schema, rows)}" for name in table if name not in rows]
+    groups = {rows[name].group for name in table if name in rows}
+    parameters: list[Parameter] = []
     missing = []
-    for name, row in taken.items():
+    for name, row in rows.items():
         if name in table:
-            entry = fill(Quantity, table[name], f"parameter {name!r}", problems)
-            found += _read_row(row, entry, structure.counts(), problems) if entry else []
+            entry = validate_table(UncertainEntry, table[name], f"parameter {name!r}", problems)
+            parameters += _read_row(row, entry, structure.counts(), problems) if entry else []
         elif row.default is not None:
-            found.append(absent(row))
-        elif not row.stated and (not row.group or row.group in written):
+            parameters.append(default_parameter(row))
+        elif not row.checked_only and (not row.group or row.group in groups):
             missing.append(name)
     if missing:
         problems.append(f"parameters that are missing: {', '.join(missing)}")
-    return found
+    return parameters
 
 
 def _read_fact(row: Row, table: object, counts: Mapping[str, int], problems: list[str]) -> list[Parameter]:
-    fact = fill(Fact, table, row.name, problems)
-    return _read_row(row, Quantity(**dict(fact)), counts, problems) if fact else []
+    fact = validate_table(ExactEntry, table, row.name, problems)
+    return _read_row(row, UncertainEntry(**dict(fact)), counts, problems) if fact else []
 
 
-def _read_row(row: Row, entry: Quantity, counts: Mapping[str, int], problems: list[str]) -> list[Parameter]:
+def _read_row(row: Row, entry: UncertainEntry, counts: Mapping[str, int], problems: list[str]) -> list[Parameter]:
     try:
-        return parameters(row, entry, counts)
+        return row_parameters(row, entry, counts)
     except DataError as error:
         problems.append(f"parameter {row.name!r}: {error}")
         return []

@@ -1,6 +1,6 @@
-"""A folder to begin one's own robot with: a `robot.toml` that loads, a README, and a measurement set to fill.
+"""Starter folder for a user's own robot: a `robot.toml` that loads, a README, and a measurement set to fill.
 
-The numbers are those of a robot of that family that ships with the twin, each under the words of its schema.
+The numbers are those of a robot of the same family that ships with the twin, each with the explanation from its schema.
 """
 
 from __future__ import annotations
@@ -10,41 +10,40 @@ import re
 import shutil
 from pathlib import Path
 
-from twin.errors import DataError, UnknownNameError, shown
-from twin.measurements.toml_text import toml_lines, toml_value
-from twin.robots.family import families, family
-from twin.robots.numbers import Line, as_written, lines
-from twin.robots.robot import FORMAT, Robot, available, load
-from twin.robots.schema import NOT_WRITTEN
-from twin.units import unit_scale
+from twin.foundation.errors import DataError, UnknownNameError, short_repr
+from twin.foundation.units import unit_scale
+from twin.measurements.parsing.toml_text import toml_lines, toml_value
+from twin.robots.family import family_names, load_family
+from twin.robots.numbers import FileEntry, file_entries, in_file_unit
+from twin.robots.robot import ROBOT_FORMAT, Robot, load, robot_names
+from twin.robots.schema import SOURCE_OF_DEFAULT
 
-SOURCE = "example: where does this number come from?"
-SET = "samples/first"
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+EXAMPLE_SOURCE = "example: where does this number come from?"
+FIRST_SET = "samples/first"
+_ROBOT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
 def write_starter(name: str, family: str, place: Path) -> Path:
-    """Writes the folder `place`/`name` whole or not at all, and returns it.
+    """Write the folder `place`/`name` whole or not at all, and return it.
 
-    Raises UnknownNameError for an unknown family, DataError for a name that is no simple one, that a shipped robot has, or where
-    something is already.
+    Raises UnknownNameError for an unknown family, DataError for an invalid name, a shipped robot's name or an existing folder.
     """
-    if family not in families():
-        raise UnknownNameError("family", family, families())
-    if not _NAME.fullmatch(name) or name in available():
-        taken = f" that is none of {', '.join(available())}"
-        raise DataError(f"{shown(name)} cannot be a robot's name; write up to 64 letters, digits, - and _{taken}")
+    if family not in family_names():
+        raise UnknownNameError("family", family, family_names())
+    if not _ROBOT_NAME.fullmatch(name) or name in robot_names():
+        taken = ", ".join(robot_names())
+        raise DataError(f"{short_repr(name)} cannot be a robot's name; write up to 64 letters, digits, - and _, none of {taken}")
     folder = place / name
     draft = place / f".{name}.{os.getpid()}.writing"
-    robot = next(r for r in map(load, available()) if r.family == family)
+    robot = next(r for r in map(load, robot_names()) if r.family == family)
     try:
         if folder.exists():
             raise DataError(f"{folder} is there already and is not overwritten; choose another name, or another place with --out")
-        (draft / SET).mkdir(parents=True)
+        (draft / FIRST_SET).mkdir(parents=True)
         try:
             (draft / "robot.toml").write_text(robot_text(name, robot), "utf-8")
             (draft / "README.md").write_text(readme_text(name), "utf-8")
-            write_set(draft / SET, robot)
+            write_set(draft / FIRST_SET, robot)
             draft.rename(folder)
         except BaseException:
             shutil.rmtree(draft, ignore_errors=True)
@@ -55,52 +54,56 @@ def write_starter(name: str, family: str, place: Path) -> Path:
 
 
 def robot_text(name: str, robot: Robot) -> str:
-    """A commented `robot.toml` with the numbers of `robot`, without what is in force in some uses only (groups)."""
-    schema = family(robot.family).SCHEMA
+    """Return a commented `robot.toml` with the numbers of `robot`, without optional groups."""
+    schema = load_family(robot.family).SCHEMA
     head = [
         f"# {name}: replace every number by your robot's, and say in `source` where it comes from.",
-        "# `std` marks what a built robot may differ in (one standard deviation, same unit): those are fitted to data.",
-        "# `low` and `high` are hard bounds. A list has one number for each, fitted one by one; a number alone, where it may stand",
-        "# for all, is fitted as one: of disks that are built unlike each other what is left then passes for a missing effect.",
-        "#", *(f"#  {line}".rstrip() for line in schema.picture.splitlines()),
-        *toml_lines({"format": FORMAT, "family": robot.family, "title": f"{name}, described by its builder"}), "", "[structure]",
-    ]  # fmt: skip
+        "# `std` marks numbers in which a built robot may differ (one standard deviation, same unit): they are fitted to data.",
+        "# `low` and `high` are hard bounds. A list has one number for each, all fitted; one number for all is fitted as one.",
+        "# If your disks differ, give a list: otherwise their differences may look like a missing effect.",
+        "#",
+        *(f"#  {line}".rstrip() for line in schema.diagram.splitlines()),
+        *toml_lines({"format": ROBOT_FORMAT, "family": robot.family, "title": f"{name}, described by its builder"}),
+        "",
+        "[structure]",
+    ]
     for key, field in schema.structure.model_fields.items():
         given = key in robot.structure
         text = toml_lines({key: robot.structure[key]})[0] if given else f"# {key} ="
         head.append(f"{text}  # {field.description}")
     body = ["", "[parameters]"]
-    for line in lines(robot):
+    for line in file_entries(robot):
         if not line.row.group:
-            given = line.parameters[0].source != NOT_WRITTEN
-            body += [f"# {line.row.meaning}; {line.row.range()}", _entry(line) if given else f"# {_entry(line)}"]
+            given = line.parameters[0].source != SOURCE_OF_DEFAULT
+            body += [f"# {line.row.meaning}; {line.row.range_text()}", _entry_text(line) if given else f"# {_entry_text(line)}"]
     gravity = robot.gravity.tolist()
-    tail = ["", "[gravity]  # in the base frame", *toml_lines({"value": gravity, "unit": "m/s^2", "source": SOURCE}), ""]
-    usual = schema.accuracy.usual
+    tail = ["", "[gravity]  # in the base frame", *toml_lines({"value": gravity, "unit": "m/s^2", "source": EXAMPLE_SOURCE}), ""]
+    usual = schema.accuracy.usual_unit
     accuracy = {
         "value": float(f"{robot.accuracy / unit_scale(usual, schema.accuracy.unit).to_si(1.0):.6g}"),
         "unit": usual,
-        "source": SOURCE,
+        "source": EXAMPLE_SOURCE,
     }
     tail += [f"[accuracy]  # {schema.accuracy.meaning}", *toml_lines(accuracy)]
     return "\n".join([*head, *body, *tail]) + "\n"
 
 
-def _entry(line: Line) -> str:
+def _entry_text(line: FileEntry) -> str:
     p = line.parameters[0]
     entry: dict[str, object] = {"value": line.values if p.name != line.row.name else line.values[0], "unit": line.unit}
     if p.std is not None:
-        entry |= {"std": line.spread, "low": as_written(p, p.low), "high": as_written(p, p.high)}
-    return f'"{line.row.name}" = {toml_value({**entry, "source": SOURCE})}'
+        entry |= {"std": line.std, "low": in_file_unit(p, p.low), "high": in_file_unit(p, p.high)}
+    return f'"{line.row.name}" = {toml_value({**entry, "source": EXAMPLE_SOURCE})}'
 
 
 def write_set(folder: Path, robot: Robot) -> None:
-    """A measurement set without measurements: two trials whose files have a header only."""
-    schema = family(robot.family).SCHEMA
-    channels = schema.logged(schema.structure.model_validate(dict(robot.structure)))
+    """Write a measurement set without samples: two trials whose files have a header only."""
+    schema = load_family(robot.family).SCHEMA
+    channels = schema.usual_channels(schema.structure.model_validate(dict(robot.structure)))
     text = [
         "# One [[channel]] a column of the CSV files, one [[trial]] a file. Every key and every channel's name: models/README.md.",
-        "# Times in seconds, each trial from rest; an empty cell is a missing value. Fill the files, then: twin diagnose " + SET,
+        "# Times in seconds, each trial from rest; an empty cell is a missing value. Fill the files, then: twin diagnose "
+        + FIRST_SET,
         *toml_lines({"format": "twin-measurements/1", "robot": "../..", "title": "First bench day", "source": "hardware"}),
     ]
     for name, role, unit, noise in channels:
@@ -113,12 +116,13 @@ def write_set(folder: Path, robot: Robot) -> None:
 
 
 def readme_text(name: str) -> str:
+    """Return the README of a new robot."""
     return f"""# {name}
 
 What it is, who built it, where its numbers come from.
 
     twin robots .                # draws it and prints its numbers: is every unit right?
-    twin diagnose {SET}   # once its trials are filled
+    twin diagnose {FIRST_SET}   # once its trials are filled
 
 Every key, unit and sign: models/README.md of the twin.
 """

@@ -1,21 +1,11 @@
-"""Sensing: from what the robot feels to its shape.
+"""Shape of a robot from its sensors: markers of a rod from load cells, the surface of a soft finger from strain sensors.
 
-tensions.py    load cells, and tendon displacements where they are known, to markers with an error bar
-
-Strain sensors to the surface of a soft finger, one estimator per file, found by themselves:
-
-physics.py     the twin's equilibrium under the likeliest push         estimator.py  what an estimator is
-modal.py       a small network onto the twin's deformation modes       learned.py    what one with weights is; weights.py
-folding.py     KineSoft's decoder, a baseline                          training.py   how those are trained (torch): lesson.py what
-deepsoro.py    a decoder trained by chamfer distance, a baseline                     differs between them, judge.py their bands
-constant_curvature.py  an arc, a baseline
-
-free.py        strains that tendons alone make                         drift.py      what sensors drifted by, from free motion
-sensing.py     a trial to strains and displacements                    align.py      R0, kappa and mounting angle from clouds
-band.py        how wide a band is to be, from clouds
-predict.py     a recording's shapes as a file                          cloud_fit.py, sensor_fit.py, skin.py  what it is made of
+sensing.py        from a trial to resistances and tendon displacements pushed_trials.py  a check of the strain sensors in trials
+with external contact predict.py        a recording's shapes as a file estimators/       one estimator a module, found by its file's
+name, and what they share alignment/        alignment of a twin to a built finger by partial clouds, band widening, drift correction
+training/         training of estimators with weights (torch) training_data/    random shapes of a finger to train on
 """
 
-from twin.shape.tensions import Estimate, TensionShape
+from twin.shape.estimators.tension_shape import TensionShapeEstimate, TensionShapeFilter
 
-__all__ = ["Estimate", "TensionShape"]
+__all__ = ["TensionShapeEstimate", "TensionShapeFilter"]

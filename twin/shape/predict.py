@@ -1,4 +1,4 @@
-"""A recording's shapes as a file: every trial's named points, their uncertainty and the skin, in the base frame."""
+"""Estimate the shapes of a recording: named points of every trial, their uncertainty and the skin, in the base frame."""
 
 from __future__ import annotations
 
@@ -7,34 +7,40 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.errors import DataError
+from twin.foundation.atomic_write import write_atomically
+from twin.foundation.errors import DataError
+from twin.foundation.threads import single_thread
 from twin.measurements import Recording
-from twin.shape.band import STRANGER, Bands, widened
-from twin.shape.drift import steadied
-from twin.shape.estimator import Estimator, Felt, Shapes
-from twin.shape.sensing import Sensed, sense
-from twin.soft.skin import Skin
-from twin.soft.statics import turned
-from twin.threads import single_thread
+from twin.mechanics.silicone.skin import Skin
+from twin.mechanics.silicone.statics import rotation_about_z
+from twin.shape.alignment.band_widening import UNKNOWN_CONTACT_WIDENING, BandWidening, widen_band
+from twin.shape.alignment.drift_correction import correct_drift
+from twin.shape.estimators.estimator import Estimator, SensorReadings, ShapeEstimates
+from twin.shape.sensing import SensedTrial, read_sensors
 
-PLAIN = Bands()
+NO_WIDENING = BandWidening()
 
 
-def predict(recording: Recording, estimator: Estimator, bands: Bands = PLAIN) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3) m of each trial,
-    and what a reader should know. `bands`: how wide they are to be where something may press."""
-    sensed, notices = sense(recording, estimator.twin)
-    sensed, drift = steadied(sensed, [t.start for t in recording.trials], estimator.twin)
-    arrays, skin = {}, SkinOf(estimator)
+def predict_shapes(
+    recording: Recording, estimator: Estimator, bands: BandWidening = NO_WIDENING
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Estimate the shapes of all trials and return them as arrays, with notices for the reader.
+
+    Arrays of each trial: NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3)
+    m. `bands` widens the bands where something may press.
+    """
+    sensed, notices = read_sensors(recording, estimator.twin)
+    sensed, drift = correct_drift(sensed, [t.start for t in recording.trials], estimator.twin)
+    arrays, skin = {}, SkinReconstruction(estimator)
     for trial in sensed:
         label = next(t.label for t in recording.trials if t.name == trial.name)
         with single_thread():
-            shapes = estimator.estimate(felt(trial, estimator))
-        shapes = judged(shapes, trial.contact, estimator, bands)
-        turn = turned(estimator.body.turn).T
+            shapes = estimator.estimate(trial_readings(trial, estimator))
+        shapes = apply_band_widening(shapes, trial.contact, estimator, bands)
+        turn = rotation_about_z(estimator.body.turn).T
         arrays |= {
             f"{label}_time": trial.time,
-            f"{label}_vertices": (estimator.points.rest + shapes.moved) @ turn,
+            f"{label}_vertices": (estimator.points.rest + shapes.displacements) @ turn,
             f"{label}_std": shapes.std,
             f"{label}_outside": shapes.outside,
             f"{label}_cloud": skin(shapes) @ turn,
@@ -42,20 +48,21 @@ def predict(recording: Recording, estimator: Estimator, bands: Bands = PLAIN) ->
     return arrays, (*notices, *drift)
 
 
-def judged(shapes: Shapes, contact: str | None, law: Estimator, bands: Bands) -> Shapes:
-    """With the band that goes with what pushes; a frame where something presses that pushed in no alignment is outside."""
-    if contact is None:  # frames marked as outside are those where strains say that something presses
-        return widened(shapes, np.where(shapes.outside & bands.strange(None), STRANGER, 1.0))
-    strange = bands.strange(contact) & (True if shapes.pressed is None else shapes.pressed)
-    return replace(widened(shapes, bands.of(law, contact)), outside=shapes.outside | strange)
+def apply_band_widening(shapes: ShapeEstimates, contact: str | None, estimator: Estimator, bands: BandWidening) -> ShapeEstimates:
+    """Widen the band for the contact of the trial, and mark frames pressed by a contact unknown to the alignment as outside."""
+    if contact is None:  # here `outside` marks frames in which the strains show a push
+        return widen_band(shapes, np.where(shapes.outside & bands.is_unknown(None), UNKNOWN_CONTACT_WIDENING, 1.0))
+    unknown = bands.is_unknown(contact) & (True if shapes.pressed is None else shapes.pressed)
+    return replace(widen_band(shapes, bands.factor(estimator, contact)), outside=shapes.outside | unknown)
 
 
-def felt(trial: Sensed, estimator: Estimator) -> Felt:
-    return Felt(trial.strain(estimator.body.cords), trial.displacement, trial.pushed, np.arange(len(trial.time)) > 0)
+def trial_readings(trial: SensedTrial, estimator: Estimator) -> SensorReadings:
+    """Return the readings of a trial as the estimator's input."""
+    return SensorReadings(trial.strain(estimator.body.cords), trial.displacement, trial.pushed, np.arange(len(trial.time)) > 0)
 
 
-class SkinOf:
-    """The whole skin from the named points: the nodes that move the points so, by least squares, move it."""
+class SkinReconstruction:
+    """The whole skin from the named points, through the nodal displacements that fit the points by least squares."""
 
     def __init__(self, estimator: Estimator) -> None:
         skin = Skin.of(estimator.body)
@@ -63,18 +70,15 @@ class SkinOf:
         self.weights = skin.weights
         self.inverse = np.linalg.pinv(estimator.body.lattice.weights(estimator.points.rest), rcond=1e-6)
 
-    def __call__(self, shapes: Shapes) -> np.ndarray:
-        """(n, M, 3) m in the finger's own frame."""
-        n, p = shapes.moved.shape[:2]
-        nodes = self.inverse @ shapes.moved.transpose(1, 0, 2).reshape(p, -1)
+    def __call__(self, shapes: ShapeEstimates) -> np.ndarray:
+        """Return the skin (n, M, 3) m in the finger's own frame."""
+        n, p = shapes.displacements.shape[:2]
+        nodes = self.inverse @ shapes.displacements.transpose(1, 0, 2).reshape(p, -1)
         return self.rest + (self.weights @ nodes).reshape(-1, n, 3).transpose(1, 0, 2)
 
 
-def write(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Whole or not at all: to a neighbour first, then renamed. Raises DataError where nothing can be written."""
+def write_shapes(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write the arrays, whole or not at all. Raises DataError where the folder is missing."""
     if not path.absolute().parent.is_dir():
         raise DataError(f"{path.absolute().parent} is no folder; make it, or give another file with --out")
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-    part.replace(path)
+    write_atomically(path, lambda file: np.savez_compressed(file, **arrays))  # type: ignore[arg-type]

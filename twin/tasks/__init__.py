@@ -1,9 +1,10 @@
-"""What a hand is to do with things: one task per file, found by itself; success is defined by where the object is.
+"""Tasks of the hand: one a module, found by its file's name; success is defined by where the object is.
 
-task.py   what a task is, how a person pushes, what may become of it     trial.py   one trial, a step at a time
+task.py      base of all tasks, a person's push, outcomes        trial.py     one trial, step by step imitation/   demonstrations,
+policies and trials by tendons
 """
 
-from twin.tasks.task import STEP, TABLE, Outcome, Person, Task, Track, task, tasks
-from twin.tasks.trial import Trial
+from twin.tasks.task import CONTROL_STEP, TABLE_NAME, Demonstrator, ObjectTrack, Outcome, Task, make_task, tasks
+from twin.tasks.trial import TaskTrial
 
-__all__ = ["STEP", "TABLE", "Outcome", "Person", "Task", "Track", "Trial", "task", "tasks"]
+__all__ = ["CONTROL_STEP", "TABLE_NAME", "Demonstrator", "ObjectTrack", "Outcome", "Task", "TaskTrial", "make_task", "tasks"]

@@ -6,53 +6,65 @@ from typing import ClassVar
 
 import numpy as np
 
-from twin.soft.scene import Part, Sight, Thing
-from twin.tasks.task import Outcome, Task, Track, block, table
+from twin.mechanics.silicone.motion.scene import Part, SceneState, Thing
+from twin.tasks.task import ObjectTrack, Outcome, Task, build_table, table_block
 
-TOP = 0.105  # m
-PLUG = (0.010, 0.018)  # m, radius and half height
-MOUTH, DEEP = 0.016, 0.018  # m: where the socket begins, and how deep it is
-FIT, TALL = 1.5e-3, 0.010  # m: play on either side; half the height of its walls
-WALL, FLARE, YAW = 2e-3, 8e-3, np.radians(40.0)  # m, m, rad: half its thickness; half the length of what leads in, and its angle
-WANTED, TILTED = 0.012, np.radians(15.0)  # m, rad
+SOCKET_TABLE_TOP = 0.105  # m below the palm
+PLUG_SIZE = (0.010, 0.018)  # m, radius and half height
+SOCKET_MOUTH, SOCKET_DEPTH = 0.016, 0.018  # m: where the socket begins, and how deep it is
+SOCKET_PLAY, SOCKET_HALF_HEIGHT = 1.5e-3, 0.010  # m: play on either side; half the height of its walls
+# m, m, rad: half a wall's thickness; half the length of the lead-in walls, and their angle
+SOCKET_HALF_WALL, FLARE_HALF_LENGTH, FLARE_ANGLE = 2e-3, 8e-3, np.radians(40.0)
+WANTED_DEPTH, LARGEST_PLUG_TILT = 0.012, np.radians(15.0)  # m, rad
 
 
 class Insert(Task):
-    about = "push a round plug of 20 mm over a table into a socket 23 mm wide"
-    success = "in the last 0.4 s the plug is 12 mm deep in the socket (of 18), and tilted by less than 15 degrees"
-    seconds: ClassVar[float] = 2.6
-    strength: ClassVar[float | tuple[float, ...]] = (0.7, 0.0, 0.0)
+    """A plug that walls guide into a socket."""
 
-    def things(self, rng: np.random.Generator) -> tuple[Thing, ...]:
+    description = "push a round plug of 20 mm over a table into a socket 23 mm wide"
+    success_criterion = "in the last 0.4 s the plug is 12 mm deep in the socket (of 18), and tilted by less than 15 degrees"
+    duration: ClassVar[float] = 2.6
+    push_strength: ClassVar[float | tuple[float, ...]] = (0.7, 0.0, 0.0)
+
+    def draw_things(self, rng: np.random.Generator) -> tuple[Thing, ...]:
         slick = rng.uniform(0.25, 0.4)
         plug = Thing(
-            "object", "cylinder", PLUG, rng.uniform(0.03, 0.05),
-            (rng.uniform(0.027, 0.029), rng.uniform(-2e-3, 2e-3), TOP - PLUG[1]), friction=slick,
+            "object", "cylinder", PLUG_SIZE, rng.uniform(0.03, 0.05),
+            (rng.uniform(0.027, 0.029), rng.uniform(-2e-3, 2e-3), SOCKET_TABLE_TOP - PLUG_SIZE[1]), friction=slick,
         )  # fmt: skip
-        return plug, table(TOP, *socket(slick), friction=slick)
+        return plug, build_table(SOCKET_TABLE_TOP, *socket_walls(slick), friction=slick)
 
-    def sideways(self, before: float, seen: Sight, start: Sight) -> float:
-        """None: what is round may turn, and two walls lead it in."""
+    def side_push(self, before: float, seen: SceneState, start: SceneState) -> float:
+        """Return no side push: a round plug may turn, and two walls guide it."""
         return 0.0
 
-    def judge(self, track: Track) -> Outcome:
-        deep = MOUTH - (track.place[:, 0] - PLUG[0])
-        inside = (deep > WANTED) & (np.abs(track.place[:, 1]) < PLUG[0])
-        if not track.reached:
+    def judge(self, track: ObjectTrack) -> Outcome:
+        depth = SOCKET_MOUTH - (track.place[:, 0] - PLUG_SIZE[0])
+        inside = (depth > WANTED_DEPTH) & (np.abs(track.place[:, 1]) < PLUG_SIZE[0])
+        if not track.was_touched:
             return Outcome.NOT_REACHED
-        if track.upright()[-1] < np.cos(2.0 * TILTED):
+        if track.tilt_cosine()[-1] < np.cos(2.0 * LARGEST_PLUG_TILT):
             return Outcome.DROPPED
-        if (inside & (track.upright() > np.cos(TILTED)))[track.last].all():
+        if (inside & (track.tilt_cosine() > np.cos(LARGEST_PLUG_TILT)))[track.in_final_span].all():
             return Outcome.SUCCESS
-        return Outcome.NOT_REACHED if deep[-1] < WANTED else Outcome.SLIPPED
+        return Outcome.NOT_REACHED if depth[-1] < WANTED_DEPTH else Outcome.SLIPPED
 
 
-def socket(slick: float) -> tuple[Part, ...]:
-    """Two walls, one behind them, and two that lead in."""
-    side, half = PLUG[0] + FIT + WALL, 0.5 * DEEP
-    parts = [block((WALL, side + WALL, TALL), MOUTH - DEEP - WALL, 0.0, friction=slick)]
+def socket_walls(slick: float) -> tuple[Part, ...]:
+    """Return two walls, one behind them, and two that lead in."""
+    side, half = PLUG_SIZE[0] + SOCKET_PLAY + SOCKET_HALF_WALL, 0.5 * SOCKET_DEPTH
+    parts = [
+        table_block(
+            (SOCKET_HALF_WALL, side + SOCKET_HALF_WALL, SOCKET_HALF_HEIGHT),
+            SOCKET_MOUTH - SOCKET_DEPTH - SOCKET_HALF_WALL,
+            0.0,
+            friction=slick,
+        )
+    ]
     for sign in (-1.0, 1.0):
-        lead = MOUTH + FLARE * np.cos(YAW), sign * (side + FLARE * np.sin(YAW))
-        parts.append(block((half, WALL, TALL), MOUTH - half, sign * side, friction=slick))
-        parts.append(block((FLARE, WALL, TALL), *lead, yaw=sign * YAW, friction=slick))
+        lead = SOCKET_MOUTH + FLARE_HALF_LENGTH * np.cos(FLARE_ANGLE), sign * (side + FLARE_HALF_LENGTH * np.sin(FLARE_ANGLE))
+        parts.append(table_block((half, SOCKET_HALF_WALL, SOCKET_HALF_HEIGHT), SOCKET_MOUTH - half, sign * side, friction=slick))
+        parts.append(
+            table_block((FLARE_HALF_LENGTH, SOCKET_HALF_WALL, SOCKET_HALF_HEIGHT), *lead, yaw=sign * FLARE_ANGLE, friction=slick)
+        )
     return tuple(parts)

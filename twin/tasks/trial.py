@@ -1,71 +1,74 @@
-"""One trial of a task, a step at a time: by a person's hand on slack fingers, or by tendons."""
+"""Run one trial of a task step by step: by a person's hand on slack fingers, or by tendons."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from twin.errors import SolveError
-from twin.factory.draw import Pushes
-from twin.factory.solve import surface
-from twin.soft import HandBody
-from twin.soft.scene import Scene, Sight
-from twin.tasks.task import STEP, TABLE, Outcome, Person, Task, Track
+from twin.foundation.errors import SolveError
+from twin.mechanics.silicone import HandBody
+from twin.mechanics.silicone.motion.scene import Scene, SceneState
+from twin.mechanics.silicone.skin_loads import Pushes, push_surface
+from twin.shape.training_data.draw import PAID_OUT_DISPLACEMENT
+from twin.tasks.task import CONTROL_STEP, TABLE_NAME, Demonstrator, ObjectTrack, Outcome, Task
 
-SINKS = 0.05  # m/s
-PAID_OUT = -15e-3  # m: slack
+TABLE_SPEED = 0.05  # m/s, of a sinking table
 
 
-class Trial:
+class TaskTrial:
     """A hand and the task's things, from rest."""
 
     def __init__(self, task: Task, body: HandBody, gravity: np.ndarray, rng: np.random.Generator) -> None:
-        """The things are drawn. Raises SolveError where the hand has no equilibrium."""
-        self.task, self.things = task, task.things(rng)
+        """Draw the things. Raises SolveError where the hand has no equilibrium."""
+        self.task, self.things = task, task.draw_things(rng)
         self.scene = Scene(body, self.things, gravity)
-        self.start = self.seen = self.scene.see()
-        self._skins = [surface(finger.cone, finger.cells) for finger in body.fingers]
-        self._looks, self._lost, self._aside = [self.seen], False, 0.0
-        self._sunk = [0.0]
+        self.start = self.state = self.scene.observe()
+        self._push_surfaces = [push_surface(finger.cone, finger.cells) for finger in body.fingers]
+        self._states, self._lost, self._side_push = [self.state], False, 0.0
+        self._table_drops = [0.0]
 
     @property
-    def over(self) -> bool:
-        return self._lost or self.seen.time > self.task.seconds - 0.5 * STEP
+    def is_over(self) -> bool:
+        """Whether the time is up or the simulation has ended."""
+        return self._lost or self.state.time > self.task.duration - 0.5 * CONTROL_STEP
 
     def pull(self, shortening: np.ndarray) -> None:
-        """STEP s on, tendons shortened to (finger, tendon) m by its end; a simulation that ends is an outcome, no error."""
-        leaves, sunk = self.task.leaves, self._sunk[-1]
-        if leaves is not None and self.seen.time > leaves:
-            self.scene.shift(TABLE, [0.0, 0.0, SINKS * STEP])
-            sunk += SINKS * STEP
+        """Step on by CONTROL_STEP, tendons shortened to (finger, tendon) m by its end. A lost simulation is an outcome, no
+        error."""
+        drop_time, drop = self.task.table_drop_time, self._table_drops[-1]
+        if drop_time is not None and self.state.time > drop_time:
+            self.scene.move_thing(TABLE_NAME, [0.0, 0.0, TABLE_SPEED * CONTROL_STEP])
+            drop += TABLE_SPEED * CONTROL_STEP
         try:
-            self.seen = self.scene.pull(shortening, STEP)
-            self._looks.append(self.seen)
-            self._sunk.append(sunk)
+            self.state = self.scene.step_tendons(shortening, CONTROL_STEP)
+            self._states.append(self.state)
+            self._table_drops.append(drop)
         except SolveError:
             self._lost = True
 
-    def push(self, person: Person) -> None:
-        """STEP s on under a person's hand, all tendons paid out."""
-        inwards = person.squeeze(self.seen.time)
-        self._aside = self.task.sideways(self._aside, self.seen, self.start)
-        force = np.column_stack([inwards, self._aside * (person.force > 0.0), np.zeros(len(inwards))])
-        self.scene.press(np.stack([
-            skin.force(Pushes(person.height[k : k + 1], person.azimuth[k : k + 1], person.width[k : k + 1], force[k : k + 1]))
-            for k, skin in enumerate(self._skins)
+    def push(self, demonstrator: Demonstrator) -> None:
+        """Step on by CONTROL_STEP under a person's hand, all tendons paid out."""
+        d, inwards = demonstrator, demonstrator.push_force(self.state.time)
+        self._side_push = self.task.side_push(self._side_push, self.state, self.start)
+        force = np.column_stack([inwards, self._side_push * (d.force > 0.0), np.zeros(len(inwards))])
+        self.scene.set_node_forces(np.stack([
+            skin.nodal_force(Pushes(d.height[k : k + 1], d.azimuth[k : k + 1], d.width[k : k + 1], force[k : k + 1]))
+            for k, skin in enumerate(self._push_surfaces)
         ]))  # fmt: skip
-        self.pull(np.full_like(self.seen.shortening, PAID_OUT))
+        self.pull(np.full_like(self.state.shortening, PAID_OUT_DISPLACEMENT))
 
-    def frames(self, every: int) -> list[tuple[Sight, float]]:
-        """What was seen, at every so many steps and last, and by how many m the table had sunk then."""
-        last = len(self._looks) - 1
-        return [(self._looks[k], self._sunk[k]) for k in sorted({*range(0, last + 1, every), last})]
+    def frames(self, every: int) -> list[tuple[SceneState, float]]:
+        """Return the observations at every so many steps and the last one, with how far (m) the table had sunk then."""
+        last = len(self._states) - 1
+        return [(self._states[k], self._table_drops[k]) for k in sorted({*range(0, last + 1, every), last})]
 
-    def track(self) -> Track:
-        looks: list[Sight] = self._looks
-        return Track(
-            np.array([s.time for s in looks]), np.stack([s.place[0] for s in looks]), np.stack([s.turn[0] for s in looks]),
-            np.array([s.touching for s in looks]), np.stack([s.place[1:] for s in looks]),
+    def track(self) -> ObjectTrack:
+        """Return the object's track so far."""
+        states: list[SceneState] = self._states
+        return ObjectTrack(
+            np.array([s.time for s in states]), np.stack([s.place[0] for s in states]), np.stack([s.turn[0] for s in states]),
+            np.array([s.touching for s in states]), np.stack([s.place[1:] for s in states]),
         )  # fmt: skip
 
     def outcome(self) -> Outcome:
+        """Return how the trial ended."""
         return Outcome.ENDED if self._lost else self.task.judge(self.track())

@@ -1,29 +1,30 @@
-"""A robot under sliders: its shape under what pulls it and its loads, from where it stood; under currents, as time goes on."""
+"""The shape of a robot under sliders: static, with friction's history, or heated by currents over time."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from twin.bench import ROOM, Inputs
-from twin.effects import Drive, Loads
-from twin.equilibrium import Equilibrium
-from twin.equilibrium.figure import ChainFigure
-from twin.figure import Frames
-from twin.kinematics import HeatedRobot
-from twin.twin import Twin, alone
+from twin.body import Drive, Loads
+from twin.body.drawable import Frames
+from twin.mechanics.rod import Equilibrium
+from twin.mechanics.rod.drawing import ChainFigure
+from twin.prediction.kinematics import HeatedRobot
+from twin.prediction.prepared import ROOM_TEMPERATURE, Inputs
+from twin.prediction.simulate import simulate_alone
+from twin.prediction.twin import Twin
 
-TURNS = 24  # back to which friction is followed
-STEP = 0.1  # s between equilibria while springs heat, which takes them tens of seconds
-ROUNDING = 1e-9  # s
-RESTING = 0.01  # K/s: at rest
-LONGEST = 900.0  # s within which springs come to rest
+MOST_TURNING_POINTS = 24  # of the pulls, kept as the history of friction
+HEATING_STEP = 0.1  # s between equilibria while springs heat, which takes them tens of seconds
+TIME_ROUNDING = 1e-9  # s
+REST_RATE = 0.01  # K/s; slower springs are at rest
+LONGEST_HEATING = 900.0  # s; springs are at rest by then
 
 
-class Live:
-    """A robot whose friction remembers where its tendons turned, as long as its loads stay as they are.
+class LiveRobot:
+    """A robot in static equilibrium whose friction depends on where its tendons reversed, while the loads stay the same.
 
-    Pulls on in one direction wipe out those between, so that the turns are all that friction knows of its history; creep is as of a
-    second a turn.
+    Pulling on in one direction erases the pulls between, so the turning points are the whole history of friction. Creep counts one
+    second for each turning point.
     """
 
     def __init__(self, twin: Twin, drive: Drive = Drive.TENSION) -> None:
@@ -32,68 +33,72 @@ class Live:
         self._turns: list[np.ndarray] = []
 
     def shape(self, pull: np.ndarray, loads: Loads) -> Frames:
-        """One instant under pulls (n_tendon,), N as load cells read them or m as drives report. Raises SolveError where there is
-        none."""
-        if self._loads is None or not _same(loads, self._loads):
+        """Return the shape under pulls (n_tendon,), N as load cells read them or m as drives report.
+
+        Raises SolveError where there is no equilibrium.
+        """
+        if self._loads is None or not _same_loads(loads, self._loads):
             self._turns, self._loads = [np.zeros_like(pull)], loads
-        turns = [*(self._turns if _turned(self._turns, pull) else self._turns[:-1]), pull][-TURNS:]
+        turns = [*(self._turns if _reverses(self._turns, pull) else self._turns[:-1]), pull][-MOST_TURNING_POINTS:]
         command, time = np.stack(turns), np.arange(float(len(turns)))
-        inputs = Inputs("here", time, time, command, (self._drive,) * len(pull), np.full(len(turns), ROOM), loads)
-        trace = alone(self._twin, inputs)
-        assert trace.path is not None  # statics without one raise
+        inputs = Inputs("here", time, time, command, (self._drive,) * len(pull), np.full(len(turns), ROOM_TEMPERATURE), loads)
+        trace = simulate_alone(self._twin, inputs)
+        assert trace.solution is not None  # statics without one raise
         self._turns = turns
-        return self._figure.frames(trace.path, self._twin.laws.surround(loads), self._twin.laws.route).at(-1)
+        return self._figure.frames(trace.solution, self._twin.effect_chain.surround(loads), self._twin.effect_chain.route).frame_at(
+            -1
+        )
 
 
-class Heated:
-    """A backbone whose springs currents heat. Its clock goes on as it is told; `time` is s since the springs were cold."""
+class LiveHeatedRobot:
+    """A backbone whose springs are heated by currents. `time` is s since the springs were cold."""
 
     def __init__(self, twin: Twin) -> None:
-        """Raises DataError for a robot without springs."""
+        """Raise DataError for a robot without springs."""
         body = twin.robot.chain(twin.body())
         self._twin, self._figure = twin, ChainFigure(body, Equilibrium(body))
         self._robot: HeatedRobot | None = None
         self._loads: Loads | None = None
         self._current = np.zeros(twin.robot.n_tendon)
-        self.time, self._owed, self._rate = 0.0, 0.0, np.inf
+        self.time, self._pending_time, self._rate = 0.0, 0.0, np.inf
 
     def shape(self, current: np.ndarray, loads: Loads, passed: float) -> Frames:
-        """One instant, `passed` (s) after the last, under currents (n_tendon,) A. Raises SolveError where there is none."""
+        """Return the shape `passed` (s) after the last, under currents (n_tendon,) A. Raises SolveError where there is none."""
         if self._robot is None:
             self._robot, self._loads = HeatedRobot(self._twin, loads), loads
-        elif self._loads is None or not _same(loads, self._loads):
-            self._robot.bear(loads)
+        elif self._loads is None or not _same_loads(loads, self._loads):
+            self._robot.set_loads(loads)
             self._loads, self._rate = loads, np.inf
         if not np.array_equal(current, self._current):
             self._current, self._rate = current, np.inf
-        robot, self._owed = self._robot, self._owed + passed
-        while self._owed > STEP - ROUNDING:
-            before = robot.warm.copy()
-            robot.step(current, STEP)
-            self._rate = float(np.abs(robot.warm - before).max()) / STEP
-            self._owed, self.time = self._owed - STEP, self.time + STEP
-        return self._figure.standing(robot.path(), self._twin.laws.route, robot.heating.spring)
+        robot, self._pending_time = self._robot, self._pending_time + passed
+        while self._pending_time > HEATING_STEP - TIME_ROUNDING:
+            before = robot.spring_temperature.copy()
+            robot.step(current, HEATING_STEP)
+            self._rate = float(np.abs(robot.spring_temperature - before).max()) / HEATING_STEP
+            self._pending_time, self.time = self._pending_time - HEATING_STEP, self.time + HEATING_STEP
+        return self._figure.standing(robot.solution(), self._twin.effect_chain.route, robot.heating.spring)
 
     def rest(self, current: np.ndarray, loads: Loads) -> Frames:
-        """As the springs rest at last under currents that stay."""
-        shown, began = self.shape(current, loads, STEP), self.time
-        while self.changing and self.time - began < LONGEST:
+        """Return the shape once the springs are at rest under constant currents."""
+        shown, began = self.shape(current, loads, HEATING_STEP), self.time
+        while self.changing and self.time - began < LONGEST_HEATING:
             shown = self.shape(current, loads, 1.0)
         return shown
 
     @property
     def changing(self) -> bool:
-        """Whether some spring warms or cools, as far as is known."""
-        return self._rate > RESTING
+        """Return whether some spring warms or cools, by the last step."""
+        return self._rate > REST_RATE
 
     @property
     def temperature(self) -> np.ndarray:
-        """(n_tendon,) K of the springs."""
+        """Return the temperatures of the springs, (n_tendon,) K."""
         assert self._robot is not None
-        return self._robot.warm
+        return self._robot.spring_temperature
 
 
-def _same(a: Loads, b: Loads) -> bool:
+def _same_loads(a: Loads, b: Loads) -> bool:
     alike = a.payload == b.payload and np.array_equal(a.gravity, b.gravity) and np.array_equal(a.force, b.force)
     if a.push is None or b.push is None:
         return alike and a.push is b.push
@@ -101,8 +106,8 @@ def _same(a: Loads, b: Loads) -> bool:
     return alike and np.array_equal(one, other)
 
 
-def _turned(turns: list[np.ndarray], pull: np.ndarray) -> bool:
-    """Whether some tendon goes another way than on its last; the first pull always counts as a turn."""
+def _reverses(turns: list[np.ndarray], pull: np.ndarray) -> bool:
+    """Return whether some tendon reverses or starts to move; the first pull always counts."""
     if len(turns) < 2:
         return True
     last, now = turns[-1] - turns[-2], pull - turns[-1]

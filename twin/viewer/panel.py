@@ -1,11 +1,10 @@
-"""What all panels share: pictures and films of the scene, and the loop that serves them.
+"""What all panels share: pictures and films of the scene, and the loop that draws.
 
-Callbacks of a panel only note what is wanted: one loop solves and draws, since a solver serves one thread.
+Callbacks only record what is wanted; one loop solves and draws, since a solver serves one thread.
 """
 
 from __future__ import annotations
 
-import logging
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -13,116 +12,121 @@ from typing import Any
 
 import viser
 
-from twin.errors import TwinError
-from twin.figure import Range
-from twin.viewer.colours import bar
-from twin.viewer.film import Film, captioned, plain, png, render
+from twin.body.drawable import ColourScale
+from twin.foundation.errors import TwinError
+from twin.viewer.address import free_port
+from twin.viewer.drawing.colours import colour_bar
+from twin.viewer.drawing.film import Film, add_caption, encode_png, strip_markdown, take_picture
 from twin.viewer.scrubber import Clock
 
-RATE = 60.0  # Hz, of the loop
-PAUSE = 0.25  # s: a clock that was held up for longer does not catch up
-SHADES = {"tension": "tension of the tendons", "strain": "strain of the skin", "resistance": "resistance of the cords"}
-Sent = Callable[[str, bytes], None]
+LOOP_RATE = 60.0  # Hz, of the loop
+LONGEST_TICK = 0.25  # s; after a longer delay the clock does not catch up
+COLOUR_FIELDS = {"tension": "tension of the tendons", "strain": "strain of the skin", "resistance": "resistance of the cords"}
+SendFile = Callable[[str, bytes], None]
 
 
 class Panel(ABC):
-    """Base of what stands beside a scene. It has a clock, `scrubber`, and a heading, which `_heading` makes."""
+    """Base of panels beside a scene. It has a clock, `scrubber`, and a heading from `_add_heading`."""
 
     scrubber: Clock
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.server = server
-        self._wanted, self._clock = True, time.monotonic()
-        self._asked: list[Callable[[], None]] = []  # what clicks and buttons left to the loop
-        self._film: tuple[Film, Sent] | None = None
-        self._ranges: dict[str, Range] = {}
-        self.drawn = 0  # pictures sent
+        self._redraw, self._clock = True, time.monotonic()
+        self._pending: list[Callable[[], None]] = []  # actions of clicks and buttons, left to the loop
+        self._film: tuple[Film, SendFile] | None = None
+        self._ranges: dict[str, ColourScale] = {}
+        self.pictures_drawn = 0  # pictures sent
 
-    def _heading(self, gui: viser.GuiApi) -> None:
-        """The colour bars, and what is said of the picture."""
+    def _add_heading(self, gui: viser.GuiApi) -> None:
+        """Add the colour bars and the text about the picture."""
         self._bar, self.words = gui.add_html(""), gui.add_markdown("")
 
-    def _picture_button(self, gui: viser.GuiApi) -> None:
-        self.picture = gui.add_button("save picture", hint="of the scene as you see it, its colour bar beside it, as PNG")
-        self.picture.on_click(lambda event: self._asked.append(lambda: self._save(event)))
+    def _add_picture_button(self, gui: viser.GuiApi) -> None:
+        self.picture = gui.add_button("save picture", hint="the scene as you see it with its colour bar, as PNG")
+        self.picture.on_click(lambda event: self._pending.append(lambda: self._save_picture(event)))
 
-    def _film_button(self, gui: viser.GuiApi) -> None:
-        self.film = gui.add_button("save film", hint="the trial from first to last at this speed, as GIF; keep the window open")
-        self.film.on_click(lambda event: self._asked.append(lambda: self._filmed(event)))
+    def _add_film_button(self, gui: viser.GuiApi) -> None:
+        self.film = gui.add_button("save film", hint="the whole trial at this speed, as GIF; keep the window open")
+        self.film.on_click(lambda event: self._pending.append(lambda: self._start_film(event)))
 
-    def _changed(self, handle: Any) -> None:
+    def _redraw_on_change(self, handle: Any) -> None:
         def note(event: viser.GuiEvent) -> None:
-            # What the loop itself moved needs no second picture.
+            # Handles that the loop itself moved need no second picture.
             if event.client is not None:
-                self._wanted = True
+                self._redraw = True
 
         clicked = isinstance(handle, viser.GuiButtonGroupHandle | viser.GuiButtonHandle)
         (handle.on_click if clicked else handle.on_update)(note)
 
-    def _colours(self, gui: viser.GuiApi, shades: Sequence[str]) -> None:
-        """What the figure may be coloured by."""
-        told = tuple(SHADES[s] for s in shades)
-        self.shade = gui.add_dropdown("colour by", told, visible=len(told) > 1, hint="what the colours of the robot mean")
-        self._changed(self.shade)
+    def _add_colour_choice(self, gui: viser.GuiApi, shades: Sequence[str]) -> None:
+        """Add the choice of what the colours mean."""
+        told = tuple(COLOUR_FIELDS[s] for s in shades)
+        self.colour_choice = gui.add_dropdown("colour by", told, visible=len(told) > 1, hint="what the colours of the robot mean")
+        self._redraw_on_change(self.colour_choice)
 
     @property
-    def _shade(self) -> str:
-        return next(s for s, told in SHADES.items() if told == self.shade.value)
+    def _colour_field(self) -> str:
+        return next(s for s, told in COLOUR_FIELDS.items() if told == self.colour_choice.value)
 
     @property
-    def _bars(self) -> list[Range]:
-        """The ranges that are in the picture."""
-        return [r for shade, r in self._ranges.items() if shade in (self._shade, "temperature")]
+    def _visible_ranges(self) -> list[ColourScale]:
+        """Return the ranges of the colours in the picture."""
+        return [r for shade, r in self._ranges.items() if shade in (self._colour_field, "temperature")]
 
-    def _range(self, ranges: dict[str, Range]) -> None:
-        """From now on colours mean this."""
+    def _set_ranges(self, ranges: dict[str, ColourScale]) -> None:
+        """Set the ranges of the colours and their bars."""
         self._ranges = ranges
-        now = "".join(bar(r) for r in self._bars)
+        now = "".join(colour_bar(r) for r in self._visible_ranges)
         if now != self._bar.content:
             self._bar.content = now
 
     @property
     @abstractmethod
-    def _end(self) -> float:
-        """s, of the chosen trial."""
+    def _trial_end(self) -> float:
+        """Return the end of the chosen trial, s."""
 
     @abstractmethod
-    def _stand(self) -> None:
-        """Draw the chosen trial at the scrubber's time."""
+    def _draw_now(self) -> None:
+        """Draw the chosen trial at the time of the scrubber."""
 
     @abstractmethod
-    def _shown(self, passed: float) -> bool:
-        """Draw what is wanted, `passed` (s) after the last time. Whether anything was drawn."""
+    def _draw_if_wanted(self, passed: float) -> bool:
+        """Draw what is wanted, `passed` (s) after the last time; return whether anything was drawn."""
 
     # ---- pictures and films ---------------------------------------------------------------------------------------------
 
-    def _save(self, event: viser.GuiEvent) -> None:
+    def _save_picture(self, event: viser.GuiEvent) -> None:
         if event.client is not None:
             camera = event.client.camera
-            picture = render(event.client, int(camera.image_width), int(camera.image_height))
-            self._handed(event.client)("twin.png", png(captioned(picture, plain(self.words.content), self._bars)))
+            picture = take_picture(event.client, int(camera.image_width), int(camera.image_height))
+            self._download_to(event.client)(
+                "twin.png", encode_png(add_caption(picture, strip_markdown(self.words.content), self._visible_ranges))
+            )
 
-    def _filmed(self, event: viser.GuiEvent) -> None:
+    def _start_film(self, event: viser.GuiEvent) -> None:
         if event.client is not None:
-            self.begin_film(event.client, self._handed(event.client))
+            self.begin_film(event.client, self._download_to(event.client))
 
-    def _handed(self, client: viser.ClientHandle) -> Sent:
+    def _download_to(self, client: viser.ClientHandle) -> SendFile:
         return lambda name, content: client.send_file_download(name, content, save_immediately=True)
 
-    def begin_film(self, client: viser.ClientHandle, sent: Sent) -> None:
-        """Take a film of the chosen trial as `client` sees it; `sent` takes its name and content. Raises DataError for one of too
-        many pictures."""
-        self.scrubber.play.value = False
-        self._film = Film(client, self._end, self.scrubber.speed.value), sent
+    def begin_film(self, client: viser.ClientHandle, sent: SendFile) -> None:
+        """Take a film of the chosen trial as `client` shows it; `sent` takes its name and content.
 
-    def _take(self, film: Film, sent: Sent) -> None:
+        Raises DataError for too many pictures.
+        """
+        self.scrubber.play.value = False
+        self._film = Film(client, self._trial_end, self.scrubber.speed.value), sent
+
+    def _take_film_picture(self, film: Film, sent: SendFile) -> None:
         self.scrubber.time.value = film.time
-        self._stand()
-        film.take(f"{self.scrubber.trial.value}\n{plain(self.words.content)}", self._bars)
+        self._draw_now()
+        film.add_picture(f"{self.scrubber.trial.value}\n{strip_markdown(self.words.content)}", self._visible_ranges)
         self.words.content = f"taking a film: {film.time:.2f} of {film.end:.2f} s"
         if film.done:
-            sent(f"{self.scrubber.trial.value}.gif", film.gif())
-            self._film, self._wanted = None, True
+            sent(f"{self.scrubber.trial.value}.gif", film.encode_gif())
+            self._film, self._redraw = None, True
 
     @property
     def filming(self) -> bool:
@@ -135,43 +139,41 @@ class Panel(ABC):
         while True:
             started = time.monotonic()
             self.tick()
-            time.sleep(max(0.001, 1.0 / RATE - (time.monotonic() - started)))
+            time.sleep(max(0.001, 1.0 / LOOP_RATE - (time.monotonic() - started)))
 
     def tick(self) -> None:
-        """Draw what is wanted by now."""
+        """Run the pending actions and draw what is wanted."""
         now = time.monotonic()
-        passed, self._clock = min(now - self._clock, PAUSE), now
+        passed, self._clock = min(now - self._clock, LONGEST_TICK), now
         try:
-            while self._asked:
-                self._wanted = True
-                self._asked.pop(0)()
+            while self._pending:
+                self._redraw = True
+                self._pending.pop(0)()
             if self._film is not None:
-                self._take(*self._film)
-            elif not self._shown(passed):
+                self._take_film_picture(*self._film)
+            elif not self._draw_if_wanted(passed):
                 return
         except TwinError as error:
             self.words.content, self._film = f"**{error}**", None
             return
-        self.drawn += 1
+        self.pictures_drawn += 1
 
 
-Make = Callable[[viser.ViserServer], Panel]  # a panel on a server
+MakePanel = Callable[[viser.ViserServer], Panel]  # a panel on a server
 
 
-def served(port: int, label: str | None = None) -> viser.ViserServer:
-    """A server on 127.0.0.1, at the first free port from `port` on."""
-    # Browsers open connections ahead and drop those they do not need, each of which would be a traceback.
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    return viser.ViserServer(host="127.0.0.1", port=port, label=label, verbose=False)
+def start_server(host: str, port: int, label: str | None = None) -> viser.ViserServer:
+    """Start a server at the first free port of `host` from `port` on. Raises DataError as `free_port`."""
+    return viser.ViserServer(host=host, port=free_port(host, port), label=label, verbose=False)
 
 
-def serve(make: Make, name: str, port: int, told: Callable[[str], None]) -> None:
-    """Serve on 127.0.0.1, the first free port from `port` on, until interrupted; `told` the address once the picture stands."""
-    server = served(port, f"twin view {name}")
+def serve(make: MakePanel, name: str, host: str, port: int, announce: Callable[[int], None]) -> None:
+    """Serve at the first free port from `port` on until interrupted; `announce` the port once the first picture is drawn."""
+    server = start_server(host, port, f"twin view {name}")
     try:
         panel = make(server)
         panel.tick()
-        told(f"http://127.0.0.1:{server.get_port()}")
+        announce(server.get_port())
         panel.run()
     finally:
         server.stop()

@@ -1,4 +1,4 @@
-"""A measurement set's trials beside what a twin makes of their inputs."""
+"""The trials of a measurement set and a twin's predictions of them."""
 
 from __future__ import annotations
 
@@ -6,18 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.bench import prepare
-from twin.effects import Drive
-from twin.errors import DataError
-from twin.figure import Frames
+from twin.body import Drive
+from twin.body.drawable import Frames
+from twin.foundation.errors import DataError
 from twin.measurements import Recording
-from twin.twin import Twin, is_dynamic, report, simulate
+from twin.prediction.prepared import prepare
+from twin.prediction.simulate import is_dynamic, simulate
+from twin.prediction.twin import Twin
 
 
 @dataclass(frozen=True)
-class Track:
-    """One trial as predicted: time (n,) s; frames; markers (n, m, 3) m as reported, those that were measured too; the error of an
-    instant, (n,) m, and of the trial, root-mean-square over their markers."""
+class PredictedTrial:
+    """One predicted trial.
+
+    `time` (n,) s; `frames` to draw; `markers` (n, m, 3) m as reported, only those also measured; `error` (n,) m of each instant and
+    `rms` (m) of the trial, root-mean-square over the markers.
+    """
 
     time: np.ndarray
     frames: Frames
@@ -26,53 +30,55 @@ class Track:
     rms: float
 
 
-KEPT = 16  # predictions, of some megabytes each
+MOST_PREDICTIONS = 16  # kept, of some megabytes each
 
 
 class Replay:
-    """The trials of a set. Predictions are made when asked for, and the last ones kept."""
+    """The trials of a set. Predictions are made on demand; the last `MOST_PREDICTIONS` are kept."""
 
     def __init__(self, recording: Recording, twin: Twin) -> None:
-        """Raises DataError for a set without markers, or that does not drive the robot."""
-        self._bench = bench = prepare(recording, twin.robot)
-        self._dynamic = is_dynamic(bench)
+        """Raise DataError for a set without markers, or one that does not drive the robot."""
+        self._prepared = prepared = prepare(recording, twin.robot)
+        self._dynamic = is_dynamic(prepared)
         self._columns = {
-            m: [j for j, o in enumerate(bench.outputs) if o.group == "marker" and o.index == m]
-            for m in sorted({o.index for o in bench.outputs if o.group == "marker"})
+            m: [j for j, o in enumerate(prepared.outputs) if o.group == "marker" and o.index == m]
+            for m in sorted({o.index for o in prepared.outputs if o.group == "marker"})
         }
         self._columns = {m: columns for m, columns in self._columns.items() if len(columns) == 3}
         if not self._columns:
             raise DataError("the set has no marker with x, y and z to show beside the robot")
-        self.labels = [name.removesuffix(".csv") for name in (i.name for i in bench.inputs)]
-        self._kept: dict[tuple[Twin, int], Track] = {}
+        self.labels = [name.removesuffix(".csv") for name in (i.name for i in prepared.inputs)]
+        self._predictions: dict[tuple[Twin, int], PredictedTrial] = {}
 
     def measured(self, trial: int) -> np.ndarray:
-        """(n, m, 3) m, NaN where missing."""
-        return np.stack([self._bench.measured[trial][:, columns] for columns in self._columns.values()], axis=1)
+        """Return the measured markers, (n, m, 3) m, NaN where missing."""
+        return np.stack([self._prepared.measured[trial][:, columns] for columns in self._columns.values()], axis=1)
 
-    def pull(self, trial: int) -> tuple[str, np.ndarray]:
-        """What pulls the tendon that is moved furthest, in words, and how far (n,) in their unit."""
-        command, drives = self._bench.inputs[trial].command, self._bench.drives
-        t = int(np.argmax(np.ptp(command, axis=0) / self._bench.reading))
-        unit, factor = drives[t].shown
+    def strongest_pull(self, trial: int) -> tuple[str, np.ndarray]:
+        """Return a label of the most moved tendon's pull, and the pull (n,) in the unit of the label."""
+        command, drives = self._prepared.inputs[trial].command, self._prepared.drives
+        t = int(np.argmax(np.ptp(command, axis=0) / self._prepared.reading))
+        unit, factor = drives[t].display_unit
         return f"{drives[t]} of tendon {t + 1}, {unit}", factor * command[:, t]
 
-    def track(self, twin: Twin, trial: int) -> Track:
-        """A trial as the twin predicts it. Raises SolveError where it has no answer."""
-        if (twin, trial) not in self._kept:
-            inputs = self._bench.inputs[trial]
-            trace = simulate(twin, self._bench, trials=[trial], dynamic=self._dynamic)[0]
-            assert trace.path is not None
+    def predict(self, twin: Twin, trial: int) -> PredictedTrial:
+        """Predict a trial. Raises SolveError where there is no solution."""
+        if (twin, trial) not in self._predictions:
+            inputs = self._prepared.inputs[trial]
+            trace = simulate(twin, self._prepared, trials=[trial], dynamic=self._dynamic)[0]
+            assert trace.solution is not None
             heating = twin.heating(inputs.temperature) if Drive.CURRENT in inputs.drives else None
-            frames = twin.figure().frames(trace.path, twin.laws.surround(inputs.loads), twin.laws.route, heating)
-            markers = report(twin.effects, trace.true).markers[:, list(self._columns)]
+            frames = twin.figure().frames(
+                trace.solution, twin.effect_chain.surround(inputs.loads), twin.effect_chain.route, heating
+            )
+            markers = twin.effect_chain.sense(trace.true).markers[:, list(self._columns)]
             away = np.linalg.norm(self.measured(trial) - markers, axis=2)
             with np.errstate(invalid="ignore"):
                 counted = np.isfinite(away).sum(axis=1)
                 error = np.sqrt(np.nansum(away**2, axis=1) / np.where(counted, counted, np.nan))
             rms = float(np.sqrt(np.nanmean(away**2)))
-            self._kept[twin, trial] = Track(inputs.time - inputs.time[0], frames, markers, error, rms)
-        self._kept[twin, trial] = track = self._kept.pop((twin, trial))  # the last used stands last
-        while len(self._kept) > KEPT:
-            del self._kept[next(iter(self._kept))]
+            self._predictions[twin, trial] = PredictedTrial(inputs.time - inputs.time[0], frames, markers, error, rms)
+        self._predictions[twin, trial] = track = self._predictions.pop((twin, trial))  # the last used is the last entry
+        while len(self._predictions) > MOST_PREDICTIONS:
+            del self._predictions[next(iter(self._predictions))]
         return track

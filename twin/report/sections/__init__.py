@@ -1,26 +1,11 @@
-"""The sections of report.html, in order: one function `section(story)` a file, each with its template."""
+"""The sections of report.html, in order: one function `section(story)` in each file, with its template."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from twin.report.sections import (
-    attribution,
-    before_after,
-    effects,
-    identifiability,
-    leftover,
-    loops,
-    made_with,
-    next_experiment,
-    noise,
-    notices,
-    parameters,
-    residual,
-    shapes,
-    tip,
-    under_hand,
-)
+from twin.report.sections.answer import attribution, before_after, effects, leftover, next_experiment, residual
+from twin.report.sections.data import identifiability, loops, made_with, noise, notices, parameters, shapes, tip, under_hand
 from twin.report.sections.section import Section, Story
 
 SECTIONS: tuple[Callable[[Story], Section | None], ...] = (

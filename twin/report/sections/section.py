@@ -1,4 +1,4 @@
-"""What a section of the page is: a heading, a template, and what the template needs."""
+"""A section of the page and its input."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from twin.diagnose import Diagnosis
+from twin.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True)
 class Story:
-    """What every section may draw on."""
+    """The input of every section."""
 
     diagnosis: Diagnosis
     provenance: Mapping[str, Any]
@@ -19,7 +19,7 @@ class Story:
 
 @dataclass(frozen=True)
 class Section:
-    """One section: anchor, heading, template under `templates/`, and the names the template uses."""
+    """One section: anchor, heading, template under `templates/`, and the values for the template."""
 
     id: str
     title: str

@@ -1,0 +1,105 @@
+"""Suspicions by hand: single looks at a file, against geometry and plain numbers; whole files are in `test_suspicions.py`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tools.simulators.two_link import write_day
+from twin.diagnosis import Settings
+from twin.diagnosis.checks.preview import preview_data
+from twin.diagnosis.checks.suspicions.case import Case
+from twin.diagnosis.checks.suspicions.clouds import _nearest
+from twin.diagnosis.checks.suspicions.frames import _axes
+from twin.diagnosis.checks.suspicions.trials import times
+from twin.measurements import Clouds, read
+from twin.prediction.prepared import prepare
+from twin.prediction.twin import Twin
+from twin.robots import load
+from twin.robots.robot import models_folder
+
+FRIDAY = models_folder() / "continuum/samples/friday"
+
+
+@pytest.mark.parametrize(
+    ("turn", "axes"),
+    [
+        (np.diag([-1.0, 1.0, 1.0]), "x of the file is -x, y of the file is y, z of the file is z"),
+        (
+            np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+            "x of the file is -y, y of the file is x, z of the file is z",
+        ),
+        (np.roll(np.eye(3), 1, axis=0), "x of the file is z, y of the file is x, z of the file is y"),
+    ],
+)
+def test_a_turned_frame_is_said_axis_by_axis(turn: np.ndarray, axes: str) -> None:
+    """What stands along x of the file is `turn` times what stands in the base frame; two degrees more are no other exchange."""
+    assert _axes(turn) == axes
+    c, s = np.cos(np.radians(2.0)), np.sin(np.radians(2.0))
+    assert _axes(turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])) == axes
+
+
+def test_markers_are_held_against_the_cloud_of_the_same_instant() -> None:
+    """A row of markers moves along x by 1 mm a row of 0.1 s; clouds of a grid 2 mm apart about it, between rows, a quarter of a
+    row early. Distances in metres, by hand: half the diagonal of a cell in y and z, and what it moved in x."""
+    time, rest = np.arange(10) * 0.1, np.stack(np.meshgrid([0.0], [0.0, 10.0], [0.0, 10.0]), axis=-1).reshape(-1, 3) * 1e-3
+    markers = rest + np.arange(10)[:, None, None] * [1e-3, 0.0, 0.0]
+    markers[:, 0] = np.nan  # one that is not seen
+    grid = np.stack(np.meshgrid([0.0], np.arange(-5.0, 15.0, 2.0), np.arange(-5.0, 15.0, 2.0)), axis=-1).reshape(-1, 3) * 1e-3
+    when = np.array([0.275, 0.475])
+    points = np.concatenate([grid + 10e-3 * t * np.eye(3)[0] for t in when])
+    off, spacing = _nearest(markers, time, Clouds(points, np.array([0, len(grid), 2 * len(grid)]), when))
+    np.testing.assert_allclose(off, 1e-3 * np.sqrt(2.0 + 0.25**2), rtol=1e-9)  # three markers in two frames
+    assert len(off) == 6
+    np.testing.assert_allclose(spacing, 2e-3, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("pause", "mistake"), [(1.2e5, True), (1.2e4, False)])
+def test_a_clock_in_ms_is_a_mistake_where_the_trials_clock_is_in_ms_too(pause: float, mistake: bool) -> None:
+    """Ten trials of three hours each with a reading every ten minutes: begun every 33 hours, the session lasts twelve days and
+    must be one of 20 minutes in ms; begun every 3.3 hours it may be one of slow creep, over within a day and a half."""
+    time = np.arange(0.0, 10801.0, 600.0)
+    trials = [SimpleNamespace(name=f"{k}", start=k * pause, time=time) for k in range(10)]
+    bench: Any = SimpleNamespace(inputs=trials, recording=SimpleNamespace(trials=trials))
+    said = [s.kind for s in times(SimpleNamespace(prepared=bench))]  # type: ignore[arg-type]
+    assert said == ["time unit"] * mistake
+
+
+def test_of_two_mistakes_the_one_that_leaves_the_smaller_share_of_the_error_is_said() -> None:
+    """An error of 4 mm that a change brings to 0.2 mm is left to a twentieth, however far the robot moves; one that leaves a half
+    is none, nor one that leaves as much as the motion."""
+    case: Any = SimpleNamespace(motion=lambda columns: 0.05)
+    assert Case.better(case, 4e-3, 2e-4, [0]) == pytest.approx(0.05)
+    assert Case.better(case, 0.4, 2e-3, [0]) == pytest.approx(0.005)
+    assert Case.better(case, 4e-3, 2e-3, [0]) is None
+    assert Case.better(case, 4.0, 0.05, [0]) is None
+
+
+def test_an_encoder_that_counts_the_other_way_is_said(tmp_path: Path) -> None:
+    """A joint's angle negated: that joint and no other. Both as they are raise nothing (test_suspicions_silent.py)."""
+    write_day(tmp_path / "day", None, 41002)
+    day, twin = read(tmp_path / "day"), Twin.of("two_link")
+    turned = tuple(replace(t, values={**t.values, "joint_2_angle": -t.values["joint_2_angle"]}) for t in day.trials)
+    found = preview_data(prepare(replace(day, trials=turned), twin.robot), twin, Settings(jobs=1)).suspicions
+    assert [s.kind for s in found if "joint_2_angle: falls where" in s.words] == ["sign"]
+    assert not any("joint_1_angle" in s.words for s in found)
+
+
+@pytest.mark.parametrize("by", [1, 2])
+def test_tendons_counted_from_another_one_are_a_mistake_in_their_order(by: int) -> None:
+    """All three columns each under the name of the next, or of the one before."""
+    day, names = read(FRIDAY), [f"tendon_{i}_tension" for i in (1, 2, 3)]
+    trials = []
+    for t in day.trials:
+        trials.append(replace(t, values={**t.values, **{names[(i + by) % 3]: t.values[names[i]] for i in range(3)}}))
+    found = preview_data(
+        prepare(replace(day, trials=tuple(trials)), load("continuum")), Twin.of("continuum"), Settings(jobs=1)
+    ).suspicions
+    (said,) = (s for s in found if s.kind == "tendon order")
+    for i in range(3):
+        assert f"{names[(i + by) % 3]} as {names[i]}" in said.change

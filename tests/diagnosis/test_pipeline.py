@@ -1,0 +1,64 @@
+"""The stages in order: what each hands on is what the next one gets."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.diagnosis.checks.test_design import bench
+from tools.simulators.rod.design import bench_day
+from twin.diagnosis import Settings, pipeline
+from twin.diagnosis.budget import Budget
+from twin.diagnosis.pipeline import conclude
+from twin.diagnosis.split import blind
+
+
+def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    got: dict[str, tuple[Any, ...]] = {}
+
+    def stage(name: str, result: Any) -> None:
+        def run(*arguments: Any) -> Any:
+            got[name] = arguments
+            return result
+
+        monkeypatch.setattr(pipeline, name, run)
+
+    screening: Any = SimpleNamespace(patterns="patterns", limits="bars")
+    study = SimpleNamespace(budget=Budget(0.0))
+    assert not study.budget.allows("friction")
+    stage("calibrate", (study, "base", ["a note"]))
+    stage("screen", screening)
+    stage("search", "found")
+    stage("choose", "chosen")
+    stage("lateness", "told")
+    stage("gate", "gated")
+    stage("settle", ("all told", "settled"))
+    stage("judge", "judged")
+    stage("with_systematic", "as unsure as it is")
+    settings = Settings(seed=7)
+    made = conclude("bench", "twin", [2], "nominal", settings, "progress")  # type: ignore[arg-type]
+    assert got == {
+        "calibrate": ("bench", "twin", [2], "nominal", settings, "progress"),
+        "screen": (study, "base", 7),
+        "search": (study, "base", "patterns", "bars"),
+        "choose": (study, "found", "bars"),
+        "lateness": (study, "chosen"),
+        "gate": (study, "told", screening),
+        "settle": (study, "told", "gated", "bars"),
+        "judge": (study, "all told", "settled", "bars"),
+        "with_systematic": (study, "judged", "patterns"),
+    }
+    assert (made.context, made.found, made.gated, made.judged) == (study, "all told", "settled", "as unsure as it is")
+    assert made.notices[0] == "a note"
+    assert "not tried: friction" in made.notices[1]
+
+
+def test_what_was_measured_on_sealed_trials_is_not_there() -> None:
+    day = bench(bench_day("default", np.random.default_rng(0)))
+    hidden = blind(day, [1, 4])
+    assert [k for k, y in enumerate(hidden.measured) if np.isnan(y).all()] == [1, 4]
+    assert all(np.isfinite(y).all() for y in day.measured)
+    assert hidden.inputs == day.inputs

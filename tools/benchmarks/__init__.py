@@ -1,0 +1,1 @@
+"""Benchmarks by theme: diagnosis, solvers, shape, control, tasks, viewer, hardware."""

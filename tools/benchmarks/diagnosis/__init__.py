@@ -1,0 +1,1 @@
+"""Benchmarks of the diagnosis on days of the independent simulators."""

@@ -1,0 +1,1 @@
+"""Public data of real robots, before and after."""

@@ -1,0 +1,1 @@
+"""Benchmarks of shape estimation and shape control."""

@@ -1,0 +1,1 @@
+"""Benchmarks of the solvers: speed, convergence, agreement with independent formulations."""

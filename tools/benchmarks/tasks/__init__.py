@@ -1,0 +1,1 @@
+"""Benchmarks of environments, policies and the hand's tasks."""

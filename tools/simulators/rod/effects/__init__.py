@@ -1,0 +1,18 @@
+"""What a real bench has and the robot's description has not; one law per file, found by its `id`."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+
+from tools.simulators.rod.effects.effect import Effect, Situation
+
+
+def all_effects() -> dict[str, type[Effect]]:
+    """Every effect by identifier; `in_catalogue` tells whether the twin's catalogue names it."""
+    for module in pkgutil.iter_modules(__path__, __name__ + "."):
+        importlib.import_module(module.name)
+    return {kind.id: kind for kind in sorted(Effect.__subclasses__(), key=lambda kind: kind.id)}
+
+
+__all__ = ["Effect", "Situation", "all_effects"]

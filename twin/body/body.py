@@ -1,0 +1,157 @@
+"""Interface of a robot's body: the channels that may drive it, the signals it shows, and the changes that effects make.
+
+The mechanics (hinges, nodes, a drum) are hidden behind it. A family (`twin.robots.family`) builds bodies and their solvers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from twin.body.signals import Drive
+from twin.foundation.errors import DataError
+from twin.foundation.parameters import Size
+
+ROPE_FEATURES = frozenset({"rope"})  # of a body whose tendons may bed in and whose motors may stall
+
+
+@dataclass(frozen=True)
+class Port:
+    """A channel that may drive a body.
+
+    One SI unit of it gives each tendon `tendon_gains` (n_tendon,) SI: 1 for the tendon's own tension, m/rad for a drum's angle.
+    """
+
+    channel: str
+    drive: Drive
+    tendon_gains: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Sense:
+    """A channel that a body can show, as its place in `Signals.group(group)`; with `required_drive` only if its tendon has it."""
+
+    group: str
+    index: int
+    axis: int = 0
+    required_drive: Drive | None = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The markers' frame: reported = R(turn) x + shift, x in the base frame, turn a rotation vector (3,), shift (3,) m.
+
+    Both are zero where the camera is registered to the base frame; a robot that never was has them as parameters.
+    """
+
+    turn: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @staticmethod
+    def from_values(values: Mapping[str, float]) -> Frame:
+        """Build the frame from a robot's parameters frame.turn_x, ..., frame.shift_z; missing ones are zero."""
+        turn, shift = (np.array([values.get(f"frame.{kind}_{a}", 0.0) for a in "xyz"]) for kind in ("turn", "shift"))
+        return Frame(turn, shift)
+
+    def to_marker_frame(self, points: np.ndarray) -> np.ndarray:
+        """Transform points (..., 3) m from the base frame to the markers' frame."""
+        if not (self.turn.any() or self.shift.any()):
+            return points
+        return points @ Rotation.from_rotvec(self.turn).as_matrix().T + self.shift
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A robot as an editable MuJoCo model.
+
+    `ports` holds, for each drive, the channels it may be driven through; `dynamic_drives` are the drives that its dynamics accept.
+    `senses` are the channels it can show. `load_channels` maps input channels that load it to fields of `Loads`. `antagonists` is
+    as in `Signals`, `frame` is the markers' frame, `tendon_sites` are the sites each tendon passes, base to tip, `marker_sites`
+    those of the markers. `features` are what effects need to act on:
+
+        weight, elasticity (one stiffness for all of it), markers, load cells, strain sensors, antagonists
+        rope          tendons may bed in, motors may stall    planes       `set_bending_anisotropy` works
+        length        `set_stiffness_gradient` works          rest shape   `set_rest_curvature` works
+        holes         `move_tendon_holes` works               surface      may touch obstacles
+        viscosity     may creep                               skin         compared with clouds (`Problem.seen`)
+        hanging zero  lengths count from where it hangs, not from a straight body
+    """
+
+    spec: mujoco.MjSpec
+    n_tendon: int
+    features: frozenset[str]
+    ports: tuple[tuple[Port, ...], ...]
+    senses: Mapping[str, Sense]
+    dynamic_drives: frozenset[Drive] = frozenset({Drive.TENSION})
+    load_channels: Mapping[str, str] = field(default_factory=dict)
+    antagonists: bool = False
+    frame: Frame = field(default_factory=Frame)
+    tendon_sites: tuple[tuple[str, ...], ...] = ()
+    marker_sites: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> Size:
+        """Its size relative to the reference robot, for which effects' numbers are written; 1 for a body without a rod."""
+        return Size()
+
+    def first_mode_frequency(self) -> float:
+        """Return the frequency (Hz) of the first mode, a scale for rates; infinite for a body that only statics describes."""
+        return math.inf
+
+    def set_bending_anisotropy(self, along: float, across: float) -> None:
+        """Change EI_x to EI_x (1 + along) and EI_y to EI_y (1 - along), with sqrt(EI_x EI_y) across coupling them.
+
+        As the other changes: before the body is compiled. Raises DataError for a body that cannot be changed so.
+        """
+        raise self._unchangeable("bending planes")
+
+    def set_stiffness_gradient(self, slope: float) -> None:
+        """Multiply all stiffnesses by 1 + slope (s/L - 1/2), s the distance from the base."""
+        raise self._unchangeable("stiffness along its length")
+
+    def set_rest_curvature(self, about_x: float, about_y: float, slope: float) -> None:
+        """Add a rest curvature (1/m) about x and y, times 1 + slope (s/L - 1/2)."""
+        raise self._unchangeable("rest shape")
+
+    def move_tendon_holes(self, tendon: int, angle: float, further: float) -> None:
+        """Move all holes of a tendon (from 0) about the axis by `angle` (rad) and away from it by `further` (m)."""
+        raise self._unchangeable("tendon holes")
+
+    def _unchangeable(self, what: str) -> DataError:
+        return DataError(f"a body of kind {type(self).__name__} has no {what} to change; remove the effect that changes it")
+
+
+def tendon_ports(n: int, resistance: float = 1.0) -> tuple[tuple[Port, ...], ...]:
+    """Return the ports of n tendons: tension, displacement, and current and voltage of an SMA spring of `resistance` (ohm)."""
+    return tuple(
+        (
+            Port(f"tendon_{i}_tension", Drive.TENSION, tuple(gains)),
+            Port(f"tendon_{i}_displacement", Drive.DISPLACEMENT, tuple(gains)),
+            Port(f"sma_{i}_current", Drive.CURRENT, tuple(gains)),
+            Port(f"sma_{i}_voltage", Drive.CURRENT, tuple(gains / resistance)),
+        )
+        for i, gains in enumerate(np.eye(n), 1)
+    )
+
+
+def tendon_senses(n: int) -> dict[str, Sense]:
+    """Return the channels that n tendons and the SMA springs that pull them can show."""
+    senses = {}
+    for i in range(1, n + 1):
+        senses |= {
+            f"tendon_{i}_tension": Sense("tension", i - 1),
+            f"tendon_{i}_displacement": Sense("displacement", i - 1),
+            f"sma_{i}_temperature": Sense("temperature", i - 1, required_drive=Drive.CURRENT),
+            f"sma_{i}_resistance": Sense("resistance", i - 1, required_drive=Drive.CURRENT),
+        }
+    return senses
+
+
+def marker_senses(names: list[str]) -> dict[str, Sense]:
+    """Return the channels of markers (or disks, or the tip), given in the order of `Signals.markers`."""
+    return {f"{name}_{a}": Sense("marker", m, k) for m, name in enumerate(names) for k, a in enumerate("xyz")}

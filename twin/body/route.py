@@ -1,0 +1,52 @@
+"""Properties of tendons between drive and body (friction, stretch, play), and the delayed strain of creep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Friction of the joint that antagonists turn."""
+
+    torque: float = 0.0  # N m, at every rate
+    presliding: float = 1e-2  # rad, from sticking to sliding
+    breakaway: float = 0.0  # N m, added at rest
+    stribeck: float = 0.2  # rad/s, beyond which the breakaway torque fades
+    viscous: float = 0.0  # N m s/rad
+
+    def friction_torque(self, rate: np.ndarray | float) -> np.ndarray:
+        """Return the friction torque (n,) N m at rates (n,) rad/s of either sign."""
+        rate = np.abs(rate)
+        return self.torque + self.breakaway * np.exp(-((rate / self.stribeck) ** 2)) + self.viscous * rate
+
+
+@dataclass(frozen=True)
+class Route:
+    """The properties of the tendons between drive and body, as the effects in force set them."""
+
+    mu: float = 0.0  # friction coefficient
+    presliding: float = 4e-4  # m of travel, from sticking to sliding
+    stretch: float = 0.0  # m/N
+    bedding: float = 0.0  # m by which a tendon beds in
+    bedding_tension: float = 1.0  # N over which it beds in
+    bearing: Bearing = field(default_factory=Bearing)
+    rest_bend_share: float = 0.0  # of its rest bend that the body had when SMA springs were put on
+    stall_tension: float = np.inf  # N at which a motor that holds a tendon at a length gives way
+    initial_stretch_share: float = 0.0  # of the stretch under the springs' first tension that was there when they were put on
+    backlash: tuple[float, ...] = ()  # m each way of each tendon before its SMA spring follows
+    crossing_travel: tuple[float, ...] = (1e-4,)  # m over which the backlash is crossed: each tendon's, or one for all
+
+    def elongation(self, tension: np.ndarray) -> np.ndarray:
+        """Return the elongation (m) of a tendon under a tension (N)."""
+        return self.stretch * tension + self.bedding * -np.expm1(-tension / self.bedding_tension)
+
+
+@dataclass(frozen=True)
+class Creep:
+    """Delayed strain: amplitude (delayed over instant strain) and retardation time (s) of each element."""
+
+    amplitude: tuple[float, ...] = ()
+    time: tuple[float, ...] = ()

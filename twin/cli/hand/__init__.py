@@ -1,0 +1,1 @@
+"""Commands for the tasks of a hand."""

@@ -1,0 +1,1 @@
+"""Commands about robots and effects."""

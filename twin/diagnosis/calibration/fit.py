@@ -1,0 +1,399 @@
+"""The robot's own uncertain parameters, and those of effects in force, fitted to the trials set aside for fitting.
+
+Minimises  sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2  over x, the parameters in units of their `step`, within bounds:
+Gauss-Newton on derivatives by finite differences. A difference costs a fraction of a prediction, because a
+changed twin is solved from the equilibria and tangents of the unchanged one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from joblib import Parallel, delayed
+from scipy.optimize import lsq_linear
+
+from twin.body import SOLVE_TOLERANCE, Drive
+from twin.diagnosis.calibration.fisher_information import scatter, solve, unidentifiable
+from twin.diagnosis.noise.whitening import Whitener
+from twin.effects import Effect, effect_class
+from twin.effects.base.scaling import scaled_effect, scaled_parameters
+from twin.foundation.errors import SolveError
+from twin.foundation.parameters import FittedValue, Parameter
+from twin.prediction.prepared import PreparedRecording
+from twin.prediction.simulate import SolveOptions, Trace, iterate_traces
+from twin.prediction.twin import Twin
+from twin.robots import Robot
+
+ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
+NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
+BOUND = 1e-3  # of a parameter's range: closer to an end of it, it stands there
+STEPS = 12  # at most, of a fit
+TRUSTED = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
+# Of an effect's amplitude: what two codes of one law make of it. On the first 69 days of `tools.benchmarks.diagnosis.attribution --seed 70000` they were
+# off by 0.5 to 2 % where noise and the trials' disagreement gave errors of 0.2 to 0.7 %.
+LAW = 0.02
+UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
+
+Unsolved = Literal["raise", "zeros"]
+
+
+@dataclass(frozen=True)
+class Free:
+    """One parameter a fit may move: of the robot (`effect` None) or of an effect."""
+
+    effect: str | None
+    parameter: Parameter
+
+    @property
+    def label(self) -> str:
+        return self.parameter.name if self.effect is None else f"{self.effect}.{self.parameter.name}"
+
+
+@dataclass(frozen=True)
+class Model:
+    """A twin and which of its parameters are free."""
+
+    twin: Twin
+    free: tuple[Free, ...]
+
+    @staticmethod
+    def base(robot: Robot, twin: Twin | None = None) -> Model:
+        """The robot as described with its nuisance parameters free, and what is uncertain of the effects it is known to have."""
+        twin = twin or Twin.of(robot)
+        known = {e.id for e in twin.effects}
+        free = (*(Free(None, p) for p in robot.nuisance), *(Free(e, p) for e, p in robot.uncertain if e in known))
+        return Model(twin, free)
+
+    def value(self, free: Free) -> float:
+        if free.effect is None:
+            return float(self.twin.values.get(free.parameter.name, free.parameter.value))
+        return next(e for e in self.twin.effects if e.id == free.effect)[free.parameter.name]
+
+    def vector(self) -> np.ndarray:
+        """Free parameters (n_free,) in units of their steps."""
+        return np.array([self.value(f) / f.parameter.step for f in self.free])
+
+    def at(self, x: np.ndarray) -> Model:
+        """The same model with its free parameters at x (in steps)."""
+        values = dict(self.twin.values)
+        effects: dict[str, dict[str, float]] = {e.id: dict(e.values) for e in self.twin.effects}
+        for f, v in zip(self.free, x, strict=True):
+            target = values if f.effect is None else effects[f.effect]
+            target[f.parameter.name] = float(np.clip(v * f.parameter.step, f.parameter.low, f.parameter.high))
+        built = tuple(type(e)(effects[e.id], e.n_tendon) for e in self.twin.effects)
+        return Model(replace(self.twin, values=values, effects=built), self.free)
+
+    def with_effect(self, identifier: str, values: Mapping[str, float], names: Sequence[str], n_tendon: int) -> Model:
+        """This model plus an effect, its named parameters free."""
+        law = effect_class(identifier)
+        table = {p.name: p for p in scaled_parameters(law, n_tendon, self.twin.robot.size)}
+        effects = (*self.twin.effects, scaled_effect(law, values, n_tendon, self.twin.robot.size))
+        return Model(replace(self.twin, effects=effects), (*self.free, *(Free(identifier, table[n]) for n in names)))
+
+    def without_effect(self, identifier: str) -> Model:
+        effects = tuple(e for e in self.twin.effects if e.id != identifier)
+        return Model(replace(self.twin, effects=effects), tuple(f for f in self.free if f.effect != identifier))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A model's prediction of the fitted trials: traces by trial, raw residuals (n_k, n_output) SI, whitened residual flat (n,)."""
+
+    model: Model
+    traces: Mapping[int, Trace]
+    raw: list[np.ndarray]
+    z: np.ndarray
+
+
+class Objective:
+    """Residuals and derivatives of models on the listed trials of a bench, white under `whitener`."""
+
+    def __init__(self, prepared: PreparedRecording, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
+        self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
+        self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
+
+    def of(self, which: Sequence[int]) -> Objective:
+        """The same of some of its trials alone, by their positions."""
+        return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
+
+    def predict(
+        self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
+    ) -> tuple[dict[int, Trace], list[np.ndarray]]:
+        way = SolveOptions(near or {}, keep, once, SOLVE_TOLERANCE if keep else ROUGH)
+        traces = dict(iterate_traces(twin, self.prepared, self.trials, way))
+        return traces, [traces[k].outputs(twin, self.prepared) for k in self.trials]
+
+    def evaluate(self, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation:
+        found = self.within(np.inf, model, near)
+        assert found is not None
+        return found
+
+    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+        """The evaluation of a model whose |z|^2 is `most` at most, else None, without a look at the trials that are left then."""
+        at, traces = {k: i for i, k in enumerate(self.trials)}, {}
+        raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
+        n = 1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))  # a body that creeps remembers the trials before
+        shares = [self.trials[i::n] for i in range(n)]
+        total = np.zeros(n)
+
+        def solve(share: int) -> None:
+            for k, trace in iterate_traces(model.twin, self.prepared, shares[share], SolveOptions(near or {}, keep=True)):
+                traces[k] = trace
+                if (i := at.get(k)) is not None:
+                    raw[i] = self.prepared.measured[k] - trace.outputs(model.twin, self.prepared)
+                    z[i] = self.whitener.trial(i, raw[i]).ravel()
+                    total[share] += float(z[i] @ z[i])
+                    if total.sum() > most:
+                        return
+
+        Parallel(n_jobs=n, prefer="threads", require="sharedmem")(delayed(solve)(s) for s in range(n))
+        return None if total.sum() > most else Evaluation(model, dict(sorted(traces.items())), raw, np.concatenate(z))
+
+    def cut_off(self, twin: Twin) -> np.ndarray:
+        """Its square is what the laws cut off of the readings' noise near slack (`Whitener.cut_off`), flat (n_row n_tendon,)."""
+        pulled, cut = self.prepared.driven_by(Drive.TENSION), []
+        for i, k in enumerate(self.trials):
+            tension = np.where(pulled, twin.effect_chain.command(self.prepared.inputs[k].signals).tension, np.inf)
+            cut.append(np.sqrt(self.whitener.clipped_input_noise(i, tension)).ravel())
+        return np.concatenate(cut)
+
+    def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
+
+    def columns(
+        self, at: Evaluation, models: Sequence[tuple[Model, float]], *, once: bool = False, unsolved: Unsolved = "raise"
+    ) -> np.ndarray:
+        """White change of the residual per unit, (n, n_model), for neighbouring models and the size of their difference;
+        with `once` to first order in it. What has no equilibrium raises SolveError, or has a column of `"zeros"`."""
+
+        def column(model: Model, size: float) -> np.ndarray:
+            if _same_simulation(at.model.twin, model.twin):
+                predicted = [at.traces[k].outputs(model.twin, self.prepared) for k in self.trials]
+            else:
+                try:
+                    predicted = self.predict(model.twin, at.traces, once=once)[1]
+                except SolveError:
+                    if unsolved == "raise":
+                        raise
+                    return np.zeros(at.z.size)
+            raw = [self.prepared.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]
+            return self.white(raw) / size
+
+        with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
+            done: Any = parallel(delayed(column)(m, s) for m, s in models)
+        return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
+
+    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
+        """dz/dx (n, len(which)) for the listed free parameters, x in steps."""
+        x = at.model.vector()
+        neighbours = []
+        for i in which:
+            p = at.model.free[i].parameter
+            size = NUDGE if (x[i] + NUDGE) * p.step <= p.high else -NUDGE
+            moved = x.copy()
+            moved[i] += size
+            neighbours.append((at.model.at(moved), size))
+        return self.columns(at, neighbours, once=True)
+
+
+def _same_simulation(a: Twin, b: Twin) -> bool:
+    """Whether two twins differ in what sensors report of outputs only, so that one simulation serves both."""
+
+    def acting(t: Twin) -> list[Effect]:
+        return [e for e in t.effects if e.acts_on_robot]
+
+    return a.values == b.values and acting(a) == acting(b)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model. `J` (n, n_free) whitened derivatives at the solution, x in steps; `cost` = |z|^2 + prior terms; `systematic`
+    (n_free,) SI what effects that the model lacks may have put into its parameters, where that was asked."""
+
+    evaluation: Evaluation
+    J: np.ndarray
+    cost: float
+    systematic: np.ndarray | None = None
+
+    @property
+    def model(self) -> Model:
+        return self.evaluation.model
+
+    @property
+    def z(self) -> np.ndarray:
+        return self.evaluation.z
+
+    def information(self) -> np.ndarray:
+        """Posterior information (n_free, n_free) in steps: J'J plus that of the priors."""
+        return self.J.T @ self.J + np.diag(prior_weight(self.model) ** 2)
+
+    def std(self) -> np.ndarray:
+        """Standard errors (n_free,) in SI: by the noise, or by how far trials disagree, whichever is more. A law that is not
+        quite the robot's errs alike all through a trial, and from trial to trial otherwise."""
+        noise, free = self._by_noise(), ~self.at_bound()
+        step = np.array([f.parameter.step for f in self.model.free])
+        J, each = self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
+        if len(each) > 1 and free.any():
+            parts = [(J[a:b].T @ J[a:b], J[a:b].T @ self.z[a:b]) for a, b in each]
+            noise[free] = np.maximum(noise[free], np.sqrt(scatter(parts, self.information()[np.ix_(free, free)])) * step[free])
+        return noise
+
+    def _by_noise(self) -> np.ndarray:
+        """(n_free,) in SI, widened where the residual is larger than the noise it was divided by."""
+        inflation = max(1.0, float(self.z @ self.z) / max(self.z.size - len(self.model.free), 1))
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information())), 0.0) * inflation)
+        return spread * np.array([f.parameter.step for f in self.model.free])
+
+    def correlation(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """Labels of the free parameters that the data or priors tell, and how their errors go together, (p, p): the inverse
+        information, scaled to a unit diagonal."""
+        covariance, told = np.linalg.pinv(self.information()), ~unidentifiable(self.information())
+        size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        labels = tuple(f.label for f, t in zip(self.model.free, told, strict=True) if t)
+        return labels, (covariance / np.outer(size, size))[np.ix_(told, told)]
+
+    def effective_parameters(self) -> float:
+        """How many parameters the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
+        data = self.J.T @ self.J
+        return float(np.trace(solve(self.information(), data)))
+
+    def fitted(self, effect: str | None) -> dict[str, FittedValue]:
+        """Values and standard errors of the robot's (None) or an effect's free parameters; no error where nothing tells. Amplitudes
+        of effects are no better known than the form of a law, `LAW`, which no data of one robot tell."""
+        blind = unidentifiable(self.information())
+        spread = self.std() if self.systematic is None else np.hypot(self.std(), self.systematic)
+        return {
+            f.parameter.name: FittedValue(self.model.value(f), None if b else float(np.hypot(s, self._form(f))), f.parameter.unit)
+            for f, s, b in zip(self.model.free, spread, blind, strict=True)
+            if f.effect == effect
+        }
+
+    def _form(self, free: Free) -> float:
+        """What the form of a law is good for, of its amplitude (SI), which is counted from OFF or from zero, whichever is less (a
+        limit that is never reached is OFF); nothing of where and when it acts, or of the robot's own."""
+        law = next((e for e in self.model.twin.effects if e.id == free.effect), None)
+        if law is None or free.parameter.name in law.inactive_when_off:
+            return 0.0
+        value = self.model.value(free)
+        return LAW * min(abs(value - free.parameter.value), abs(value))
+
+    def at_bound(self) -> np.ndarray:
+        """Which free parameters (n_free,) stand at an end of their range."""
+        at = [(self.model.value(f), f.parameter) for f in self.model.free]
+        return np.array([min(x - p.low, p.high - x) < BOUND * (p.high - p.low) for x, p in at], bool)
+
+    def unfixed(self) -> list[str]:
+        """Labels of the parameters the data do not fix: their standard error stays near their prior's, or nothing tells them, or
+        not from each other."""
+        out = []
+        for f, s, b in zip(self.model.free, self._by_noise(), unidentifiable(self.information()), strict=True):
+            if b or (f.parameter.std is not None and s > UNFIXED * f.parameter.std):
+                out.append(f.label)
+        return out
+
+
+def prior_weight(model: Model) -> np.ndarray:
+    """1 / std in steps, zero where nothing is believed beforehand."""
+    return np.array([0.0 if f.parameter.std is None else f.parameter.step / f.parameter.std for f in model.free])
+
+
+def prior_pull(model: Model) -> np.ndarray:
+    """Half the gradient (n_free,) of the priors' terms, per step."""
+    prior = np.array([f.parameter.value / f.parameter.step for f in model.free])
+    return prior_weight(model) ** 2 * (model.vector() - prior)
+
+
+def fit(
+    objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, refresh: bool = False,
+    tolerance: float = 1e-5, worth: float = 0.0, beat: float = np.inf,
+) -> Fit:  # fmt: skip
+    """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
+
+    Derivatives for the robot's own parameters, nearly linear, are taken once, or come as `J`, the whitened columns (n, m) of the
+    first m free parameters from a neighbouring fit; those for effects are taken anew at every step. `refresh` takes them all again
+    at the solution, for standard errors and screening. A fit ends where a step falls by less than `tolerance` of its cost, or by
+    less than `worth`. One that would not `beat` a cost though all further steps fell by as much
+    as its last ends there. Raises SolveError where the model cannot be solved at its start.
+
+    Laws of load cells are fitted to |z|^2 and the noise that they cut off near slack: else they lean to where tendons at rest fall
+    silent.
+    """
+    steps = np.array([f.parameter.step for f in model.free])
+    low = np.array([f.parameter.low for f in model.free]) / steps
+    high = np.array([f.parameter.high for f in model.free]) / steps
+    prior = np.array([f.parameter.value for f in model.free]) / steps
+    weight = prior_weight(model) ** 2
+    cells = {e.id for e in model.twin.effects if "load cells" in e.needs}
+    silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
+
+    def believed(x: np.ndarray) -> float:
+        return float(weight @ (x - prior) ** 2)
+
+    def cut_off(x: np.ndarray) -> np.ndarray:
+        return objective.cut_off(model.at(x).twin) if silencing else np.zeros(0)
+
+    def besides(x: np.ndarray) -> float:
+        """What is fitted besides |z|^2."""
+        return believed(x) + float(np.sum(cut_off(x) ** 2))
+
+    def cost(e: Evaluation) -> float:
+        return float(e.z @ e.z) + besides(e.model.vector())
+
+    at = objective.evaluate(model, near.traces if near else None)
+    fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
+    moving = [i for i, f in enumerate(model.free) if f.effect is not None]
+    columns = np.zeros((at.z.size, len(model.free)))
+    if J is not None:
+        columns[:, : J.shape[1]] = J
+    columns[:, fixed] = objective.jacobian(at, fixed)
+    now, damping = cost(at), 1e-4
+    for left in range(STEPS - 1, -1, -1):
+        columns[:, moving] = objective.jacobian(at, moving)
+        x = at.model.vector()
+        cut = cut_off(x)
+        D = np.zeros((cut.size, x.size))
+        for i in silencing:
+            D[:, i] = (cut_off(x + NUDGE * (np.arange(x.size) == i)) - cut) / NUDGE
+        H = columns.T @ columns + D.T @ D + np.diag(weight)
+        g = columns.T @ at.z + D.T @ cut + weight * (x - prior)
+        better, whole, enough = None, damping, max(tolerance * now, worth)
+        while better is None and damping < 1e4:
+            d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
+            foretold = -float(2.0 * g @ d + d @ H @ d)
+            if damping > whole and foretold < enough:  # a step that failed is not shortened until it is worth nothing
+                break
+            better = _improved(objective, at, x + d, now - besides(x + d))
+            damping *= 1.0 if better else 10.0
+        if better is None:
+            break
+        fall, at, now = now - cost(better), better, cost(better)
+        if fall > TRUSTED * foretold:
+            damping = max(0.1 * damping, 1e-6)
+        if fall < enough or now - left * fall > beat:
+            break
+    if refresh:
+        columns = objective.jacobian(at, range(len(model.free)))
+    return Fit(at, columns, float(at.z @ at.z) + believed(at.model.vector()))
+
+
+def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """argmin 1/2 d'Hd + g'd within low <= d <= high."""
+    L = np.linalg.cholesky(H + 1e-12 * np.trace(H) * np.eye(len(g)))
+    d = -solve(H, g)
+    if np.all((d >= low) & (d <= high)):
+        return d
+    room = np.maximum(high - low, 1e-9)
+    return lsq_linear(L.T, -np.linalg.solve(L, g), bounds=(low, low + room), method="bvls").x
+
+
+def _improved(objective: Objective, at: Evaluation, x: np.ndarray, now: float) -> Evaluation | None:
+    """The evaluation at x if its |z|^2 is below `now`, else None; a model without equilibrium is not better."""
+    try:
+        moved = objective.within(now, at.model.at(x), at.traces)
+    except SolveError:
+        return None
+    return moved if moved is not None and float(moved.z @ moved.z) < now else None

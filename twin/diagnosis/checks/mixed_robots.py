@@ -1,0 +1,69 @@
+"""Do the trials come from one robot? Two groups of trials, each with values of its own for the robot's parameters, against one.
+
+To first order a group G of trials that may move the robot's parameters takes fall(G) = g'(sum J_k'J_k + P)^-1 g, g = sum J_k'z_k,
+off its |z|^2. Trials change sides while the sum of both falls grows (a two-means search from several starts).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from twin.diagnosis.calibration.fisher_information import solve
+from twin.diagnosis.calibration.fit import Fit, prior_weight
+from twin.diagnosis.thresholds import GROUP, TURNS, WORTH
+from twin.prediction.prepared import PreparedRecording
+
+
+@dataclass(frozen=True)
+class MixedRobots:
+    """Two groups of trials (indices into the bench) that want different robots, and what that takes off |z|^2, the price of the
+    second robot paid."""
+
+    one: tuple[int, ...]
+    other: tuple[int, ...]
+    fall: float
+
+
+def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit) -> MixedRobots | None:
+    """The two groups, the larger first; None where one robot does. `fitted` to the listed trials, its residuals in their order."""
+    own = [i for i, f in enumerate(fitted.model.free) if f.effect is None]
+    rows = np.concatenate([[0], np.cumsum([len(prepared.inputs[k].time) * len(prepared.outputs) for k in trials])])
+    J, z = fitted.J[:, own], fitted.z.ravel()
+    H = np.array([J[a:b].T @ J[a:b] for a, b in pairwise(rows)])
+    g = np.array([J[a:b].T @ z[a:b] for a, b in pairwise(rows)])
+    P = np.diag(prior_weight(fitted.model)[own] ** 2) + 1e-9 * np.eye(len(own))
+
+    def shift(side: np.ndarray) -> np.ndarray:
+        return solve(H[side].sum(axis=0) + P, g[side].sum(axis=0))
+
+    def fall(side: np.ndarray) -> float:
+        return float(g[side].sum(axis=0) @ shift(side))
+
+    def costs(move: np.ndarray) -> np.ndarray:
+        return np.einsum("i,kij,j->k", move, H, move) - 2.0 * g @ move
+
+    best, sides = 0.0, None
+    for seed in range(len(trials)):
+        # From each trial in turn: with the half of the others that its own robot suits best.
+        start = costs(solve(H[seed] + P, g[seed]))
+        side = start <= np.median(start)
+        for _ in range(TURNS):
+            if not GROUP <= side.sum() <= len(trials) - GROUP:
+                break
+            again = costs(shift(side)) < costs(shift(~side))
+            if (again == side).all():
+                break
+            side = again
+        if GROUP <= side.sum() <= len(trials) - GROUP and (gain := fall(side) + fall(~side)) > best:
+            best, sides = gain, side
+    n = int(np.count_nonzero(z))
+    # As many parameters more, and a choice of sides for every trial.
+    worth = best - fall(np.ones(len(trials), bool)) - len(own) * np.log(n) - 2.0 * len(trials) * np.log(2.0)
+    if sides is None or worth < WORTH**2 * n:
+        return None
+    one, other = (tuple(trials[int(k)] for k in np.flatnonzero(s)) for s in (sides, ~sides))
+    return MixedRobots(one, other, worth) if len(one) >= len(other) else MixedRobots(other, one, worth)

@@ -1,0 +1,51 @@
+"""Stage `look`: the robot as described held against the data, and what they may mean otherwise, before anything is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnosis.checks.loops import Loops, loops
+from twin.diagnosis.checks.suspicions import Suspicion, suspicions
+from twin.diagnosis.checks.suspicions.case import beginnings
+from twin.diagnosis.diagnosis import Settings
+from twin.diagnosis.fit_context import Progress, silent
+from twin.diagnosis.split import blind, split
+from twin.diagnosis.thresholds import FEW
+from twin.foundation.errors import SolveError
+from twin.prediction.prepared import PreparedRecording
+from twin.prediction.simulate import simulate, unstable_starts
+from twin.prediction.twin import Twin
+
+
+@dataclass(frozen=True)
+class DataPreview:
+    """The bench with notices of unstable starts, the sealed trials (none of fewer than `FEW`), the prediction (n_k, n_output) of
+    the twin as described, the suspicions, and the loops of pulling and releasing in the trials that are not sealed."""
+
+    prepared: PreparedRecording
+    held_out: tuple[int, ...]
+    nominal: tuple[np.ndarray, ...]
+    suspicions: tuple[Suspicion, ...]
+    loops: Loops
+
+
+def preview_data(prepared: PreparedRecording, twin: Twin, settings: Settings, progress: Progress = silent) -> DataPreview:
+    """What is known before the first fit. Raises SolveError, with what may be wrong, where the twin as described has no
+    equilibrium."""
+    held_out = split(prepared, settings.seed)[1] if len(prepared.inputs) >= FEW else []
+    progress("nominal prediction")
+    try:
+        simulate(twin, beginnings(prepared))
+        traces = simulate(twin, prepared)
+    except SolveError as error:
+        found = suspicions(prepared, twin, held_out, None)
+        raise SolveError("\n".join([str(error), *(f"Suspicion: {s.words}. Change: {s.change}." for s in found)])) from None
+    nominal = tuple(t.outputs(twin, prepared) for t in traces)
+    unstable = tuple(f"{name}: unstable start, its shape is one of several" for name in unstable_starts(prepared, traces))
+    progress("what the files may mean otherwise")
+    found = suspicions(prepared, twin, held_out, nominal)
+    return DataPreview(
+        replace(prepared, notices=(*prepared.notices, *unstable)), tuple(held_out), nominal, found, loops(blind(prepared, held_out))
+    )

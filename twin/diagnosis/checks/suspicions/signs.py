@@ -1,0 +1,76 @@
+"""Signs and directions: displacements paid out for pulled in, readings negated, gravity that points elsewhere or counts in g."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from twin.body import Drive
+from twin.diagnosis.checks.suspicions.case import Case, Suspicion, called
+from twin.diagnosis.checks.suspicions.units import best
+from twin.diagnosis.thresholds import EARTH
+from twin.prediction.prepared import Inputs
+
+
+def outputs(case: Case) -> Iterator[Suspicion]:
+    """Scalar outputs, channel by channel: the negated one fits. (Positions are looked at as a frame.)"""
+    nominal = case.as_is()
+    if nominal is None:
+        return
+    for group in dict.fromkeys(o.group for o in case.prepared.outputs if o.group != "marker"):
+        wrong = []
+        for j in case.columns(group):
+            measured = [np.where(np.arange(y.shape[1]) == j, -y, y) for y in case.prepared.measured]
+            turned = replace(case, prepared=replace(case.prepared, measured=tuple(measured)))
+            left = turned.better(case.error([j], nominal), turned.error([j], nominal), [j])
+            if left is not None:
+                wrong.append((left, case.prepared.outputs[j].channel))
+        if wrong:
+            names = ", ".join(c.name for _, c in wrong)
+            words = f"{names}: falls where the robot as described rises, and rises where it falls"
+            change = f"the columns {names} with the other sign (positive is pulled in, taut, counter-clockwise)"
+            yield Suspicion("sign", words, change, max(left for left, _ in wrong), group)
+
+
+def displacements(case: Case) -> Iterator[Suspicion]:
+    """Commanded displacements or angles of the other sign: as they stand no tendon ever pulls, or the wrong one does."""
+    of = np.array([d is Drive.DISPLACEMENT for d in case.prepared.drives])
+    if not of.any():
+        return
+    channels = [c for c, by in zip(case.prepared.drivers, of, strict=True) if by]
+    most = max(float(i.command[:, of].max()) for i in case.prepared.inputs)
+    pulls = "no tendon ever pulls: none is drawn in beyond the straight robot" if most <= 0 else "the wrong tendons pull"
+    change = f"the columns {called(channels)} with the other sign (positive is pulled in)"
+    tried = [("", lambda i: replace(i, command=np.where(of, -i.command, i.command)))]
+    yield from best(case, "sign", f"with {called(channels)} as they stand {pulls}", change, tried)
+
+
+def size(case: Case) -> Iterator[Suspicion]:
+    """Gravity in g, or in another unit."""
+    sizes = np.array([np.linalg.norm(i.loads.gravity) for i in case.prepared.inputs])
+    odd = sizes[(sizes > 0) & ((sizes < EARTH[0]) | (sizes > EARTH[1]))]
+    if odd.size:
+        words = f"gravity is {odd[0]:.4g} m/s^2 long, and on earth it is 9.78 to 9.83"
+        yield Suspicion("gravity size", words, f"gravity in m/s^2, {9.81 / odd[0]:.4g} times as long (or [0, 0, 0] for none)")
+
+
+def gravity(case: Case) -> Iterator[Suspicion]:
+    """Gravity along another axis or way."""
+    loads = [i.loads.gravity for i in case.prepared.inputs]
+    if any(not np.allclose(g, loads[0]) for g in loads):
+        ways = [("the other sign in every gravity", lambda i: replace(i, loads=replace(i.loads, gravity=-i.loads.gravity)))]
+    else:
+        size, axes = float(np.linalg.norm(loads[0])), [s * np.eye(3)[a] for a in range(3) for s in (1.0, -1.0)]
+        ways = [
+            (f"gravity = {(np.round(size * a, 3) + 0.0).tolist()}", lambda i, a=a: _under(i, size * a))
+            for a in axes
+            if size and not np.allclose(size * a, loads[0], atol=0.1 * size)
+        ]
+    words = f"under gravity = {(np.round(loads[0], 3) + 0.0).tolist()} m/s^2 the robot as described would not move as measured"
+    yield from best(case, "gravity direction", words, "{} (base frame, z from base to tip)", ways)
+
+
+def _under(i: Inputs, g: np.ndarray) -> Inputs:
+    return replace(i, loads=replace(i.loads, gravity=g))

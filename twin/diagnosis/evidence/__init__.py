@@ -1,0 +1,1 @@
+"""What a candidate is worth: first-order patterns, scores, predictions of trials left out."""

@@ -1,0 +1,110 @@
+"""Thresholds for the user's own design, from simulated data without any effect.
+
+With the robot's own parameters fitted, no-effect data leave white noise less what the parameters absorb:
+z = (1 - J (J'J + P)^-1 J') e, e ~ N(0, 1) where something was measured. Each draw is searched as the data are; the 99 % quantile of
+the largest statistic over all effects, regressors and frequencies (a Gumbel law fitted by its moments: few draws do) is what an
+effect must exceed. The floors guard against what no simulation from the model knows: that the model is slightly wrong.
+
+Drawn anew in every diagnosis: they depend on the data and the seed, on nothing that another run left behind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from twin.diagnosis.calibration.fisher_information import solve
+from twin.diagnosis.calibration.fit import Fit, prior_weight
+from twin.diagnosis.evidence.discrepancy import Spectrum
+from twin.diagnosis.evidence.first_order import Dictionary
+from twin.diagnosis.evidence.ranking import projected
+from twin.diagnosis.fit_context import FitContext
+from twin.diagnosis.thresholds import ACCEPT, ALONE, DRAWS, FAINT, GUMBEL_99, LEFT, LINE, MATERIAL
+
+
+@dataclass(frozen=True)
+class AcceptanceLimits:
+    """What counts on this design: evidence of an effect, its contribution (sigma), structure left (sigma), a spectral line (z).
+
+    `accuracy` (sigma) is what the twin's description is good for. What it gets wrong is a function of the pose, so that it bounds
+    contributions (`visible`) but not the part of them that depends on how a pose was reached (`material`).
+    """
+
+    accept: float = ACCEPT
+    material: float = MATERIAL
+    accuracy: float = 0.0
+    left: float = LEFT
+    line: float = LINE
+
+    @property
+    def visible(self) -> float:
+        """The least contribution (sigma) worth claiming of what the pose alone decides."""
+        return max(self.material, self.accuracy)
+
+    @property
+    def slight(self) -> float:
+        """Structure (sigma) that a description of this accuracy may leave beside right laws, as it may where none is found."""
+        return max(self.left, min(ALONE, self.accuracy))
+
+    @property
+    def faint(self) -> float:
+        """A line's bar where no effect was found whose law could leave one."""
+        return FAINT * self.line
+
+
+@dataclass(frozen=True)
+class NullDraws:
+    """What each no-effect set shows, (DRAWS,) each: evidence and contribution (sigma) of the effect that imitates it best,
+    structure (sigma), and its strongest spectral line (z)."""
+
+    gain: np.ndarray
+    moved: np.ndarray
+    left: np.ndarray
+    line: np.ndarray
+
+
+def acceptance_limits(context: FitContext, base: Fit, known: Dictionary, seed: int) -> AcceptanceLimits:
+    """The larger of floor and null quantile, each."""
+    d = draws(context, base, known, seed)
+    return AcceptanceLimits(
+        accept=max(ACCEPT, quantile(d.gain)),
+        material=max(MATERIAL, quantile(d.moved)),
+        left=max(LEFT, quantile(d.left)),
+        line=max(LINE, quantile(d.line)),
+    )
+
+
+def draws(context: FitContext, base: Fit, known: Dictionary, seed: int) -> NullDraws:
+    objective, evidence = context.objective, context.evidence
+    n, k = base.z.size, base.J.shape[1]
+    present = evidence.present.ravel()[:, None]
+    e = np.random.default_rng(seed).normal(size=(n, DRAWS)) * present
+    H = base.J.T @ base.J + np.diag(prior_weight(base.model) ** 2) + 1e-9 * np.eye(k)
+    z = (e - base.J @ solve(H, base.J.T @ e)) * present
+    X = np.concatenate([base.J, known.columns], axis=1)
+    A = projected(X, X, base)[k:, k:]
+    u = known.columns.T @ z
+    gain, fall = np.full(DRAWS, -np.inf), np.zeros(DRAWS)
+    for pattern in known.patterns:
+        i = np.array(pattern.where)
+        inner = A[np.ix_(i, i)]
+        falls = np.einsum("id,id->d", u[i], solve(inner + 1e-9 * max(np.trace(inner), 1e-12) * np.eye(len(i)), u[i]))
+        gain = np.maximum(gain, falls - len(i) * np.log(objective.n))
+        fall = np.maximum(fall, falls)
+    spectrum = Spectrum.of(objective.prepared, objective.trials)
+
+    def left(of: np.ndarray) -> tuple[float, float]:
+        smooth = evidence.discrepancy(of)
+        return smooth.size, spectrum.peak(of.reshape(smooth.mean.shape) - smooth.mean)[0]
+
+    found: Any = Parallel(n_jobs=objective.jobs, prefer="threads", require="sharedmem")(delayed(left)(column) for column in z.T)
+    size, line = np.array(list(found)).T
+    return NullDraws(gain, np.sqrt(fall / objective.n), size, line)
+
+
+def quantile(x: np.ndarray) -> float:
+    """The 99 % quantile of a Gumbel law with the moments of x."""
+    return float(np.mean(x) + GUMBEL_99 * np.std(x, ddof=1))

@@ -1,0 +1,147 @@
+"""A fitted model, what the evidence says of it, and its refits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnosis.calibration.fit import Fit, Model, fit
+from twin.diagnosis.checks.zero_jumps import of_robot
+from twin.diagnosis.evidence.discrepancy import Discrepancy
+from twin.diagnosis.fit_context import FitContext
+from twin.diagnosis.thresholds import LITTLE, ROUGHLY
+from twin.effects import FitStart, catalogue
+from twin.effects.base.scaling import scaled_extended_starts
+from twin.foundation.errors import SolveError
+
+EffectForms = tuple[tuple[str, str], ...]  # effect and its form, sorted; by these sets are told apart
+
+
+@dataclass(frozen=True)
+class ScoredModel:
+    """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, less the noise of
+    readings that the law keeps from the robot, `unheard` (`Study.unheard`), up to a constant."""
+
+    fit: Fit
+    score: float
+    discrepancy: Discrepancy
+    unheard: float = 0.0
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Of the robot, that is: not the zeros of this recording that jumped."""
+        return tuple(sorted(e.id for e in of_robot(self.fit.model.twin.effects)))
+
+    @property
+    def forms(self) -> EffectForms:
+        """The same with the form each effect has."""
+        free = {e: tuple(f.parameter.name for f in self.fit.model.free if f.effect == e) for e in self.effects}
+        return tuple((e, catalogue()[e].form(free[e])) for e in self.effects)
+
+    def forms_without(self, effect: str) -> EffectForms:
+        return tuple(law for law in self.forms if law[0] != effect)
+
+
+def score_model(context: FitContext, fitted: Fit) -> ScoredModel:
+    gain, discrepancy = context.evidence.log_likelihood_gain(fitted.z)
+    prior = fitted.cost - float(fitted.z @ fitted.z)
+    size = fitted.effective_parameters() * float(np.log(context.objective.n))
+    unheard = context.blocked_input_noise(fitted)
+    return ScoredModel(fitted, gain - unheard - prior - size, discrepancy, unheard)
+
+
+def with_effect_added(
+    context: FitContext, member: ScoredModel, effect: str, start: FitStart, beat: float = np.inf
+) -> ScoredModel | None:
+    """`member` with one effect more, fitted as far as it may `beat` a cost; None without equilibrium.
+
+    Amplitudes of either sign take a step before the shape that goes with them: what a shape does is in proportion to them, and
+    of a drift begun with the wrong sign the first step would end in any shape.
+    """
+    n_tendon, model, near = context.prepared.n_tendon, member.fit.model, member.fit.evaluation
+    values = dict(start.values)
+    try:
+        if signed := _signed(effect, start, n_tendon):
+            amplitudes = model.with_effect(effect, values, signed, n_tendon)
+            begun = fit(context.objective, amplitudes, near=near, J=member.fit.J, worth=np.inf)
+            values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
+            model, near = begun.model.without_effect(effect), begun.evaluation
+        model = model.with_effect(effect, values, start.free, n_tendon)
+        found = fit(context.objective, model, near=near, J=member.fit.J, tolerance=ROUGHLY, worth=LITTLE, beat=beat)
+        return score_model(context, found)
+    except SolveError:
+        return None
+
+
+def _signed(effect: str, start: FitStart, n_tendon: int) -> tuple[str, ...]:
+    """Of a start that frees a shape too, the amplitudes that may have either sign."""
+    law = catalogue()[effect]
+    if not set(start.free) & set(law.inactive_when_off):
+        return ()
+    table = {p.name: p for p in law.all_parameters(n_tendon)}
+    return tuple(n for n in start.free if n not in law.inactive_when_off and table[n].low < table[n].value)
+
+
+def with_extended_law(context: FitContext, found: ScoredModel, accept: float) -> ScoredModel:
+    """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it; where one is, one
+    that has all of that and more (springs each with its own).
+
+    Before other effects are added: what the plain law leaves would be taken for them.
+    """
+    n_tendon, parts = context.prepared.n_tendon, context.prepared.robot.build().features
+    for effect in found.effects:
+        richer = catalogue()[effect].extended_parameters
+        free = tuple(f.parameter.name for f in found.fit.model.free if f.effect == effect)
+        if not richer or not catalogue()[effect].extended_needs <= parts:
+            continue
+        plain, in_force = found, set(richer) & set(free)
+        law = next(e for e in plain.fit.model.twin.effects if e.id == effect)
+        predicted = [t.true for t in plain.fit.evaluation.traces.values()]
+        starts = scaled_extended_starts(law, predicted, context.prepared.robot.size)
+        starts = [s for s in starts if in_force <= set(s.free) and not set(s.free) <= set(free)]
+        if not starts:
+            continue
+        if not context.budget.allows(f"the fuller law of {effect}"):
+            continue
+        context.progress(f"fuller law of {effect}")
+        for start in starts:
+            values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
+            model = plain.fit.model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
+            try:
+                fuller = score_model(context, fit(context.objective, model, J=_own(plain.fit), tolerance=ROUGHLY, worth=LITTLE))
+            except SolveError:
+                continue
+            if fuller.score > max(found.score, plain.score + accept):
+                found = fuller
+    return found
+
+
+def refit_without(context: FitContext, base: ScoredModel, best: ScoredModel, effect: str) -> ScoredModel:
+    """The best set less one effect, everything else fitted again.
+
+    A robot fitted with the effect may have no equilibrium without it, where lengths are held: then from the base's robot, and where
+    that has none under the other effects, the base itself.
+    """
+    context.progress(f"without {effect}")
+    keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
+    model = best.fit.model.without_effect(effect)
+    as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
+    for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
+        try:
+            return score_model(context, fit(context.objective, start, J=J, worth=LITTLE))
+        except SolveError:
+            continue
+    return base
+
+
+def better(found: ScoredModel, than: ScoredModel) -> bool:
+    """Of two fits of the same effects. With the same parameters free they are minima of one cost, and the lower one is the fit."""
+    if set(found.fit.model.free) == set(than.fit.model.free):
+        return found.fit.cost < than.fit.cost
+    return found.score > than.score
+
+
+def _own(fitted: Fit) -> np.ndarray:
+    """Derivatives for the robot's own parameters, which come first."""
+    return fitted.J[:, [i for i, f in enumerate(fitted.model.free) if f.effect is None]]

@@ -1,0 +1,1 @@
+"""What is left, in words, and the experiment that would settle a doubt."""

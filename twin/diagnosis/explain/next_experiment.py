@@ -1,0 +1,157 @@
+"""The next experiment: the one trial, from a menu the robot can run, that best separates the two best explanations.
+
+T-optimality (Atkinson and Fedorov 1975): with both models fitted to today's data, T = min over B's parameters, held by their
+present covariance, of |W (y_A - y_B)|^2; T = 25 separates them by five standard errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from twin.body import Drive
+from twin.diagnosis.calibration.fisher_information import solve
+from twin.diagnosis.calibration.fit import Evaluation, Fit, Objective
+from twin.diagnosis.checks.zero_jumps import of_robot
+from twin.diagnosis.noise.model import Noise
+from twin.diagnosis.noise.whitening import Whitener
+from twin.diagnosis.thresholds import CLEAR, HEAVIEST, HELD, LEAST_LOAD, MOST_RUNS
+from twin.foundation.errors import SolveError
+from twin.measurements import Channel
+from twin.prediction.prepared import Inputs, Output, PreparedRecording
+
+_Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, what a's adds to it
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A trial in words and as commands, the separation T of one run of it, how many runs reach T = 25, and the sets of effects it
+    separates."""
+
+    words: str
+    trial: Inputs
+    separation: float
+    repeats: int
+    between: tuple[tuple[str, ...], tuple[str, ...]]
+
+
+def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
+    """Trials this robot could run, within the commands already used; payload up to three times as much, at most 30 g; of a jaw
+    load torques from none to the largest.
+
+    Where displacements are commanded, the tendons that do not pull are paid out, so that they are slack. Springs that currents heat
+    cool within a minute: what is fast to a motor they would not feel.
+    """
+    n = prepared.n_tendon
+    top = np.max([i.command.max(axis=0) for i in prepared.inputs], axis=0)
+    held = prepared.driven_by(Drive.DISPLACEMENT)
+    top = np.where(held, np.max(top[held], initial=0.0), np.max(top[~held], initial=0.0))
+    words = [f"{_shown(d.display_unit[1] * x)} {d.display_unit[0]}" for x, d in zip(top, prepared.drives, strict=True)]
+    like = prepared.inputs[0]
+    bare = replace(like.loads, force=np.zeros(3))
+    if "torque" in prepared.robot.build().loads.values():
+        torques = [float(np.mean(i.loads.torque)) for i in prepared.inputs]
+        least, most = min(torques), max(torques)
+        loaded = [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]
+    else:
+        heaviest = max(i.loads.payload for i in prepared.inputs)
+        payloads = sorted({0.0, min(HEAVIEST, max(LEAST_LOAD, 3.0 * heaviest))})
+        loaded = [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
+    shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
+
+    def add(label: str, duration: float, *shares: np.ndarray) -> None:
+        pull = np.stack(shares, axis=1)
+        command = top * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
+        shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
+
+    up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
+    up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
+    hold = np.concatenate([[0.0], np.full(60, HELD)])
+    for i in np.flatnonzero(top > 0.0):  # what was never commanded has no range to stay within
+        alone = np.eye(n)[i]
+        what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", 4.0)
+        pull = f"heat {what} with up" if prepared.drives[i] is Drive.CURRENT else f"pull {what}"
+        add(f"{pull} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
+        add(f"{pull} to {words[i]} and release it, fast ({fast:.0f} s)", fast, *np.outer(alone, up_down))
+        again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly (240 s)"
+        add(again, 240.0, *np.outer(alone, up_half_up_down))
+        add(f"step {what} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
+    turns = np.linspace(0, 4 * np.pi, 80)
+    circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
+    if not held.any() and top.all():
+        add(f"two circles with all tendons up to 0.6 of {words[0]} (160 s)", 160.0, *circle)
+    add("rest unloaded for 60 s", 60.0, *np.zeros((n, 30)))
+    last = max(float(i.clock[-1]) for i in prepared.inputs)
+    out = []
+    for load, loads in loaded:
+        for motion, time, command in shapes:
+            label = f"{motion}, {load}"
+            warm = np.full(len(time), like.temperature[0])
+            out.append((label, Inputs(label, time, last + 60.0 + time, command, prepared.drives, warm, loads)))
+    return out
+
+
+def _shown(x: float) -> str:
+    return f"{x:.1f}" if x >= 1.0 else f"{x:.2g}"
+
+
+def next_experiment(prepared: PreparedRecording, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
+    """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
+    rivals = tuple(e.id for e in of_robot(a.model.twin.effects)), tuple(e.id for e in of_robot(b.model.twin.effects))
+    prepared, noise = _foreseen(prepared, noise)
+
+    def told(words: str, inputs: Inputs) -> _Apart | None:
+        n = len(inputs.time)
+        empty = np.zeros((n, len(prepared.outputs)))
+        imagined = replace(prepared, inputs=(inputs,), measured=(empty,))
+        exact = replace(noise, drive=np.zeros(prepared.n_tendon))
+        whitener = Whitener(exact, [empty], [np.zeros((n, len(prepared.outputs), prepared.n_tendon))], [inputs.command])
+        objective = Objective(imagined, [0], whitener, jobs)
+        try:
+            at = objective.evaluate(b.model)
+            return words, inputs, objective, at, objective.evaluate(a.model, at.traces).z - at.z
+        except SolveError:
+            return None
+
+    found: Any = Parallel(n_jobs=jobs, prefer="threads", require="sharedmem")(delayed(told)(*trial) for trial in menu(prepared))
+    # What a robot does not feel (a load where nothing weighs, a pace without a law of time) makes no other trial: the first stands.
+    alike: dict[bytes, _Apart] = {}
+    for trial in found:
+        if trial is not None:
+            alike.setdefault(trial[3].z.tobytes() + trial[4].tobytes(), trial)
+    apart = list(alike.values())
+    best: Experiment | None = None
+    for words, inputs, objective, at, d in sorted(apart, key=lambda trial: -float(trial[-1] @ trial[-1])):
+        if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it
+            break
+        try:
+            T = _separation(objective, b, at, d)
+        except SolveError:  # a neighbour of b has no equilibrium there: no trial to send anyone to
+            continue
+        if best is None or best.separation < T:
+            best = Experiment(words, inputs, T, max(1, int(np.ceil(CLEAR / max(T, 1e-9)))), rivals)
+    return best if best is not None and best.repeats <= MOST_RUNS else None
+
+
+def _foreseen(prepared: PreparedRecording, noise: Noise) -> tuple[PreparedRecording, Noise]:
+    """With the tip in place of patches of skin: which points of it a camera will see is not known, but that it tells the tip is."""
+    skin = [j for j, o in enumerate(prepared.outputs) if o.group == "skin"]
+    if not skin:
+        return prepared, noise
+    senses, sigma = prepared.robot.build().senses, float(np.max(noise.sigma[skin]))
+    tip = [Output(Channel(f"tip_{a}", "output", "mm", sigma), "marker", senses[f"tip_{a}"].index, k) for k, a in enumerate("xyz")]
+    keep = [j for j in range(len(prepared.outputs)) if j not in skin]
+    outputs = (*(prepared.outputs[j] for j in keep), *tip)
+    rho, fade = (np.append(x[keep], np.zeros(3)) for x in (noise.rho, noise.lasting[1]))
+    return replace(prepared, outputs=outputs), replace(noise, sigma=np.append(noise.sigma[keep], 3 * [sigma]), rho=rho, fade=fade)
+
+
+def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> float:
+    """What is left of |d|^2, d = W (y_A - y_B), when B's parameters move within their present covariance to imitate A."""
+    J = objective.jacobian(at, range(len(b.model.free)))
+    inner = b.information() + J.T @ J
+    u = J.T @ d
+    return float(max(0.0, d @ d - u @ solve(inner + 1e-9 * np.eye(len(u)), u)))

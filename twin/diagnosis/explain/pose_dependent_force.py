@@ -1,0 +1,84 @@
+"""What is left, held against a force on the tip that changes with where the tip is: a magnet, a spring, a cable that drags.
+
+No law of the catalogue, since every such thing has its own. To first order in where the tip is,
+
+    F(x) = f + G (x - mean x),
+
+twelve numbers, whose effect on the white residual is C_a per newton along axis a, so that z ~ C_a (f_a + G_ab (x - mean x)_b) is
+linear least squares beside the robot's own parameters. It is said where it takes `FELT` of the smooth error, f alone does not, and
+the evidence is `ACCEPT` after twelve numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.body import Loads
+from twin.diagnosis.calibration.fit import Model, prior_weight
+from twin.diagnosis.evidence.scored_model import ScoredModel
+from twin.diagnosis.fit_context import FitContext
+from twin.diagnosis.thresholds import ACCEPT, FELT, PROBE
+from twin.effects.base.effect import Effect
+from twin.foundation.parameters import Parameter
+
+
+class TipForce(Effect):
+    """A constant force on the tip, in the base frame."""
+
+    id = "tip_force"
+    parameters = tuple(Parameter(f"along_{a}", 0.0, "N", -10.0, 10.0, "of a difference", scale=PROBE) for a in "xyz")
+    moves_with = "nothing"
+
+    def surround(self, loads: Loads) -> Loads:
+        return replace(loads, force=loads.force + np.array([self[f"along_{a}"] for a in "xyz"]))
+
+
+@dataclass(frozen=True)
+class PoseDependentForce:
+    """The share of the smooth error it takes, and by how much (N) it changes: of |F - mean F| over the fitted samples what nine of
+    ten are below. Where it points is not told: what pulls along a robot that does not stretch moves nothing."""
+
+    share: float
+    change: float
+
+    def words(self) -> str:
+        return (
+            f" A force on the tip that changes with where the tip is, by some {1e3 * self.change:.2g} mN, would take "
+            f"{100 * self.share:.0f} % of it: a magnet, a spring, a cable that drags?"
+        )
+
+
+def pose_dependent_force(context: FitContext, final: ScoredModel) -> PoseDependentForce | None:
+    """The force on the tip that would leave what `final` leaves; None where none would, or where the tip is not known."""
+    body, fit, size = context.prepared.robot.build(), final.fit, final.discrepancy.size
+    if "tip_x" not in body.senses or size == 0.0:
+        return None
+    at = body.senses["tip_x"].index
+    tip = np.concatenate([fit.evaluation.traces[k].true.markers[:, at] for k in context.trials])
+    twin, probe = fit.model.twin, PROBE * context.prepared.robot.size.force
+    pushed = [(Model(replace(twin, effects=(*twin.effects, TipForce({f"along_{a}": probe}))), ()), probe) for a in "xyz"]
+    C = context.objective.columns(fit.evaluation, pushed, unsolved="zeros")
+    away = tip - tip.mean(axis=0)
+    rows = np.repeat(away, len(fit.z) // len(tip), axis=0)
+    linear = (C[:, :, None] * rows[:, None, :]).reshape(len(C), -1)
+    (constant, _), (whole, numbers) = (_taken(context, final, K) for K in (C, np.hstack([C, linear])))
+    structure = size**2 * context.objective.n
+    chance = len(numbers) * np.log(context.objective.n) + ACCEPT
+    if whole < max(FELT * structure, chance) or constant >= FELT * structure:
+        return None
+    change = np.linalg.norm(away @ numbers[3:].reshape(3, 3).T, axis=1)
+    return PoseDependentForce(min(1.0, whole / structure), float(np.quantile(change, 0.9)))
+
+
+def _taken(context: FitContext, final: ScoredModel, K: np.ndarray) -> tuple[float, np.ndarray]:
+    """The fall of |z|^2, beside the robot's own parameters with their priors, and the numbers (p,) for columns K (n, p)."""
+    J, z, k = final.fit.J, final.fit.z, final.fit.J.shape[1]
+    scale = np.maximum(np.linalg.norm(K, axis=0), 1e-30)
+    prior = np.zeros((k, k + K.shape[1]))
+    prior[:, :k] = np.diag(prior_weight(final.fit.model))
+    A, b = np.vstack([np.hstack([J, K / scale]), prior]), np.append(-z, np.zeros(k))
+    without, both = (np.linalg.lstsq(M, b, rcond=1e-9)[0] for M in (A[:, :k], A))
+    fall = float(((b - A[:, :k] @ without) ** 2).sum() - ((b - A @ both) ** 2).sum())
+    return fall, both[k:] / scale

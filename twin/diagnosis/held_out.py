@@ -1,0 +1,122 @@
+"""Stage `seal`: the sealed trials, opened once when everything else is written, and their errors, whatever they say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnosis.calibration.objective import sensitivity
+from twin.diagnosis.checks.spikes import without_spikes
+from twin.diagnosis.checks.zero_jumps import rezeroed
+from twin.diagnosis.conclusion import Conclusion
+from twin.diagnosis.diagnosis import Errors
+from twin.diagnosis.split import blind
+from twin.foundation.errors import SolveError
+from twin.prediction.evaluate import headline_group, rms, squared_errors
+from twin.prediction.prepared import PreparedRecording
+from twin.prediction.simulate import simulate
+from twin.prediction.twin import Twin
+
+Pick = Callable[[Conclusion], Twin | None]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The sealed trials with what was measured on them, and the twins that had to predict them unseen."""
+
+    prepared: PreparedRecording
+    nominal: Sequence[np.ndarray]  # (n_k, n_output) a trial, as described
+    parts: Sequence[tuple[Conclusion, Sequence[int]]]
+    spikes: tuple[str, ...]
+
+    @staticmethod
+    def of(
+        prepared: PreparedRecording, nominal: Sequence[np.ndarray], parts: Sequence[tuple[Conclusion, Sequence[int]]]
+    ) -> HeldOut:
+        """Lone marker samples are left out here as they were of the fitted trials, by the sealed trials' own scatter."""
+        shown = {k for _, trials in parts for k in trials}
+        whole, words = without_spikes(blind(prepared, [k for k in range(len(prepared.inputs)) if k not in shown]), nominal)
+        return HeldOut(whole, nominal, parts, tuple(words))
+
+    @property
+    def trials(self) -> list[int]:
+        return sorted(k for _, trials in self.parts for k in trials)
+
+    def predictions(self, pick: Pick) -> dict[int, np.ndarray]:
+        """(n_k, n_output) SI a sealed trial, by the twin picked of each conclusion; NaN where it has no equilibrium."""
+        out: dict[int, np.ndarray] = {}
+        for conclusion, trials in self.parts:
+            twin = pick(conclusion)
+            out |= dict(zip(trials, predicted(twin, self.prepared, trials), strict=True))
+        return out
+
+    def error(self, pick: Pick) -> float:
+        """RMS in SI of the headline's outputs; NaN where some trial cannot be predicted."""
+        at = self.predictions(pick)
+        if any(np.isnan(y).all() for y in at.values()):
+            return float("nan")
+        groups = [o.group for o in self.prepared.outputs]
+        return rms(self.prepared, [self.prepared.measured[k] - at[k] for k in self.trials], headline_group(groups))
+
+    def rezeroed(self, group: str) -> tuple[float, float]:
+        """RMS in SI of one group of outputs by the twins left in force: as it is, and with each trial's zero taken anew."""
+        at = self.predictions(lambda c: c.final)
+        raw = [self.prepared.measured[k] - at[k] for k in self.trials]
+        return rms(self.prepared, raw, group), rms(self.prepared, [rezeroed(self.prepared, group, r) for r in raw], group)
+
+    def errors(self, seed: int) -> Errors:
+        """As described, calibrated and with the effects, on the sealed trials that each of the three has an equilibrium for."""
+        calibrated, after = (self.predictions(p) for p in (lambda c: c.base, lambda c: c.final))
+        stages = {"nominal": dict(enumerate(self.nominal)), "calibrated": calibrated, "after": after}
+        lost = [k for k in self.trials if any(np.isnan(at[k]).all() for at in stages.values())]
+        kept = [k for k in self.trials if k not in lost]
+        groups = list(dict.fromkeys(o.group for o in self.prepared.outputs))
+        raw = {s: [self.prepared.measured[k] - at[k] for k in kept] for s, at in stages.items()}
+        error = {s: {g: rms(self.prepared, r, g) if kept else float("nan") for g in groups} for s, r in raw.items()}
+        ci = {s: {g: interval(squared_errors(self.prepared, raw[s], g), seed) for g in groups} for s in ("calibrated", "after")}
+        return Errors(
+            error["nominal"], error["calibrated"], error["after"], self._floor(kept, groups), ci["calibrated"], ci["after"],
+            tuple(lost), self.spikes,
+        )  # fmt: skip
+
+    def _floor(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
+        """RMS error a perfect twin would still show, by group; NaN where no trial can be predicted. By the noise as it is once the
+        effects are known: what they change between repeated trials would raise it else."""
+        squared: dict[str, list[float]] = {g: [] for g in groups}
+        for conclusion, trials in self.parts:
+            noise = conclusion.noise()
+            for k in (k for k in trials if k in kept):
+                at = predicted(conclusion.final, self.prepared, [k])
+                try:
+                    G = sensitivity(self.prepared, [k], conclusion.final, at)
+                except SolveError:
+                    continue  # a neighbouring command has no equilibrium: this trial says nothing of the floor
+                for g, value in noise.floor(self.prepared, G).items():
+                    squared[g].append(value**2)
+        return {g: float(np.sqrt(np.mean(s))) if s else float("nan") for g, s in squared.items()}
+
+
+def predicted(twin: Twin | None, prepared: PreparedRecording, trials: Sequence[int]) -> list[np.ndarray]:
+    """(n_k, n_output) SI a trial; NaN for one without an equilibrium, and where there is no twin."""
+    if twin is None or not trials:
+        return [np.full_like(prepared.measured[k], np.nan) for k in trials]
+    try:
+        return [t.outputs(twin, prepared) for t in simulate(twin, prepared, trials=trials)]
+    except SolveError:
+        if len(trials) > 1:
+            return [predicted(twin, prepared, [k])[0] for k in trials]
+        return predicted(None, prepared, trials)
+
+
+def interval(squares: Sequence[np.ndarray], seed: int) -> tuple[float, float]:
+    """95 % bootstrap interval of an RMS, over whole trials and blocks of ten samples within them, since neighbours are alike."""
+    blocks = [b for s in squares for b in np.array_split(s, max(1, len(s) // 10)) if len(b)]
+    if not blocks:
+        return float("nan"), float("nan")
+    sums, counts = np.array([b.sum() for b in blocks]), np.array([len(b) for b in blocks])
+    pick = np.random.default_rng(seed).integers(len(blocks), size=(1000, len(blocks)))
+    values = np.sqrt(sums[pick].sum(axis=1) / counts[pick].sum(axis=1))
+    low, high = np.quantile(values, [0.025, 0.975])
+    return float(low), float(high)

@@ -1,0 +1,224 @@
+"""The main job: from a recording to what the twin lacks, how sure that is, and the error before and after on sealed trials.
+
+look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> systematic -> describe, all on the fitted trials;
+then the seal is opened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnosis.calibration.calibrate import calibrate
+from twin.diagnosis.calibration.fit import Fit, fit
+from twin.diagnosis.calibration.objective import objective_of
+from twin.diagnosis.checks.loops import loops
+from twin.diagnosis.checks.preview import DataPreview, preview_data
+from twin.diagnosis.checks.spikes import without_spikes
+from twin.diagnosis.checks.zero_jumps import jumps_of, without_zero_jumps
+from twin.diagnosis.checks.zero_jumps import words as jumped
+from twin.diagnosis.conclusion import Conclusion
+from twin.diagnosis.diagnosis import Claim, Diagnosis, Fold, Settings
+from twin.diagnosis.explain.describe import describe
+from twin.diagnosis.explain.next_experiment import Experiment, next_experiment
+from twin.diagnosis.fit_context import Progress, silent
+from twin.diagnosis.held_out import HeldOut, predicted
+from twin.diagnosis.search.choose import choose
+from twin.diagnosis.search.lag_or_delay import lag_or_delay
+from twin.diagnosis.search.screen import screen
+from twin.diagnosis.search.search import search
+from twin.diagnosis.split import blind, split
+from twin.diagnosis.thresholds import FEW, FIRST
+from twin.diagnosis.verdict.gate import gate
+from twin.diagnosis.verdict.judge import judge
+from twin.diagnosis.verdict.resolve_ties import resolve_ties
+from twin.diagnosis.verdict.systematic import with_systematic
+from twin.foundation.errors import DataError
+from twin.foundation.threads import single_thread
+from twin.measurements import Recording
+from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms
+from twin.prediction.prepared import PreparedRecording, prepare
+from twin.prediction.twin import Twin
+
+OnPreview = Callable[[DataPreview], None]
+
+
+def ignore_preview(preview: DataPreview) -> None:
+    """Nobody listens; all of it stands in the diagnosis."""
+
+
+def diagnose(
+    recording: Recording,
+    twin: Twin,
+    settings: Settings | None = None,
+    progress: Progress = silent,
+    on_preview: OnPreview = ignore_preview,
+) -> Diagnosis:
+    """Diagnose a recording against a twin. Raises TwinError for data that cannot be used.
+
+    What was seen before anything is fitted is told to `hear`: what the files may mean otherwise, and loops; no number depends on
+    it.
+
+    About a quarter of the trials is sealed; of fewer than `FEW` trials each in turn, the claims coming from all of them.
+    """
+    settings = settings or Settings()
+    prepared = prepare(recording, twin.robot)
+    if len(prepared.inputs) < 2:
+        raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one sealed")
+    with single_thread():
+        preview = preview_data(prepared, twin, settings, progress)
+        on_preview(preview)
+        return _sealed(recording, preview, twin, settings, progress)
+
+
+def _sealed(recording: Recording, preview: DataPreview, twin: Twin, settings: Settings, progress: Progress) -> Diagnosis:
+    n = len(preview.prepared.inputs)
+    prepared, nominal = preview.prepared, preview.nominal
+    if n >= FEW:
+        found = conclude(prepared, twin, preview.held_out, nominal, settings, progress)
+        return _reported(recording, preview, twin, found, [(found, preview.held_out)], settings)
+    parts, share = [], replace(settings, budget=settings.budget and settings.budget / (n + 1))
+    for k in range(n):
+
+        def told(words: str, k: int = k) -> None:
+            progress(f"{n} trials, each sealed in turn and the others diagnosed, {k + 1} of {n}: {words}")
+
+        parts.append((conclude(prepared, twin, [k], nominal, share, told), [k]))
+    found = conclude(prepared, twin, [], nominal, share, lambda words: progress(f"all {n} trials: {words}"))
+    return _reported(recording, preview, twin, found, parts, settings)
+
+
+def conclude(
+    prepared: PreparedRecording,
+    twin: Twin,
+    held_out: Sequence[int],
+    nominal: Sequence[np.ndarray],
+    settings: Settings,
+    progress: Progress,
+) -> Conclusion:
+    """Everything a diagnosis decides, without what was measured on the sealed trials."""
+    context, base, notes = calibrate(prepared, twin, held_out, nominal, settings, progress)
+    screening = screen(context, base, settings.seed)
+    found = choose(context, search(context, base, screening.patterns, screening.limits), screening.limits)
+    found = lag_or_delay(context, found)
+    found, gated = resolve_ties(context, found, gate(context, found, screening), screening.limits)
+    judged = with_systematic(context, judge(context, found, gated, screening.limits), screening.patterns)
+    return Conclusion(context, screening, found, gated, judged, (*notes, *context.budget.words()))
+
+
+def _reported(
+    recording: Recording,
+    preview: DataPreview,
+    twin: Twin,
+    found: Conclusion,
+    parts: Sequence[tuple[Conclusion, Sequence[int]]],
+    settings: Settings,
+) -> Diagnosis:
+    """All that is said of `found`, the seal unopened; then the errors, by the conclusions that had not seen each trial."""
+    prepared, nominal = preview.prepared, preview.nominal
+    context, judged, limits = found.context, found.judged, found.screening.limits
+    final, base = judged.final, found.found.base
+    seen = loops(context.prepared)
+    said = describe(context, found.found, found.gated, judged, limits)
+    experiment = _experiment(found, settings)
+    opened = HeldOut.of(prepared, nominal, parts)
+    measured = [y if k in context.trials else opened.prepared.measured[k] for k, y in enumerate(context.prepared.measured)]
+    folds = tuple(Fold(trials[0], c.judged.verdict, tuple(x.effect for x in c.judged.claims)) for c, trials in parts)
+    return Diagnosis(
+        verdict=judged.verdict,
+        twin=without_zero_jumps(found.final),
+        calibrated=without_zero_jumps(found.base),
+        claims=tuple(replace(c, error=opened.error(lambda x, e=c.effect: x.without(e))) for c in judged.claims),
+        runners_up=tuple(
+            replace(c, error=opened.error(lambda x, s=(c.effect, *c.beside): x.weighed(s))) for c in judged.runners_up
+        ),
+        below_materiality=tuple(
+            Claim(s.effect, s.fitted.fit.fitted(s.effect), float("nan"), 0.0, s.contribution) for s in found.gated.small
+        ),
+        parameters={
+            **final.fit.fitted(None),
+            **{f"{e}.{p.name}": final.fit.fitted(e)[p.name] for e, p in prepared.robot.uncertain},
+        },
+        unfixed=tuple(final.fit.unfixed()),
+        correlation=final.fit.correlation(),
+        errors=opened.errors(settings.seed),
+        noise=context.objective.whitener.noise,
+        structure_before=base.discrepancy.size,
+        structure_after=final.discrepancy.size,
+        structure_unseen=judged.signs.unseen,
+        limits=limits,
+        structure=said.components,
+        strongest=said.strongest,
+        line=judged.signs.line,
+        worst_channel=said.worst_channel,
+        description=said.words,
+        identifiability=found.screening.table,
+        ambiguous=judged.ambiguous,
+        experiment=experiment,
+        recording=recording,
+        prepared=replace(prepared, measured=tuple(measured)),
+        fitted_trials=tuple(context.trials),
+        held_out_trials=tuple(opened.trials),
+        folds=folds if len(parts) > 1 else (),
+        loops=seen,
+        suspicions=preview.suspicions,
+        predictions=_predictions(prepared, found, opened, nominal),
+        notices=(*prepared.notices, *found.notices, *jumped(prepared, final.fit), *_anew(found, opened), *said.notices),
+        settings=settings,
+        scores=tuple((w.effects, w.score) for w in found.found.all),
+        untried=tuple(context.budget.untried),
+    )
+
+
+def _anew(found: Conclusion, opened: HeldOut) -> Iterator[str]:
+    """Where zeros jump, the sealed trials' error with those that were fitted, and with each trial's own."""
+    for group in dict.fromkeys(j.group for j in jumps_of(found.final)):
+        unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
+        fitted, own = (factor * e for e in opened.rezeroed(group))
+        yield (
+            f"sealed trials, {OUTPUT_GROUPS[group].kind}: {fitted:.3g} {unit} with the zeros that were fitted, {own:.3g} {unit} where each "
+            f"trial's is taken from its own first {FIRST} rows; the first counts"
+        )
+
+
+def _experiment(found: Conclusion, settings: Settings) -> Experiment | None:
+    """What would settle a doubt, where there is one."""
+    judged, context = found.judged, found.context
+    doubt = judged.ambiguous or (judged.verdict != "noise" and judged.runners_up)
+    if not doubt or judged.between is None:
+        return None
+    context.progress("next experiment")
+    a, b = judged.between
+    return next_experiment(context.prepared, context.objective.whitener.noise, a.fit, b.fit, settings.jobs)
+
+
+def _predictions(
+    prepared: PreparedRecording, found: Conclusion, opened: HeldOut, nominal: Sequence[np.ndarray]
+) -> dict[str, list[np.ndarray]]:
+    """By stage, every trial by the twin that had to predict it."""
+    out = {"nominal": list(nominal)}
+    for name, pick in (("calibrated", lambda c: c.base), ("after", lambda c: c.final)):
+        unseen = opened.predictions(pick)
+        open_ = [k for k in range(len(prepared.inputs)) if k not in unseen]
+        seen = dict(zip(open_, predicted(pick(found), prepared, open_), strict=True))
+        out[name] = [(unseen | seen)[k] for k in range(len(prepared.inputs))]
+    return out
+
+
+def calibration(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str, tuple[str, ...]]:
+    """The robot's own uncertain parameters fitted, no effect sought; the RMS error on sealed trials in words; and notices."""
+    settings = settings or Settings()
+    prepared = prepare(recording, twin.robot)
+    every = list(range(len(prepared.inputs)))
+    nominal = predicted(twin, prepared, every)
+    fitted, held_out = split(prepared, settings.seed)
+    seen, alone = without_spikes(blind(prepared, held_out), nominal)
+    start, objective, _ = objective_of(seen, twin, fitted, settings)
+    found = fit(objective, start, refresh=True)
+    opened, _ = without_spikes(blind(prepared, fitted), nominal)
+    raw = [opened.measured[k] - y for k, y in zip(held_out, predicted(found.model.twin, prepared, held_out), strict=True)]
+    group = headline_group(o.group for o in prepared.outputs)
+    unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
+    return found, f"{factor * rms(prepared, raw, group):.3f} {unit}", (*prepared.notices, *alone)

@@ -1,0 +1,1 @@
+"""The search over sets of effects, and the choice among them."""

@@ -1,0 +1,189 @@
+"""Stage `search`: beam search over sets of effects: rank, refit, weigh by evidence, add while it pays, then drop what does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnosis.evidence.first_order import Dictionary, dictionary
+from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
+from twin.diagnosis.evidence.ranking import rank
+from twin.diagnosis.evidence.scored_model import (
+    EffectForms,
+    ScoredModel,
+    better,
+    refit_without,
+    with_effect_added,
+    with_extended_law,
+)
+from twin.diagnosis.fit_context import FitContext
+from twin.diagnosis.noise.friction import noise_credit
+from twin.diagnosis.thresholds import BEHIND, DEEPER, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WHITER, WIDTH
+from twin.effects import FitStart, catalogue
+
+Known = dict[EffectForms, ScoredModel]
+
+
+@dataclass(frozen=True)
+class Search:
+    """The base model, the best set found, and every set that was weighed (the best start of its laws), best first; whether the best
+    is that for what it predicts, and not by evidence."""
+
+    base: ScoredModel
+    best: ScoredModel
+    all: tuple[ScoredModel, ...]
+    predicted: bool = False
+
+
+def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits: AcceptanceLimits) -> Search:
+    """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
+    known: Known = {base.forms: base}
+    beam, step = [base], []
+    for level in range(1, DEEPEST + 1):
+        best_before = max(w.score for w in known.values())
+        fresh: Known = {}
+        for member in (*beam, *step):
+            lacks = patterns.beside(member.effects)
+            # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
+            # effects that promise something by the base's; the others' are the base's.
+            if member is (*beam, *step)[0] and member is not base:
+                least = STALE * _asked(context, base, member, limits)
+                promise = rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
+                lacks = dictionary(context.objective, member.fit, {c.effect for c in promise if c.gain >= least})
+            context.progress(f"effects, {level} at once")
+            before = dict(fresh)
+            extend(context, base, member, lacks, limits, fresh)
+            if any(member is s for s in step):
+                more, half = best_before + limits.accept, WHITER * _leaves(context, base, member)
+                fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(context, base, w) < half}
+        leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
+        fresh = {
+            k: with_extended_law(context, w, limits.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()
+        }
+        known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
+        beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
+        if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > DEEPER):
+            break
+    best = max(known.values(), key=lambda w: w.score - limits.accept * len(w.effects))
+    best = exchanged(context, best, known)
+    best = _leaner(context, base, best, known, limits.accept)
+    return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+
+
+def carried(
+    context: FitContext, base: ScoredModel, beam: list[ScoredModel], fresh: list[ScoredModel], bar: float
+) -> tuple[list[ScoredModel], list[ScoredModel]]:
+    """The models of the `beam` and one effect to which one more is added next: where evidence passes the `bar` the best by it,
+    `WIDTH` of them, none far behind; and, as a step only, the one that leaves least of |z|^2, where that is less than `WHITER` of
+    what these leave, or where there are none the beam. What is built on a step counts where it passes the bar and halves the error
+    once more: it explains what lay under the smooth one.
+
+    Evidence forgives a smooth error whatever its size: of two effects that bend alike either may leave it as smooth as none, and
+    so have no evidence until the other is there.
+    """
+    best = max((w.score for w in fresh), default=-np.inf)
+    ahead = sorted((w for w in fresh if best >= bar and w.score >= best - BEHIND), key=lambda w: -w.score)[:WIDTH]
+    least = min(_leaves(context, base, w) for w in ahead or beam)
+    whitest = min(fresh, key=lambda w: _leaves(context, base, w), default=base)
+    return ahead, [whitest] if _leaves(context, base, whitest) < WHITER * least else []
+
+
+def extend(
+    context: FitContext, base: ScoredModel, member: ScoredModel, lacks: Dictionary, limits: AcceptanceLimits, fresh: Known
+) -> None:
+    """Into `fresh`: `member` with each of the effects whose pattern promises most."""
+    for candidate in rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks):
+        if candidate.gain < _asked(context, base, member, limits):
+            continue
+        name = " + ".join((*member.effects, candidate.effect))
+        if not context.budget.allows(name):
+            continue
+        context.progress(name)
+        beat = HOPELESS * min((w.fit.cost for w in fresh.values()), default=np.inf)
+        found = with_effect_added(context, member, candidate.effect, candidate.start, beat)
+        if found is not None and (found.forms not in fresh or better(found, fresh[found.forms])):
+            fresh[found.forms] = found
+
+
+def _leaves(context: FitContext, base: ScoredModel, member: ScoredModel) -> float:
+    """The share of the base's |z|^2 above the noise that a set leaves."""
+    noise = float(context.objective.n)
+    return max(float(member.fit.z @ member.fit.z) - noise, 0.0) / max(float(base.fit.z @ base.fit.z) - noise, 1.0)
+
+
+def _asked(context: FitContext, base: ScoredModel, member: ScoredModel, limits: AcceptanceLimits) -> float:
+    """The gain an effect's pattern must promise beside `member` to be fitted there."""
+    return PROMISE * max(limits.accept, _material(context, base, member, limits.visible))
+
+
+def _material(context: FitContext, base: ScoredModel, member: ScoredModel, bar: float) -> float:
+    """The fall of |z|^2 below which an effect added to `member` would be immaterial: in the group of outputs in which `member`
+    explains least, where its laws' faults show least."""
+    explained = max(0.0, float(context.fall_by_group(base.fit, member.fit).min()))
+    return max(bar**2 * context.objective.n, FORM**2 * explained)
+
+
+def exchanged(context: FitContext, best: ScoredModel, known: Known) -> ScoredModel:
+    """The best set, or one with another effect in the place of one of its own, where that has more evidence.
+
+    Tried is what was better than an effect of the set where both were weighed in the same company, and was not seen in the set's:
+    what is too small to be sought beside the true effect may be worth more beside a false one, which it helps to imitate it.
+    """
+    for weaker in list(known.values()):
+        company = set(weaker.forms)
+        if not company or not company < set(best.forms):
+            continue
+        for stronger in list(known.values()):
+            own, new = company - set(stronger.forms), set(stronger.forms) - company
+            if len(own) != 1 or len(new) != 1 or new <= set(best.forms) or stronger.score <= weaker.score:
+                continue
+            found = _in_company(context, stronger, best, {e for e, _ in set(best.forms) - company}, known)
+            if found is not None and found.score > best.score:
+                return exchanged(context, found, known)
+    return best
+
+
+def _in_company(context: FitContext, member: ScoredModel, best: ScoredModel, effects: set[str], known: Known) -> ScoredModel | None:
+    """`member` and these effects of the best set beside, as they were fitted there; None where they are not to be had together or
+    were weighed already."""
+    together = {*member.effects, *effects}
+    laws = (*member.forms, *(law for law in best.forms if law[0] in effects))
+    if (
+        len(together) < len(laws)
+        or tuple(sorted(laws)) in known
+        or any(together & set(catalogue()[e].confusable_with) for e in together)
+    ):
+        return None
+    for effect in sorted(effects):
+        if not context.budget.allows(f"{effect} beside {' + '.join(member.effects)}"):
+            return None
+        context.progress(f"{effect} beside {' + '.join(member.effects)}")
+        law = next(e for e in best.fit.model.twin.effects if e.id == effect)
+        free = tuple(f.parameter.name for f in best.fit.model.free if f.effect == effect)
+        found = with_effect_added(context, member, effect, FitStart(law.values, free))
+        if found is None:
+            return None
+        member = found
+    known[member.forms] = member
+    return member
+
+
+def _leaner(context: FitContext, base: ScoredModel, best: ScoredModel, known: Known, accept: float) -> ScoredModel:
+    """Drop every effect beside the base's whose removal costs less evidence than `accept`, less what friction pays it (`paid`); the
+    last one stays. Of sets that lead the one left by effects more, too, what friction pays them is taken off."""
+    while len(added := [e for e in best.effects if e not in base.effects]) > 1:
+        reduced = []
+        for effect in added:
+            rest = best.forms_without(effect)
+            if rest not in known:
+                known[rest] = refit_without(context, base, best, effect)
+            reduced.append((known[rest], noise_credit(context, best, known[rest])))
+        lean, due = max(reduced, key=lambda r: r[0].score + r[1])
+        if lean.score < best.score - due - accept:
+            break
+        best = lean
+    for laws, more in list(known.items()):
+        if more.score > best.score and set(laws) > set(best.forms) and (due := noise_credit(context, more, best)) > 0.0:
+            known[laws] = replace(more, score=more.score - due, unheard=more.unheard + due)
+    return best

@@ -1,0 +1,67 @@
+"""Which trials are sealed: about a quarter, by what was done in them and the seed, never by what was measured."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnosis.checks.design import longest_rest, pulled, rates
+from twin.diagnosis.noise.estimate import repeats
+from twin.diagnosis.thresholds import EDGE, PACE, SEALED, STEADY
+from twin.prediction.prepared import PreparedRecording
+
+LOADS = ("payload", "mount", "force")
+
+
+def split(prepared: PreparedRecording, seed: int) -> tuple[list[int], list[int]]:
+    """(fitted, sealed) trials, both in order of the clock.
+
+    What only one of the trials still open shows (a payload, a mount, a kind of motion, an end of a range) is sealed last, and so
+    are repeats, which the noise is read from. A load that nobody sees any more is worse than a repeat less.
+    """
+    n = len(prepared.inputs)
+    shown = list(_conditions(prepared))
+    repeated = {k for pair in repeats(prepared) for k in pair}
+    place = np.random.default_rng(seed).permutation(n)
+    open_, wanted = set(range(n)), max(1, round(SEALED * n))
+    while n - len(open_) < wanted:
+        count = Counter(c for k in open_ for c in shown[k])
+        lost = {k: sum(1 + (c[0] in LOADS) for c in shown[k] if count[c] == 1) for k in open_}
+        open_.remove(min(open_, key=lambda k: (lost[k] + (k in repeated), k in repeated, place[k])))
+    return sorted(open_), [k for k in range(n) if k not in open_]
+
+
+def blind(prepared: PreparedRecording, trials: Sequence[int]) -> PreparedRecording:
+    """The bench with nothing measured on these trials; their inputs stay, which a body remembers."""
+    measured = [np.full_like(y, np.nan) if k in trials else y for k, y in enumerate(prepared.measured)]
+    return replace(prepared, measured=tuple(measured))
+
+
+def _conditions(prepared: PreparedRecording) -> Iterator[set[tuple[Hashable, ...]]]:
+    """What each trial shows, by its inputs and conditions alone."""
+    tops = np.array([np.abs(i.command).max(axis=0) for i in prepared.inputs])
+    ranges = {
+        "command": tops,
+        "torque": np.array([[np.mean(i.loads.torque)] for i in prepared.inputs]),
+        "temperature": np.array([[i.temperature.mean()] for i in prepared.inputs]),
+    }
+    for k, i in enumerate(prepared.inputs):
+        moved = pulled(i, float(tops.max()))
+        shown: set[tuple[Hashable, ...]] = {
+            ("payload", round(i.loads.payload, 6)),
+            ("mount", *np.round(i.loads.gravity, 3)),
+            ("force", *np.round(i.loads.force, 3)),
+            ("together", *moved),
+            *(("pull of", t) for t in moved),
+            *(("pace", round(float(np.log(r) / np.log(PACE)))) for r in rates(i, float(tops.max()))),
+        }
+        if longest_rest(i, float(tops.max())) >= STEADY:
+            shown.add(("hold",))
+        for name, values in ranges.items():
+            span = np.ptp(values, axis=0)
+            shown |= {("most", name, c) for c in np.flatnonzero(values[k] >= values.max(axis=0) - EDGE * span) if span[c] > 0}
+            shown |= {("least", name, c) for c in np.flatnonzero(values[k] <= values.min(axis=0) + EDGE * span) if span[c] > 0}
+        yield shown

@@ -1,0 +1,39 @@
+"""Stage `settle`: of two effects that data cannot tell apart the likelier, where a structured error is left without either.
+
+With the one as with the other the day must be explained: then what they do is there, whatever its name, and a twin without it is
+off by that much. Which of them it is stays in doubt. Where a day is noise without them, or not explained with them, neither is
+taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from twin.diagnosis.evidence.left_out import left_out
+from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
+from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without
+from twin.diagnosis.fit_context import FitContext
+from twin.diagnosis.search.search import Search
+from twin.diagnosis.verdict.gate import Gated
+from twin.diagnosis.verdict.judge import out_of_sample, verdict, verdict_inputs
+
+
+def resolve_ties(context: FitContext, found: Search, gated: Gated, limits: AcceptanceLimits) -> tuple[Search, Gated]:
+    """The sets weighed; the gated one as it is, or the smallest with a doubt's effect, or its rival, that explains the day."""
+    base = found.base
+
+    def says(w: ScoredModel) -> str:
+        return verdict(w is not base, verdict_inputs(context, base, w, limits, out_of_sample(context, w, limits)), limits)
+
+    if not gated.doubts or says(gated.best) in ("noise", "explained"):
+        return found, gated
+    for n in reversed(range(len(gated.doubts))):
+        pair = gated.doubts[n].found, gated.doubts[n].other
+        if any(says(w) != "explained" or out_of_sample(context, w, limits).worse(left_out(context, base.fit)) for w in pair):
+            continue
+        weighed = (*found.all, *(w for w in pair if all(w.effects != known.effects for known in found.all)))
+        best = max(pair, key=lambda w: w.score)
+        without = {e: refit_without(context, base, best, e) for e in best.effects if e not in base.effects}
+        found = replace(found, all=tuple(sorted(weighed, key=lambda w: -w.score)))
+        return found, replace(gated, best=best, without=without, doubts=gated.doubts[:n], settled=gated.doubts[n:])
+    return found, gated

@@ -1,0 +1,10 @@
+"""Identifiers as words for people."""
+
+from __future__ import annotations
+
+ABBREVIATIONS = {"sma": "SMA"}  # words that are abbreviations
+
+
+def display_name(identifier: str) -> str:
+    """Return an identifier as words: tendon_friction -> tendon friction, sma_cooling -> SMA cooling."""
+    return " ".join(ABBREVIATIONS.get(word, word) for word in identifier.split("_"))

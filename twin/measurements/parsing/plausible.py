@@ -1,0 +1,92 @@
+"""Checks that measured numbers must pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.foundation.errors import DataError
+from twin.measurements.channels import Channel
+from twin.measurements.parsing.tables import Table
+from twin.measurements.recording import Trial
+
+_MIN_SAMPLES = 3
+MIN_TIME_STEP, MAX_TRIAL_TIME = 1e-6, 1e7  # s: a microsecond, faster than any robot here is logged; four months
+# How far below zero an input tension may read: sigmas of its noise, an offset of a load cell (N), or a share of the trial's largest
+# reading; the widest of these counts. An offset is data that the diagnosis can name (load_cell_bias); a pushing tendon is an error.
+MAX_SLACK_SIGMAS, _ZERO_OFFSET, _ZERO_OFFSET_SHARE = 5.0, 0.3, 0.05  # -, N, -
+
+
+def check_table(table: Table, channels: Sequence[Channel]) -> None:
+    """Raise DataError, naming the cell, for an infinite value, bad time, a pushing tendon, or less than 0 K.
+
+    Time is bad if it does not increase or cannot be in seconds.
+    """
+    time = table.columns["time"]
+    _check_finite(table, "time", time)
+    if len(missing := np.flatnonzero(np.isnan(time))):
+        raise DataError(f"{table.cell(int(missing[0]), 'time')}: missing; every row needs its time in seconds")
+    if len(back := np.flatnonzero(np.diff(time) <= 0)):
+        at = int(back[0]) + 1
+        order = f"{float(time[at])!r} after {float(time[at - 1])!r}"
+        raise DataError(f"{table.cell(at, 'time')}: {order}; time must strictly increase, sort or split the trial")
+    steps = np.diff(time)
+    if len(short := np.flatnonzero(steps < MIN_TIME_STEP)):
+        step = f"a step of {float(steps[short[0]]):.3g} s; time is in seconds, and at least {MIN_TIME_STEP:g} s apart"
+        raise DataError(f"{table.cell(int(short[0]) + 1, 'time')}: {step}")
+    if len(time) and not abs(time[0]) + (time[-1] - time[0]) <= MAX_TRIAL_TIME:
+        raise DataError(
+            f"{table.cell(len(time) - 1, 'time')}: {float(time[-1])!r} s; time is in seconds, and at most {MAX_TRIAL_TIME:g} s"
+        )
+    for channel in channels:
+        column = channel.scale.to_si(table.columns[channel.name])
+        _check_finite(table, channel.name, column)
+        if channel.si_unit == "K":
+            _check_floor(table, channel, column, 0.0, "below absolute zero; leave the cell empty if it is missing")
+        elif channel.kind == "tendon_tension" and channel.role == "input":
+            slack = max(
+                MAX_SLACK_SIGMAS * (channel.noise or 0.0), _ZERO_OFFSET, _ZERO_OFFSET_SHARE * np.nanmax(column, initial=0.0)
+            )
+            advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign"
+            _check_floor(table, channel, column, -slack, advice)
+
+
+def _check_finite(table: Table, name: str, column: np.ndarray) -> None:
+    if len(infinite := np.flatnonzero(np.isinf(column))):
+        raise DataError(f"{table.cell(int(infinite[0]), name)}: infinite value; write a number, or nothing if it is missing")
+
+
+def _check_floor(table: Table, channel: Channel, column: np.ndarray, floor: float, advice: str) -> None:
+    if len(below := np.flatnonzero(column < floor)):
+        at = int(below[0])
+        read = float(table.columns[channel.name][at])
+        raise DataError(f"{table.cell(at, channel.name)}: {read!r} {channel.unit}, {advice}")
+
+
+def unusable_reason(trial: Trial, channels: Sequence[Channel]) -> str:
+    """Return why a trial cannot be used; empty if it can."""
+    if len(trial.time) < _MIN_SAMPLES:
+        return f"{len(trial.time)} samples, at least {_MIN_SAMPLES} are needed"
+    outputs = [trial.values[channel.name] for channel in channels if channel.role == "output"]
+    if all(np.all(np.isnan(column)) for column in outputs):
+        return "not one output value in it"
+    return ""
+
+
+def check_roles(channels: Sequence[Channel]) -> None:
+    """Raise DataError for a set without input or without output."""
+    for role in ("input", "output"):
+        if not any(channel.role == role for channel in channels):
+            raise DataError(f'no {role} channel; give at least one [[channel]] role = "{role}"')
+
+
+def check_trials(channels: Sequence[Channel], trials: Sequence[Trial], left_out: Sequence[str], least_trials: int) -> None:
+    """Raise DataError for too few usable trials, and for a channel without any value in them."""
+    if len(trials) < least_trials:
+        needed = f"at least {least_trials} are needed, each with {_MIN_SAMPLES} samples and an output value"
+        why = f" ({'; '.join(left_out[:3])}{', ...' if len(left_out) > 3 else ''})" if left_out else ""
+        raise DataError(f"{len(trials)} usable trials; {needed}{why}")
+    for channel in channels:
+        if trials and all(np.all(np.isnan(trial.values[channel.name])) for trial in trials):
+            raise DataError(f"channel {channel.name} has no value in any usable trial; remove it, or export the data again")

@@ -1,0 +1,1 @@
+"""Mechanics of the robots' bodies: solvers for rods, silicone and SMA springs."""

@@ -1,0 +1,28 @@
+"""MuJoCo's kinematics and step functions, callable by symbol from compiled code.
+
+They are bound by name, not by address. Numba's disk cache of the functions that call them then stays valid in the next process.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import mujoco
+from numba.core import types
+
+_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*.so*"), None) or next(
+    Path(mujoco.__file__).parent.glob("*mujoco*.d*l*")
+)
+llvm.load_library_permanently(str(_LIBRARY))
+
+_MODEL_DATA = types.void(types.uintp, types.uintp)
+mj_kinematics = types.ExternalFunction("mj_kinematics", _MODEL_DATA)
+mj_com_pos = types.ExternalFunction("mj_comPos", _MODEL_DATA)
+mj_step = types.ExternalFunction("mj_step", _MODEL_DATA)
+mj_step1 = types.ExternalFunction("mj_step1", _MODEL_DATA)
+mj_step2 = types.ExternalFunction("mj_step2", _MODEL_DATA)
+mj_apply_force = types.ExternalFunction(
+    "mj_applyFT",
+    types.void(types.uintp, types.uintp, types.voidptr, types.voidptr, types.voidptr, types.int32, types.voidptr),
+)

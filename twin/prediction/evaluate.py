@@ -1,0 +1,99 @@
+"""The error of a given twin on given data. Nothing is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from twin.measurements import Recording
+from twin.prediction.prepared import PreparedRecording, prepare
+from twin.prediction.simulate import is_dynamic, simulate
+from twin.prediction.twin import Twin
+
+
+@dataclass(frozen=True)
+class OutputGroup:
+    """A group of outputs: how it is shown, and what is known of its sensors."""
+
+    unit: str  # shown
+    factor: float  # from SI to that unit
+    kind: str  # name in reports
+    typical_noise: float  # SI, of a usual sensor, until the noise is estimated
+    is_point: bool = False  # whether its channels are the x, y and z of points
+    has_declared_accuracy: bool = False  # whether a robot's declared accuracy is about it
+
+
+OUTPUT_GROUPS = {
+    "marker": OutputGroup("mm", 1e3, "position", 2.5e-4, is_point=True, has_declared_accuracy=True),
+    "displacement": OutputGroup("mm", 1e3, "tendon_displacement", 5e-5),
+    "tension": OutputGroup("N", 1.0, "tendon_tension", 2e-2),
+    "temperature": OutputGroup("K", 1.0, "sma_temperature", 0.5),
+    "resistance": OutputGroup("ohm", 1.0, "sma_resistance", 5e-3),
+    "sensor": OutputGroup("ohm", 1.0, "sensor_resistance", 0.5),
+    "angle": OutputGroup("deg", 180.0 / np.pi, "joint_angle", 2e-3, has_declared_accuracy=True),
+    "torque": OutputGroup("N*m", 1.0, "joint_torque", 1e-3),
+    "skin": OutputGroup("mm", 1e3, "skin", 2e-4, has_declared_accuracy=True),
+}
+
+
+def headline_group(groups: Iterable[str]) -> str:
+    """Return the group of outputs whose error stands for the twin: markers if there are any, else skin, else the first."""
+    groups = list(groups)
+    return next((g for g in ("marker", "skin") if g in groups), groups[0])
+
+
+def squared_errors(prepared: PreparedRecording, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
+    """Return the squared errors of a group, one array a trial: per sample and complete marker (Euclidean), or per sample and
+    channel."""
+    out = []
+    for r in raw:
+        if group == "marker":
+            markers = dict.fromkeys(o.index for o in prepared.outputs if o.group == "marker")
+            columns = [[j for j, o in enumerate(prepared.outputs) if o.group == "marker" and o.index == m] for m in markers]
+            found = np.concatenate([(r[:, c] ** 2).sum(axis=1) for c in columns])
+        else:
+            found = r[:, [j for j, o in enumerate(prepared.outputs) if o.group == group]].ravel() ** 2
+        out.append(found[np.isfinite(found)])
+    return out
+
+
+def rms(prepared: PreparedRecording, raw: Sequence[np.ndarray], group: str) -> float:
+    """Return the root-mean-square of residuals (n_k, n_output) of one group, SI; NaN where nothing was measured."""
+    found = np.concatenate(squared_errors(prepared, raw, group))
+    return float(np.sqrt(found.mean())) if found.size else float("nan")
+
+
+def evaluate(twin: Twin, recording: Recording) -> dict[str, Any]:
+    """Return the `error` block of the report contract for one twin.
+
+    Unit, trials, rmse (of positions where there are any), by_kind, by_channel (root-mean-square of the channel alone). Raises
+    TwinError for data that the twin cannot be compared with.
+    """
+    prepared = prepare(recording, twin.robot)
+    traces = simulate(twin, prepared, dynamic=is_dynamic(prepared))
+    raw = [y - t.outputs(twin, prepared) for y, t in zip(prepared.measured, traces, strict=True)]
+    groups = list(dict.fromkeys(o.group for o in prepared.outputs))
+    shown = {g: OUTPUT_GROUPS[g] for g in groups}
+    by_kind = {o.kind: {"unit": o.unit, "rmse": _or_none(o.factor * rms(prepared, raw, g))} for g, o in shown.items()}
+    everything = np.concatenate(raw)
+    by_channel = {
+        o.channel.name: {
+            "unit": shown[o.group].unit,
+            "rmse": _or_none(shown[o.group].factor * _channel_rms(everything[:, j])),
+        }
+        for j, o in enumerate(prepared.outputs)
+    }
+    first = by_kind[shown[headline_group(groups)].kind]
+    return {"trials": [t.label for t in recording.trials], **first, "by_kind": by_kind, "by_channel": by_channel}
+
+
+def _channel_rms(r: np.ndarray) -> float:
+    r = r[np.isfinite(r)]
+    return float(np.sqrt(np.mean(r**2))) if r.size else float("nan")
+
+
+def _or_none(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None

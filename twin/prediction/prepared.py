@@ -1,0 +1,294 @@
+"""A recording prepared for prediction: driving inputs, loads and clocks per trial, measured outputs as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_smoothing_spline
+
+from twin.body import Body, Drive, Drives, Loads, Port, Signals, drive_mask
+from twin.foundation.errors import DataError
+from twin.measurements import Channel, Recording, Trial
+from twin.measurements.channels import parse_channel_name
+from twin.measurements.patches import N_PATCHES, SHARED_NOISE_SHARE, Patches, camera_direction, cut_patches, point_scatter
+from twin.measurements.recording import EXTERNAL_CONTACT
+from twin.robots import Robot
+
+FEWEST_SMOOTHED_ROWS = 20  # of a thermometer; cross-validation of fewer is unreliable
+MOST_SPLINE_POINTS = 100  # enough to follow a room's temperature
+ROOM_TEMPERATURE = 296.15  # K, default: the temperature at which stiffness is quoted
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Inputs of one trial.
+
+    Time and clock (n,) s; reported command (n, n_tendon), SI, of each tendon's drive in `drives`, a current constant from one time
+    to the next; temperature (n,) K of the room; loads; `clouds`, patches of skin in point clouds, where these are compared. Between
+    rows tensions and displacements are interpolated smoothly if `smooth`.
+    """
+
+    name: str
+    time: np.ndarray
+    clock: np.ndarray
+    command: np.ndarray
+    drives: Drives
+    temperature: np.ndarray
+    loads: Loads
+    clouds: Patches | None = None
+    smooth: bool = True
+
+    @property
+    def signals(self) -> Signals:
+        """The reported drive signals of the trial; markers and other predicted signals are empty."""
+        n, nothing = len(self.time), np.zeros_like(self.command)
+        of = {kind: np.where(drive_mask(self.drives, kind), self.command, nothing) for kind in Drive}
+        return Signals(
+            self.time, self.clock, of[Drive.TENSION], of[Drive.DISPLACEMENT], np.zeros((n, 0, 3)), self.temperature, self.drives,
+            of[Drive.CURRENT], smooth=self.smooth,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Output:
+    """An output channel that the robot can predict, and its position in a trial's signals."""
+
+    channel: Channel
+    group: str  # as in `Signals.group`
+    index: int  # marker, tendon or joint, from 0
+    axis: int  # 0, 1, 2 for x, y, z; 0 for a scalar
+
+
+@dataclass(frozen=True)
+class PreparedRecording:
+    """A recording prepared for a robot. `measured[k]` is (n_k, n_output), NaN where missing; trials are in order of their clock.
+
+    `drives` is the kind of drive of each tendon, `drivers` its channel, and `pull` (n_tendon,) the tendon's command per unit of
+    that channel.
+    """
+
+    recording: Recording
+    robot: Robot
+    inputs: tuple[Inputs, ...]
+    outputs: tuple[Output, ...]
+    measured: tuple[np.ndarray, ...]
+    notices: tuple[str, ...]
+    drivers: tuple[Channel, ...]
+    pull: np.ndarray
+
+    @property
+    def n_tendon(self) -> int:
+        """Number of tendons."""
+        return len(self.drives)
+
+    @property
+    def drives(self) -> Drives:
+        """Drive of each tendon."""
+        return self.inputs[0].drives
+
+    def driven_by(self, kind: Drive) -> np.ndarray:
+        """Return (n_tendon,) whether a tendon has this kind of drive."""
+        return drive_mask(self.drives, kind)
+
+    @property
+    def reading(self) -> np.ndarray:
+        """(n_tendon,) typical resolution of the driving channels, N, m or A."""
+        return np.array([d.typical_noise for d in self.drives])
+
+    @property
+    def n_sample(self) -> int:
+        """Number of samples of all trials."""
+        return sum(len(i.time) for i in self.inputs)
+
+
+def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
+    """Prepare a recording for a robot.
+
+    Raises DataError where the inputs do not determine the robot, or no output is predictable.
+    """
+    recording, notices = _without_contact(recording)
+    body = robot.build()
+    _check_fingers(recording, robot, body)
+    driven = _drives(recording, robot, body)
+    names = [channel.name for channel, _ in driven]
+    notices += [
+        f"input {c.name} does not drive robot {robot.name!r} and is not used"
+        for c in recording.inputs()
+        if c.name not in {*names, *body.load_channels}
+    ]
+    pull = np.array([port.tendon_gains for _, port in driven])  # (n_drive, n_tendon)
+    through = np.argmax(np.abs(pull), axis=0)  # which of its drives pulls a tendon
+    drives = tuple(driven[k][1].drive for k in through)
+    if Drive.CURRENT in drives:
+        robot.springs(body.n_tendon)  # described, or refused
+    outputs, unknown = _outputs(recording, body, drives)
+    skin, camera, note = _skin(recording, body, outputs)
+    outputs, notices = (*outputs, *skin), [*notices, *note]
+    if not outputs:
+        raise DataError(f"{_source(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
+    notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
+    clocks, note = _clocks(recording)
+    notices += note
+    inputs, measured = [], []
+    for k in np.argsort([c[0] for c in clocks], kind="stable"):
+        trial = recording.trials[k]
+        readings, note = _columns(trial, names)
+        notices += note
+        notices += [f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in trial.other]
+        loads = _loads(recording, trial, robot, body)
+        seen = cut_patches(trial.clouds, camera) if skin else None
+        inputs.append(
+            Inputs(trial.name, trial.time, clocks[k], readings @ pull, drives, _temperature(recording, trial), loads, seen)
+        )  # fmt: skip
+        columns = [trial.values[o.channel.name][:, None] for o in outputs if o not in skin]
+        measured.append(np.hstack([*columns, seen.at(trial.time)] if seen else columns))
+    drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
+    return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
+
+
+def _check_fingers(recording: Recording, robot: Robot, body: Body) -> None:
+    """Raise DataError for a channel of a finger that the robot does not have."""
+    fingers = {parse_channel_name(name).finger for name in body.senses} - {None}
+    stray = [c.name for c in recording.channels if fingers and c.finger not in (*fingers, None)]
+    if stray:
+        raise DataError(
+            f"{_source(recording)}: robot {robot.name!r} has {len(fingers)} fingers, and {', '.join(stray[:3])}"
+            f"{', ...' if len(stray) > 3 else ''} are of another; remove them, or name the right finger"
+        )
+
+
+def _without_contact(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return the recording without trials under unknown contact forces, and notices. Raises DataError where that is all of them."""
+    free = tuple(t for t in recording.trials if EXTERNAL_CONTACT not in t.other)
+    if not free:
+        raise DataError(
+            f"{_source(recording)}: every trial has the condition {EXTERNAL_CONTACT!r}; under an unknown force no shape can be "
+            "predicted; record one without"
+        )
+    pushed = [t.name for t in recording.trials if EXTERNAL_CONTACT in t.other]
+    notes = [f"{name}: {EXTERNAL_CONTACT}, an unknown force; its shape is not predicted" for name in pushed]
+    return (replace(recording, trials=free) if pushed else recording), [*recording.notices, *notes]
+
+
+def _source(recording: Recording) -> str:
+    return str(recording.folder / "measurements.toml") if recording.folder else recording.title
+
+
+def _drives(recording: Recording, robot: Robot, body: Body) -> list[tuple[Channel, Port]]:
+    """Return the input channel of each of the body's drives, and its port. Raises DataError where one is missing or doubled."""
+    inputs, drives = {c.name: c for c in recording.inputs()}, []
+    for ports in body.ports:
+        found = [(inputs[p.channel], p) for p in ports if p.channel in inputs]
+        allowed = " or ".join(p.channel for p in ports)
+        if not found:
+            raise DataError(
+                f"{_source(recording)}: the inputs do not determine robot {robot.name!r}: give {allowed} the role 'input'"
+            )  # fmt: skip
+        if len(found) > 1:
+            raise DataError(
+                f"{_source(recording)}: {found[0][0].name} and {found[1][0].name} drive the same tendon; make one an 'output'"
+            )
+        drives.append(found[0])
+    return drives
+
+
+def _outputs(recording: Recording, body: Body, drives: Drives) -> tuple[tuple[Output, ...], list[str]]:
+    found, unknown = [], []
+    for channel in recording.outputs():
+        sense = body.senses.get(channel.name)
+        if sense is None or (sense.required_drive is not None and drives[sense.index] is not sense.required_drive):
+            unknown.append(channel.name)
+        else:
+            found.append(Output(channel, sense.group, sense.index, sense.axis))
+    return tuple(found), unknown
+
+
+def _skin(recording: Recording, body: Body, outputs: Sequence[Output]) -> tuple[tuple[Output, ...], np.ndarray, list[str]]:
+    """Return patches of skin as outputs, the direction (3,) to the camera, and notices.
+
+    Patches are used where clouds show the skin and no markers are compared. Beside markers, clouds stay data that no fit uses.
+    """
+    clouds = [t.clouds for t in recording.trials if t.clouds is not None and len(t.clouds.points)]
+    if not clouds or "skin" not in body.features or any(o.group == "marker" for o in outputs):
+        return (), np.zeros(3), []
+    camera, noise = camera_direction(clouds), SHARED_NOISE_SHARE * point_scatter(clouds)
+    if not camera.any() or not noise > 0.0:
+        why = "have too few points" if camera.any() else "do not show one side of the robot"
+        return (), np.zeros(3), [f"the point clouds {why}; they are not compared"]
+    named = [Channel(f"skin_{j}", "output", "mm", noise) for j in range(1, N_PATCHES + 1)]
+    said = (
+        f"no markers: the point clouds are compared, as {N_PATCHES} patches of skin, each taken to be known to {1e3 * noise:.2g} mm"
+    )
+    return tuple(Output(c, "skin", j, 0) for j, c in enumerate(named)), camera, [said]
+
+
+def _clocks(recording: Recording) -> tuple[list[np.ndarray], list[str]]:
+    starts = [t.start for t in recording.trials]
+    if all(s is not None for s in starts):
+        return [s + t.time - t.time[0] for s, t in zip(starts, recording.trials, strict=True) if s is not None], []
+    clocks, now = [], 0.0
+    for trial in recording.trials:
+        now = trial.start if trial.start is not None else now
+        clocks.append(now + trial.time - trial.time[0])
+        now = float(clocks[-1][-1])
+    return clocks, ["some trials have no `start`: they are taken to follow each other without a pause, which blurs drift and creep"]
+
+
+def _columns(trial: Trial, names: list[str]) -> tuple[np.ndarray, list[str]]:
+    """Return the drive columns of a trial. Gaps are bridged linearly, with a notice."""
+    columns, notes = [], []
+    for name in names:
+        values = trial.values[name]
+        known = np.isfinite(values)
+        if not known.any():
+            raise DataError(f"{trial.name}: input {name} is empty in this trial; remove the trial or log the channel")
+        if not known.all():
+            notes.append(
+                f"{trial.name}: {int((~known).sum())} missing values of input {name}; the twin is driven by a straight line there"
+            )
+            values = np.interp(trial.time, trial.time[known], values[known])
+        columns.append(values)
+    return np.stack(columns, axis=1), notes
+
+
+def _temperature(recording: Recording, trial: Trial) -> np.ndarray:
+    for channel in recording.channels:
+        if channel.kind == "ambient_temperature":
+            values = trial.values[channel.name]
+            known = np.isfinite(values)
+            if known.any():
+                return np.interp(trial.time, trial.time[known], smoothed_room_temperature(trial.time[known], values[known]))
+    return np.full(len(trial.time), float(trial.conditions.get("ambient_temperature", ROOM_TEMPERATURE)))
+
+
+def smoothed_room_temperature(time: np.ndarray, reading: np.ndarray) -> np.ndarray:
+    """Return a room's temperature (n,) K without its thermometer's noise, which no body follows.
+
+    0.1 K from row to row would be 0.06 mm at the tip of a robot that softens by 1 % a kelvin. The smoothing spline is chosen by
+    generalised cross-validation (Craven and Wahba, Numer. Math. 1979) through the means of at most `MOST_SPLINE_POINTS` parts, so
+    that an opened door stays visible. Fewer than `FEWEST_SMOOTHED_ROWS` rows are returned as they are.
+    """
+    if len(time) < FEWEST_SMOOTHED_ROWS or np.ptp(reading) == 0.0:
+        return reading
+    parts = np.array_split(np.stack([time, reading]), min(len(time), MOST_SPLINE_POINTS), axis=1)
+    at, mean = np.array([p.mean(axis=1) for p in parts]).T
+    return make_smoothing_spline(at, mean)(time)
+
+
+def _loads(recording: Recording, trial: Trial, robot: Robot, body: Body) -> Loads:
+    measured: dict[str, Any] = {
+        field: _columns(trial, [c.name])[0][:, 0]
+        for c in recording.inputs()
+        for name, field in body.load_channels.items()
+        if c.name == name
+    }
+    gravity = trial.conditions.get("gravity", recording.gravity if recording.gravity is not None else robot.gravity)
+    return Loads(
+        gravity=np.asarray(gravity, float),
+        payload=float(trial.conditions.get("tip_payload", 0.0)),
+        force=np.asarray(trial.conditions.get("tip_force", np.zeros(3)), float),
+        **measured,
+    )

@@ -1,0 +1,166 @@
+"""Controls: recordings whose inputs drive a twin and whose outputs, all that its robot shows, are still empty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.body import Drive, Loads, Problem
+from twin.foundation.errors import DataError
+from twin.measurements import Channel, Recording, Trial
+from twin.measurements.parsing.tables import read_table
+from twin.prediction.twin import Twin
+from twin.robots import Robot
+
+PROBE_TENSION = 0.01  # N; bends the robots by less than a degree, far more than a solve's tolerance
+CO_CONTRACTION = 0.1  # of the full pull, largest common pull
+PAUSE_RETARDATIONS = 10.0  # retardation times of creep between rollouts, which leave e^-10 of it
+# Units of the written channels.
+OUTPUT_UNITS = {"marker": "mm", "displacement": "mm", "tension": "N", "sensor": "ohm", "angle": "deg", "temperature": "degC"}
+INPUT_UNITS = {Drive.TENSION: "N", Drive.DISPLACEMENT: "mm", Drive.CURRENT: "A"}
+DRAWN_DRIVES = (Drive.TENSION, Drive.DISPLACEMENT)
+
+
+class FullPull(NamedTuple):
+    """A full pull: tension (N), travel (m) of a motor, and each tendon's direction at the tip, unit (n_tendon, 2)."""
+
+    tension: float
+    displacement: float
+    towards: np.ndarray
+
+
+def full_pull(twin: Twin) -> FullPull:
+    """Return the pull of one tendon that would move the tip sideways by half its height.
+
+    The motion is extrapolated linearly from a small pull; for an arc of constant curvature that is a bend of one radian. Gravity
+    and friction are neglected. Raises DataError for a robot whose tendons do not move a tip sideways.
+    """
+    body = twin.robot.build(twin.values)
+    solver, n = twin.robot.solver(body), body.n_tendon
+    if body.marker_sites:
+        path = solver.solve(Problem(np.arange(n + 1.0), PROBE_TENSION * np.eye(n + 1, n, -1), Loads(np.zeros(3))))
+        away, travel = path.markers[1:, :, :2] - path.markers[0, :, :2], path.path[0] - np.diagonal(path.path[1:])
+        tip = np.linalg.norm(away, axis=2).argmax(axis=1)  # of the finger that a tendon bends
+        away = away[np.arange(n), tip]
+        moved = np.linalg.norm(away, axis=1)
+        if moved.min() > 0.0:
+            share = float(moved.mean() / (0.5 * np.abs(path.markers[0, tip, 2]).mean()))
+            return FullPull(PROBE_TENSION / share, float(travel.mean()) / share, away / moved[:, None])
+    raise DataError(f"not every tendon of robot {twin.robot.name!r} moves a tip sideways: no controls are drawn for it; give them")
+
+
+def controls_from_table(twin: Twin, path: Path) -> Recording:
+    """Return one rollout from a CSV or Parquet file in SI: `time` (s), and a column for each tendon's drive.
+
+    Columns are tendon_I_tension (N), tendon_I_displacement (m) or sma_I_current (A). Raises DataError for a missing column, a value
+    that is not finite, and time that does not increase.
+    """
+    header = path.read_text("utf-8").partition("\n")[0] if path.suffix == ".csv" and path.is_file() else ""
+    drive = next((d for d in INPUT_UNITS if f"_{d}" in header), Drive.TENSION)
+    names = _input_names(twin.robot, drive)
+    table = read_table(path, ["time", *names])
+    for name, column in table.columns.items():
+        if not np.isfinite(column).all():
+            bad = int(np.flatnonzero(~np.isfinite(column))[0])
+            raise DataError(f"{table.cell(bad, name)}: a rollout needs a finite number there")
+    trial = Trial(path.stem, table.columns["time"], {name: table.columns[name] for name in names})
+    return _controls_recording(twin, [trial], drive, f"rollout under {path.name}")
+
+
+def controls_from_set(twin: Twin, recording: Recording) -> Recording:
+    """Return a measurement set's inputs and conditions, a rollout a trial. Raises DataError where they do not drive the robot."""
+    present = {c.name for c in recording.channels}
+    fitting = [d for d in INPUT_UNITS if set(_input_names(twin.robot, d)) <= {c.name for c in recording.inputs()}]
+    if not fitting:
+        wanted = " or ".join(_input_names(twin.robot, d)[0].replace("_1_", "_I_") for d in INPUT_UNITS)
+        raise DataError(f"the set's inputs do not drive robot {twin.robot.name!r}: {wanted} of each tendon is needed")
+    names = _input_names(twin.robot, fitting[0])
+    kept = [c.name for c in recording.contexts() if c.kind == "ambient_temperature" and c.name in present]
+    trials = [replace(t, values={n: t.values[n] for n in (*names, *kept)}, clouds=None) for t in recording.trials]
+    made = _controls_recording(
+        twin, trials, fitting[0], f"rollout under {recording.title}", [c for c in recording.channels if c.name in kept]
+    )
+    return replace(made, gravity=recording.gravity)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How controls are drawn: from slack, eased moves of 0.3 to 1.5 s from bend to bend, drawn uniformly from a disk.
+
+    Each tendon takes the part of a bend along its own direction, up to `pull`. Displacements pay out on the far side; tensions are
+    zero there, except for a common pull of up to `CO_CONTRACTION` of the largest.
+    """
+
+    seconds: float = 10.0
+    rate: float = 50.0
+    drive: Drive = Drive.TENSION
+    pull: float | None = None  # N or m; None for `full_pull`
+
+    def __post_init__(self) -> None:
+        if self.drive not in DRAWN_DRIVES:
+            raise DataError(f"controls by {self.drive} are not drawn; allowed: {', '.join(DRAWN_DRIVES)}")
+        for name, value in (("seconds", self.seconds), ("rate", self.rate), ("pull", 1.0 if self.pull is None else self.pull)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise DataError(f"{name} = {value:g}; a number above zero is needed")
+
+
+def draw_controls(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = None) -> Recording:
+    """Draw controls for n rollouts; rollout k depends on the seed and k only."""
+    drawing = drawing or Drawing()
+    if n < 1:
+        raise DataError(f"{n} rollouts asked for; at least one is needed")
+    by_length, pull = drawing.drive is Drive.DISPLACEMENT, full_pull(twin)
+    full = drawing.pull or (pull.displacement if by_length else pull.tension)
+    time = np.arange(round(drawing.seconds * drawing.rate) + 1) / drawing.rate
+    names = _input_names(twin.robot, drawing.drive)
+    trials = []
+    for k in range(n):
+        rng = np.random.default_rng([seed, k])
+        knots = np.append(0.0, np.cumsum(rng.uniform(0.3, 1.5, int(time[-1] / 0.3) + 2)))
+        radius, angle = np.sqrt(rng.uniform(size=len(knots))), rng.uniform(0.0, 2.0 * np.pi, len(knots))
+        pulls = full * (radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])) @ pull.towards.T
+        if not by_length:
+            pulls = np.maximum(pulls, 0.0) + full * CO_CONTRACTION * rng.uniform(size=(len(knots), 1))
+        pulls[0] = 0.0
+        at, way = np.divmod(np.interp(time, knots, np.arange(len(knots))), 1.0)
+        command = np.stack([np.interp(at + way**2 * (3 - 2 * way), np.arange(len(knots)), p) for p in pulls.T])
+        trials.append(Trial(f"rollout_{k + 1}", time, dict(zip(names, command, strict=True))))
+    return _controls_recording(twin, trials, drawing.drive, f"{n} drawn rollouts, seed {seed}")
+
+
+def _input_names(robot: Robot, drive: Drive) -> list[str]:
+    ports = [next((p for p in ports if p.drive is drive), None) for ports in robot.build().ports]
+    if None in ports:
+        raise DataError(f"robot {robot.name!r} is not driven by {drive}s of its tendons: rollouts are not made for it")
+    return [p.channel for p in ports if p is not None]
+
+
+def _output_channels(robot: Robot, inputs: Mapping[str, object] | list[str], drive: Drive) -> list[Channel]:
+    """Return all outputs that a robot shows, without those that drive it and without a tip that repeats its last marker."""
+    body = robot.build()
+    twice = bool(body.marker_sites) and body.marker_sites[-1] in body.marker_sites[:-1]
+    return [
+        Channel(name, "output", OUTPUT_UNITS.get(sense.group, "N"))
+        for name, sense in body.senses.items()
+        if sense.required_drive in (None, drive)
+        and sense.group in OUTPUT_UNITS
+        and name not in inputs
+        and not (twice and name.startswith("tip_"))
+    ]
+
+
+def _controls_recording(twin: Twin, trials: list[Trial], drive: Drive, title: str, more: list[Channel] | None = None) -> Recording:
+    names = _input_names(twin.robot, drive)
+    outputs = _output_channels(twin.robot, names, drive)
+    channels = (*(Channel(n, "input", INPUT_UNITS[drive]) for n in names), *(more or []), *outputs)
+    pause = PAUSE_RETARDATIONS * max(twin.effect_chain.creep.time, default=0.1)
+    starts = np.cumsum([0.0, *(float(t.time[-1] - t.time[0]) + pause for t in trials)])
+    filled = tuple(
+        replace(t, values={**t.values, **{c.name: np.full(len(t.time), np.nan) for c in outputs}}, start=float(starts[k]))
+        for k, t in enumerate(trials)
+    )
+    return Recording(twin.robot.name, title, f"controls for a twin of {twin.robot.name}", None, channels, filled)

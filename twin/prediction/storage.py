@@ -1,0 +1,121 @@
+"""`twin.toml`: the robot, the calibrated parameters and the effects in force, all that a prediction needs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import Field
+
+from twin.foundation.atomic_write import write_atomically
+from twin.foundation.errors import DataError, join_problems, short_repr
+from twin.foundation.file_schema import TableSchema, TextLine, validate_table
+from twin.foundation.files import is_file
+from twin.foundation.parameters import FittedValue
+from twin.foundation.toml_file import open_toml
+from twin.prediction.twin import Twin
+from twin.robots import Robot, load, robot_names
+from twin.robots.effect_tables import read_effects, read_values
+from twin.robots.robot import models_folder
+
+TWIN_FORMAT = "twin/1"
+
+
+def read_twin(source: str | Path) -> Twin:
+    """Read a twin from a `twin.toml`, a folder that holds one (a report), or a robot's name alone.
+
+    Raises DataError where the file breaks its contract, UnknownNameError for a robot's name that does not exist.
+    """
+    path = Path(source)
+    if is_file(path / "twin.toml"):
+        path = path / "twin.toml"
+    if path.suffix != ".toml" or not is_file(path):
+        if path.suffix == ".toml" or (os.sep in str(source) and not is_file(path / "robot.toml")):
+            robots = f"the folder of a robot, or one of {', '.join(robot_names())}"
+            raise DataError(f"{short_repr(str(path), 300)}: no such twin; give a twin.toml, a folder with one, {robots}")
+        return Twin.of(load(str(source)))
+    with open_toml(path, TWIN_FORMAT) as table:
+        return _twin(table, path.parent)
+
+
+def standard_errors(source: str | Path) -> dict[str, float]:
+    """Return the standard errors (SI) of a twin's parameters, where its file has them; none for a robot's name alone."""
+    path = Path(source)
+    path = path / "twin.toml" if is_file(path / "twin.toml") else path
+    if path.suffix != ".toml":
+        return {}
+    with open_toml(path, TWIN_FORMAT) as table:
+        file = validate_table(TwinFile, table, "", [])
+    entries = file.parameters if file is not None else {}
+    return {n: float(e["std"]) for n, e in entries.items() if isinstance(e, dict) and isinstance(e.get("std"), float)}
+
+
+class TwinFile(TableSchema):
+    """The top of a `twin.toml`."""
+
+    format: str = Field(description=f'"{TWIN_FORMAT}"')
+    robot: TextLine = Field(description="a robot's name, or the path to its folder from this file")
+    parameters: dict[str, Any] = Field({}, description="calibrated values; what is absent keeps the robot's nominal value")
+    effect: list[Any] = Field([], description="[[effect]] tables: the laws in force")
+    provenance: dict[str, Any] = Field({}, description="versions, seed, data hash, command, date; free")
+
+
+def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
+    """Return the twin of a file's content. Raises DataError with all its faults."""
+    problems: list[str] = []
+    file = validate_table(TwinFile, table, "", problems)
+    if file is None:
+        raise DataError(join_problems(problems))
+    robot = load(file.robot, folder)
+    values = read_values(file.parameters, robot.parameters, "parameters", problems)
+    effects = read_effects(file.effect, robot.n_tendon, robot.size, problems)
+    if not problems:
+        problems += robot.find_conflicts(values)
+    if problems:
+        raise DataError(join_problems(problems))
+    return Twin(robot, values, tuple(effects))
+
+
+def twin_table(
+    twin: Twin, folder: Path, parameters: Mapping[str, FittedValue], effects: Mapping[str, Mapping[str, FittedValue]]
+) -> dict[str, Any]:
+    """Return a twin as the content of its file in `folder`, with standard errors where a fit found them."""
+    units = {p.name: p.unit for p in twin.robot.parameters}
+    table: dict[str, Any] = {"format": TWIN_FORMAT, "robot": robot_reference(twin.robot, folder)}
+    table["parameters"] = {
+        n: value_entry(parameters.get(n) or FittedValue(v, None, units[n])) for n, v in sorted(twin.values.items())
+    }
+    table["effect"] = []
+    for effect in twin.effects:
+        laws = {p.name: p.unit for p in effect.all_parameters(effect.n_tendon)}
+        found = effects.get(effect.id, {})
+        values = {n: value_entry(found.get(n) or FittedValue(v, None, laws[n])) for n, v in effect.values.items()}
+        table["effect"].append({"id": effect.id, "parameters": values})
+    return table
+
+
+def robot_reference(robot: Robot, folder: Path) -> str:
+    """Return the robot's name if it ships with the program, else the path from `folder` to its own."""
+    if robot.folder == (models_folder() / robot.name).resolve():
+        return robot.name
+    path = Path(os.path.relpath(robot.folder, folder.resolve())).as_posix()
+    return path if path.startswith("..") else f"./{path}"
+
+
+def value_entry(fitted: FittedValue) -> dict[str, Any]:
+    """Return a value with unit and, where known, standard error, as reports and twins write it."""
+    out: dict[str, Any] = {"value": fitted.value, "unit": fitted.unit}
+    return out if fitted.std is None else {**out, "std": fitted.std}
+
+
+def write_twin(path: Path, table: Mapping[str, Any], provenance: Mapping[str, Any]) -> None:
+    """Write a twin completely or not at all, through a temporary file."""
+    write_atomically(path, twin_text(table, provenance).encode(), "give another place with --out")
+
+
+def twin_text(table: Mapping[str, Any], provenance: Mapping[str, Any]) -> str:
+    """Return the text of a `twin.toml`."""
+    return tomli_w.dumps({**table, "provenance": dict(provenance)})

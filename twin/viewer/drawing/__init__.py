@@ -1,0 +1,1 @@
+"""Drawing in the browser: scene, solids, colours, pictures and films."""
