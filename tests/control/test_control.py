@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 
 from tools.benchmarks.control.baselines import PITensionLoop
 from tools.benchmarks.control.tracking import KNOWN, LENGTH, RADIUS, Bench, Run, attempt, controller, track, unknown
-from tools.examples import circle, heat
 from twin.body import Loads
 from twin.control import HeatingGuard, PIController, RBFNetwork, TensionLoop
 from twin.control import tip_controller as tip_module
@@ -58,7 +56,7 @@ def test_a_step_of_pi_is_its_equation() -> None:
 
 def test_a_step_of_the_network_is_its_equation() -> None:
     """One input, centres half apart, width a half. W' H after one step from nothing is dt rate e, then fades by dt leak."""
-    network, X = RBFNetwork(1, 1, rate=2.0, limit=10.0, leak=0.1, per_tendon_values=5), np.array([[0.5]])
+    network, X = RBFNetwork(1, 1, rate=2.0, limit=10.0, leak=0.1, each=5), np.array([[0.5]])
     H = np.exp(-0.5 * ((0.5 - np.array([-1.0, -0.5, 0.0, 0.5, 1.0])) / 0.5) ** 2)
     np.testing.assert_allclose(network.activations(X)[0], H)
     np.testing.assert_allclose(network.activations(np.array([[9.0]])), network.activations(np.array([[1.2]])))
@@ -359,10 +357,3 @@ def test_what_the_model_is_off_by_is_taken_from_where_it_is_sent(reset: float | 
     for aim, sent in zip(aims, (later, wanted), strict=True):
         assert (aim - sent - robot.integral)[0] == pytest.approx(-off, abs=0.15 * 0.003)  # a bend of 0.05 rad on top of some 0.1
     assert (robot.tip - told.tip)[0] == pytest.approx(off, abs=0.15 * 0.003)
-
-
-def test_the_examples_write_their_pages(tmp_path: Path) -> None:
-    heat.main(tmp_path / "heat.html", seconds=60.0)
-    circle.main(tmp_path / "circle.html", until=2.0)
-    for name, title in (("heat", "Tension against temperature (simulation"), ("circle", "mm RMS")):
-        assert title in (tmp_path / f"{name}.html").read_text(encoding="utf-8")

@@ -220,7 +220,8 @@ def test_a_law_that_lets_tendons_fall_slack_lacks_what_they_would_hear(
     shares = {2: np.array([[1.0, 0.1], [0.5, 0.75]]), 0: np.array([[0.3, 0.9]])}
     bench = SimpleNamespace(driven_by=lambda kind: np.full(2, kind is drive), inputs=shares)
     monkeypatch.setattr(
-        "twin.diagnosis.fit_context.transmitted_noise", lambda twin, share, noise, pair: share if (twin, len(noise)) == ("twin", 2) else 0.0
+        "twin.diagnosis.fit_context.transmitted_noise",
+        lambda twin, share, noise, pair: share if (twin, len(noise)) == ("twin", 2) else 0.0,
     )
     study = FitContext(SimpleNamespace(whitener=SimpleNamespace(heard=heard, noise=noise), trials=[2, 0], prepared=bench), None)  # type: ignore[arg-type]
     tension = {0: np.array([[0.0, 0.09]]), 1: np.zeros((5, 2)), 2: np.array([[0.19, 0.0], [0.1, 0.09]])}
@@ -336,7 +337,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(
         assert found.nominal == tuple(f"readings of {i.name}" for i in day.inputs)
         assert found.prepared.notices == (*day.notices, f"{day.inputs[1].name}: unstable start, its shape is one of several")
         assert found.suspicions == ("odd",)
-        assert found.loops.per_tendon_values == tuple(loop for loop in loops(day).per_tendon_values if loop.trial not in found.held_out)
+        assert found.loops.by_trial == tuple(loop for loop in loops(day).by_trial if loop.trial not in found.held_out)
     assert told == ["nominal prediction", "what the files may mean otherwise"] * 2
 
 

@@ -186,7 +186,9 @@ def starts(law: type[Effect], data: Recording) -> list[Effect]:
     robot = load(data.robot)
     bench, n = prepare(data, robot), robot.n_tendon
     predicted = [t.true for t in simulate(Twin(robot), bench)]
-    held = [s.with_changes(drives=(Drive.DISPLACEMENT,) * n) for s in predicted]  # some laws are sought only where displacements command
+    held = [
+        s.with_changes(drives=(Drive.DISPLACEMENT,) * n) for s in predicted
+    ]  # some laws are sought only where displacements command
     found = list(law.fit_starts(predicted, n)) or list(law.fit_starts(held, n))
     assert found, "a law needs somewhere to start a fit"
     return [law({**s.values}, n) for s in found[:4]]

@@ -18,7 +18,9 @@ INDEX = st.integers(1, 9999)
 def test_names_say_what_they_were_made_of(kind: str, index: int, axis: str, finger: int | None) -> None:
     pattern, _ = CHANNEL_KINDS[kind]
     name = (f"finger_{finger}_" if finger else "") + pattern.replace("#", str(index)).replace("@", axis)
-    assert parse_channel_name(name) == ChannelName(kind, index if "#" in pattern else None, axis if "@" in pattern else None, finger)
+    assert parse_channel_name(name) == ChannelName(
+        kind, index if "#" in pattern else None, axis if "@" in pattern else None, finger
+    )
 
 
 @given(st.text("tendo_1289xyzkispamr", max_size=24) | st.text(max_size=12))

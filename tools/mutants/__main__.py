@@ -33,7 +33,7 @@ def main() -> None:
     parser.add_argument("--patience", type=float, default=300.0, help="s, for the tests of one mutant")
     args = parser.parse_args()
     if args.what != "table":
-        drawn = (lambda texts: sampled(texts, args.seed, args.per_tendon_values)) if args.what == "run" else survivors
+        drawn = (lambda texts: sampled(texts, args.seed, args.each)) if args.what == "run" else survivors
         run(args.only or list(GROUPS), drawn, args.patience)
     print(table(_known()))
 

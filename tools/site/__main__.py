@@ -1,6 +1,6 @@
 """Build the documentation site: python -m tools.site [--serve]   (extra `docs`)
 
-Collects the README pages, makes an API page for each package and one for every effect, and runs `mkdocs build --strict` into build/site.
+Collects the README pages, makes an API page for each package and every effect, and runs `mkdocs build --strict` into build/site.
 """
 
 from __future__ import annotations
@@ -44,13 +44,20 @@ def main(serve: bool) -> None:
         (PAGES / "tools/figures").mkdir(parents=True, exist_ok=True)
         shutil.copy(picture, PAGES / "tools/figures" / picture.name)
     verb = ["serve"] if serve else ["build", "--strict", "--quiet"]
-    subprocess.run([sys.executable, "-m", "mkdocs", *verb, "--config-file", str(Path(__file__).with_name("mkdocs.yml"))], check=True)
+    subprocess.run(
+        [sys.executable, "-m", "mkdocs", *verb, "--config-file", str(Path(__file__).with_name("mkdocs.yml"))], check=True
+    )
 
 
 def _readmes() -> list[Path]:
     """The pages: README, CHANGELOG, CONTRIBUTING, those of packages, robots and tools."""
     top = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")]
-    return [*top, *sorted(ROOT.glob("twin/**/README.md")), *sorted(ROOT.glob("models/**/README.md")), *sorted(ROOT.glob("tools/**/*.md"))]
+    return [
+        *top,
+        *sorted(ROOT.glob("twin/**/README.md")),
+        *sorted(ROOT.glob("models/**/README.md")),
+        *sorted(ROOT.glob("tools/**/*.md")),
+    ]
 
 
 def _target(path: Path) -> str:

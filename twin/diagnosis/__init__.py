@@ -23,10 +23,10 @@ from twin.diagnosis.pipeline import calibration, diagnose
 
 __all__ = [
     "Claim",
+    "DataPreview",
     "Diagnosis",
     "Errors",
     "Fold",
-    "DataPreview",
     "Settings",
     "Suspicion",
     "calibration",

@@ -77,7 +77,9 @@ class Diagnosis:
     claims: tuple[Claim, ...]
     runners_up: tuple[Claim, ...]
     below_materiality: tuple[Claim, ...]
-    parameters: dict[str, FittedValue]  # the robot's own, and as "effect.parameter" what was uncertain of effects it is known to have
+    parameters: dict[
+        str, FittedValue
+    ]  # the robot's own, and as "effect.parameter" what was uncertain of effects it is known to have
     unfixed: tuple[str, ...]
     correlation: tuple[tuple[str, ...], np.ndarray]  # of the errors of what was fitted, by its labels
     errors: Errors

@@ -178,7 +178,8 @@ def _anew(found: Conclusion, opened: HeldOut) -> Iterator[str]:
         unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
         fitted, own = (factor * e for e in opened.rezeroed(group))
         yield (
-            f"sealed trials, {OUTPUT_GROUPS[group].kind}: {fitted:.3g} {unit} with the zeros that were fitted, {own:.3g} {unit} where each "
+            f"held-out trials, {OUTPUT_GROUPS[group].kind}: {fitted:.3g} {unit} with the zeros that were fitted, "
+            f"{own:.3g} {unit} where each "
             f"trial's is taken from its own first {FIRST} rows; the first counts"
         )
 

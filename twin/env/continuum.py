@@ -52,7 +52,8 @@ class ContinuumOptions:
 class ContinuumReach(TwinEnv):
     """Bring the tip of a tendon-driven backbone to a goal and hold it there.
 
-    `twin`: a twin.toml, a report's folder or a robot's name. Its effects act as in predictions, with lag, drift and hysteresis of the
+    `twin`: a twin.toml, a report's folder or a robot's name. Its effects act as in predictions, with lag, drift and hysteresis of
+    the
     episode's own history. n tendons; one full pull F bends the robot by some one radian (`twin.prediction.rollout.full_pull`), in
     newtons, or with `drive="displacement"` as the travel of a motor; with `drive="current"` it is the current under which an SMA
     spring rests 45 K above its phase change (`twin.prediction.kinematics.warmest_current`). Springs start cold, pull on one side
@@ -152,8 +153,8 @@ class ContinuumReach(TwinEnv):
     def _limit_command(self, command: np.ndarray) -> np.ndarray:
         """Return the nearest command (k,) within the limits."""
         if self.drive is Drive.DISPLACEMENT:
-            return command * min(1.0, self._most / max(float(np.linalg.norm(command)), 1e-12))
-        return np.clip(command, 0.0, self._most)
+            return command * min(1.0, self._largest_command / max(float(np.linalg.norm(command)), 1e-12))
+        return np.clip(command, 0.0, self._largest_command)
 
     def _draw_plant(self) -> RodPlant:
         """Draw an episode's twin and payload, and build its robot. Raises SolveError where it has no equilibrium."""

@@ -102,7 +102,7 @@ class HandReorient(TwinEnv):
         return self._observation(), -info["error"] - float(np.linalg.norm(offset)), False, False, info
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """Return (480, 640, 3) bytes with `render_mode="rgb_array"`: a red arrow along the block, a green one where it should point.
+        """Return (480, 640, 3) bytes with `render_mode="rgb_array"`: a red arrow along the block, a green one where it should.
 
         Raises TwinError where this machine cannot draw.
         """

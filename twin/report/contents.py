@@ -53,7 +53,7 @@ def contents(diagnosis: Diagnosis, provenance: Mapping[str, Any]) -> dict[str, A
             "after": finite_or_none(d.structure_after),
             "components": {name: finite_or_none(size) for name, size in d.structure.items()},
         },
-        "loops": loops_json(d.loops, trial_labels(d, tuple(loop.trial for loop in d.loops.per_tendon_values))),
+        "loops": loops_json(d.loops, trial_labels(d, tuple(loop.trial for loop in d.loops.by_trial))),
         "ambiguous": [list(effects) for effects in d.ambiguous],
         "next_experiment": describe_experiment(d),
         "identifiability": [_visibility(v) for v in d.identifiability],

@@ -46,17 +46,17 @@ def recorded(
 def test_the_width_and_the_sign_are_what_was_put_in(lag: float, share: tuple[float, ...]) -> None:
     found = loops(recorded(OUT, lag=lag, share=share))
     assert (found.group, found.name) == ("marker", "disk_8")
-    assert len(found.per_tendon_values) == 3
+    assert len(found.by_trial) == 3
     # Release less pull is twice `lag`; the pairs next to the turn, 2 of 57, may mix both sides: 4 % and the noise of 170 pairs.
     assert found.lag == pytest.approx(2.0 * lag, rel=0.05)
     assert found.seen
-    assert all(loop.seen for loop in found.per_tendon_values)
+    assert all(loop.seen for loop in found.by_trial)
 
 
 def test_no_loop_is_none_and_its_noise_is_that_of_the_readings() -> None:
     found = loops(recorded(OUT, lag=0.0))
     assert not found.seen
-    pairs = sum(loop.pairs for loop in found.per_tendon_values)
+    pairs = sum(loop.pairs for loop in found.by_trial)
     # Each pair is the difference of two readings, one of them at a row or half way to the next: sqrt(1.5) to sqrt(2) sigma; of
     # 170 pairs that is known to 6 %, three times of which is allowed.
     assert 1.0 * NOISE < found.noise * np.sqrt(pairs) < 1.67 * NOISE
@@ -67,7 +67,7 @@ def test_one_visit_in_each_direction_leaves_time_and_direction_confounded() -> N
     once = loops(recorded(OUT, lag=0.0, drift=1.5e-5))
     assert once.seen
     assert once.confounded
-    assert all(loop.drift is None for loop in once.per_tendon_values)
+    assert all(loop.drift is None for loop in once.by_trial)
     again = loops(recorded(TWICE, lag=0.0, drift=1.5e-5))
     assert not again.confounded
     both = loops(recorded(TWICE, lag=HALF, drift=1.5e-5))
@@ -80,7 +80,7 @@ def test_one_visit_in_each_direction_leaves_time_and_direction_confounded() -> N
 def test_a_drift_is_half_the_difference_of_pairs_that_begin_pulling_and_that_begin_releasing() -> None:
     """The pulls of TWICE come back after 199, 40 and 40 s in the mean of 80, 80 and 40 rows, 93 s; its release after 40 s."""
     for rate in (1.5e-5, -4e-5):
-        each = loops(recorded(TWICE, lag=HALF, drift=rate, noise=1e-9)).per_tendon_values
+        each = loops(recorded(TWICE, lag=HALF, drift=rate, noise=1e-9)).by_trial
         assert [loop.drift for loop in each] == pytest.approx([rate * 0.5 * (93.0 + 40.0)] * 3, rel=0.05)
 
 
@@ -103,7 +103,7 @@ def test_commands_that_never_come_back_show_no_loop() -> None:
 def test_what_was_not_measured_is_not_compared() -> None:
     bench = recorded(OUT)
     blind = replace(bench, measured=(np.full_like(bench.measured[0], np.nan), *bench.measured[1:]))
-    assert [loop.trial for loop in loops(blind).per_tendon_values] == [1, 2]
+    assert [loop.trial for loop in loops(blind).by_trial] == [1, 2]
 
 
 def test_friction_lags_on_a_day_of_the_bench_and_a_day_without_effect_does_not() -> None:

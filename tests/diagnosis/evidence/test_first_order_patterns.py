@@ -25,7 +25,9 @@ def law(starts: list[FitStart], akin: tuple[str, ...] = (), needs: frozenset[str
         yield from starts
 
     declared = [SimpleNamespace(name=n, value=v) for n, v in (("a", 0.0), ("b", 1.0), ("t", 5.0))]
-    return SimpleNamespace(fit_starts=from_, confusable_with=akin, needs=needs, inactive_when_off=("t",), all_parameters=lambda n_tendon: declared)
+    return SimpleNamespace(
+        fit_starts=from_, confusable_with=akin, needs=needs, inactive_when_off=("t",), all_parameters=lambda n_tendon: declared
+    )
 
 
 BOTH = FitStart({"a": 0.5, "b": 3.0, "t": 8.0}, ("a", "b", "t"))
@@ -39,7 +41,9 @@ class World:
         self.asked: list[list[Any]] = []
         self.lost: set[str] = set()
         monkeypatch.setattr(stage, "catalogue", lambda: laws)
-        monkeypatch.setattr(stage, "scaled_starts", lambda law, predicted, n, size: law.fit_starts(predicted, n) if size == "its size" else ())
+        monkeypatch.setattr(
+            stage, "scaled_starts", lambda law, predicted, n, size: law.fit_starts(predicted, n) if size == "its size" else ()
+        )
         monkeypatch.setattr(stage, "scaled_parameters", lambda law, n, size: law.all_parameters(n) if size == "its size" else ())
         chain = SimpleNamespace(sense=lambda true: ((), true))
         twin = SimpleNamespace(effects=[SimpleNamespace(id=e) for e in present], effect_chain=chain)
@@ -96,7 +100,9 @@ def test_what_is_there_what_is_like_it_and_what_the_body_has_no_part_for_has_no_
         "routing": law([ONE], akin=("gain",), needs=frozenset({"tendons"})),
         "bedding": law([ONE], needs=frozenset({"antagonists"})),
         "mirror": law([FitStart({"a": -1.0}, ("a",)), ONE]),
-        "saturation": law([FitStart({"a": 0.7}, ("a",), frozenset({"ropes"})), FitStart({"a": 0.6}, ("a",), frozenset({"tendons"}))]),
+        "saturation": law(
+            [FitStart({"a": 0.7}, ("a",), frozenset({"ropes"})), FitStart({"a": 0.6}, ("a",), frozenset({"tendons"}))]
+        ),
     }
     assert [p.effect for p in World(monkeypatch, laws, ("friction",)).found().patterns] == ["routing", "mirror", "saturation"]
     found = World(monkeypatch, laws).found().patterns

@@ -118,7 +118,10 @@ def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: p
     assert then == {"near": after, "J": member.fit.J, "tolerance": ROUGHLY, "worth": LITTLE, "beat": 7.0}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, drift, start) is None
-    for effect, begun in ((drift, FitStart({"rate_1": 1e-5}, ("rate_1",))), (CREEP, FitStart({"amplitude": 0.1}, ("amplitude", "time")))):
+    for effect, begun in (
+        (drift, FitStart({"rate_1": 1e-5}, ("rate_1",))),
+        (CREEP, FitStart({"amplitude": 0.1}, ("amplitude", "time"))),
+    ):
         plain = Fits(monkeypatch)
         assert with_effect_added(study(), member, effect, begun) is not None
         assert len(plain.asked) == 1

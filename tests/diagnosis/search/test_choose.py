@@ -38,7 +38,9 @@ def errors(rms: float, headline: float) -> Any:
 @pytest.fixture(autouse=True)
 def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stage, "left_out", lambda study, fit: errors(fit.unseen, fit.headline))
-    monkeypatch.setattr(stage, "predictive_errors", lambda study, w: PredictiveErrors(errors(w.fit.unseen, w.fit.headline), w.fit.far))
+    monkeypatch.setattr(
+        stage, "predictive_errors", lambda study, w: PredictiveErrors(errors(w.fit.unseen, w.fit.headline), w.fit.far)
+    )
     monkeypatch.setattr(stage, "solves", lambda study, twin: True)
 
 

@@ -146,7 +146,7 @@ def test_the_tangent_is_the_slope_of_the_residual(mu: float, wall: np.ndarray) -
 def test_what_a_solution_keeps_is_its_tangents_factors(mu: float) -> None:
     """Of the transpose. With them a neighbour is solved in one step, and the derivatives of a fit are made."""
     e, route = Equilibrium(edited()), Route(mu, 4e-4)
-    t, T = swept((0, 0, 0), (3, 1, 0), (2, 2, 0), per_tendon_values=3)
+    t, T = swept((0, 0, 0), (3, 1, 0), (2, 2, 0), each=3)
     loads = Loads(SIDEWAYS, 0.02)
     path = e.solve(Problem(t, T, loads, route, keep=True, tolerance=1e-10))
     for i in (1, 4, 6):
@@ -176,7 +176,7 @@ def test_a_post_is_met_and_not_jumped(drive: Drive) -> None:
 def test_a_solution_is_a_minimum_of_the_energy() -> None:
     body = edited(stiffness_gradient={"gradient": 0.4}, tendon_routing={"angle_2": 0.2, "radius_1": 5e-4})
     energy, e = Energy(body), Equilibrium(body)
-    t, T = swept((0, 0, 0), (3, 1, 0), (0.5, 3, 2), per_tendon_values=3)
+    t, T = swept((0, 0, 0), (3, 1, 0), (0.5, 3, 2), each=3)
     loads = Loads(SIDEWAYS, 0.02, wall=WALL)
     path = e.solve(Problem(t, T, loads))
     rest, rng = np.zeros(48), np.random.default_rng(0)

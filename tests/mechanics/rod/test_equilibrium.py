@@ -76,7 +76,7 @@ def test_the_tip_is_the_rods(case: str, planar: bool) -> None:
 @pytest.mark.parametrize("mu", [0.1, 0.3])
 def test_with_friction_the_tip_is_the_rods(mu: float) -> None:
     """Loading, unloading and loading again, both laws with so short a pre-sliding that holes slide or reverse at once."""
-    t, T = swept((0, 0, 0), (3, 0, 0), (1, 0, 0), (2.5, 1, 0), per_tendon_values=60)
+    t, T = swept((0, 0, 0), (3, 0, 0), (1, 0, 0), (2.5, 1, 0), each=60)
     ours = tips(solver().solve(Problem(t, T, Loads(SIDEWAYS, 0.01), Route(mu, 2e-5))))
     lead = np.array([0.25, 0.5, 0.75])
     drive, weight = np.vstack([np.zeros((3, 3)), T]), np.append(lead, np.ones(len(T)))

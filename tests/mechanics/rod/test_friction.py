@@ -20,7 +20,7 @@ def test_a_sliding_tendon_loses_what_the_capstan_says(pulling: bool) -> None:
     """The tensions of all segments are what balances the solved shape: least squares, 8 unknowns in 48 equations."""
     mu, body = 0.2, load("continuum").build()
     energy, e = Energy(body), Equilibrium(body)
-    t, T = swept((0, 0, 0), (3, 0, 0), per_tendon_values=60) if pulling else swept((0, 0, 0), (4, 0, 0), (2, 0, 0), per_tendon_values=60)
+    t, T = swept((0, 0, 0), (3, 0, 0), each=60) if pulling else swept((0, 0, 0), (4, 0, 0), (2, 0, 0), each=60)
     path = e.solve(Problem(t, T, Loads(NOWHERE), Route(mu, 2e-5), tolerance=EXACT))
     q = path.q[-1]
     np.testing.assert_array_equal(path.slip[0, 1:], 1.0 if pulling else -1.0)
@@ -60,7 +60,7 @@ def test_friction_does_not_know_the_clock() -> None:
 def test_loads_come_in_the_stated_order() -> None:
     """Gravity and payload first, then the first tensions from slack: a log that starts pulled is one that was ramped there."""
     loads = Loads(SIDEWAYS, 0.03)
-    t, T = swept((0, 0, 0), (3, 1, 0), per_tendon_values=64)
+    t, T = swept((0, 0, 0), (3, 1, 0), each=64)
     ramped = tips(solver().solve(Problem(t, T, loads, FRICTION)))[-1]
     at_once = tips(solver().solve(Problem(np.zeros(1), T[-1:], loads, FRICTION)))[0]
     # m: the documented difference of 8 steps from 64
@@ -76,7 +76,7 @@ def test_loads_come_in_the_stated_order() -> None:
 
 def test_more_steps_on_the_way_change_nothing_much() -> None:
     """Slip is integrated implicitly from sample to sample: a log of every tenth sample gives the same loop."""
-    t, T = swept((0, 0, 0), (3, 0, 1), (0.5, 2, 0), (3, 0, 0), per_tendon_values=100)
+    t, T = swept((0, 0, 0), (3, 0, 1), (0.5, 2, 0), (3, 0, 0), each=100)
     fine = tips(solver().solve(Problem(t, T, Loads(SIDEWAYS, 0.02), FRICTION)))
     coarse = tips(solver().solve(Problem(t[::10], T[::10], Loads(SIDEWAYS, 0.02), FRICTION)))
     # m: 0.3 N a sample against 0.03 N. Worst measured 0.22 mm between one step and 16 where a hole reverses on the way.

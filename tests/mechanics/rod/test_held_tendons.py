@@ -99,7 +99,12 @@ def test_a_tendon_pulls_at_its_length_or_is_slack_while_it_moves() -> None:
     assert path.end_reason == ""
     assert 0.2 < taut.mean() < 0.9
     assert path.tension.min() == 0.0
-    gap = path.path - (solvers()[0].straight_path - u) - LEAST_STRETCH * path.tension - BACKBONE_COMPLIANCE * path.tension.sum(1, keepdims=True)
+    gap = (
+        path.path
+        - (solvers()[0].straight_path - u)
+        - LEAST_STRETCH * path.tension
+        - BACKBONE_COMPLIANCE * path.tension.sum(1, keepdims=True)
+    )
     # m: what all press out of the backbone, and what its bowing takes, follow within some steps: micrometres. Where a slack tendon
     # is caught at some 50 mm/s, the one step in which that happens ends up to a step's way, 5e-5 m, off.
     assert np.percentile(np.abs(gap[taut]), 99) < 2e-6

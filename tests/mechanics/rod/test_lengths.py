@@ -188,7 +188,10 @@ def test_a_tendon_pulls_at_its_length_or_is_slack(mu: float, stretch: float) -> 
     u[:, 2] = -u[:, 0] - u[:, 1] - 1e-3  # a bent robot's three displacements add up to about nothing: more would tear at it
     found = by_length(u, SIDEWAYS, Route(mu, 4e-4, stretch))
     gap = (
-        found.path - (solver().straight_path - u) - stretch * found.tension - BACKBONE_COMPLIANCE * found.tension.sum(axis=1, keepdims=True)
+        found.path
+        - (solver().straight_path - u)
+        - stretch * found.tension
+        - BACKBONE_COMPLIANCE * found.tension.sum(axis=1, keepdims=True)
     )
     taut = found.tension > 0.0
     assert 0.2 < taut.mean() < 0.9  # both happen

@@ -116,7 +116,9 @@ def test_antagonists_that_bed_in_follow_a_hyperbolic_tangent_and_then_hookes_law
     beds = law("tendon_elasticity", toe=S, toe_tension=T)
     a = solved(RIGID, (beds,), run(np.zeros(9), torque)).others["angle"][:, 1] - REST
     # rad: the least stretch comes on top, at most 1e-6 m/N x 16 N on 5 mm
-    np.testing.assert_allclose(a, S * np.tanh(torque / PULLEY / 2 / T) / PULLEY, rtol=0, atol=1.01 * LEAST_STRETCH * 16 / abs(PULLEY))
+    np.testing.assert_allclose(
+        a, S * np.tanh(torque / PULLEY / 2 / T) / PULLEY, rtol=0, atol=1.01 * LEAST_STRETCH * 16 / abs(PULLEY)
+    )
     true = solved(ELASTIC, (beds,), run(np.zeros(9), torque))
     above = true.tension - PRETENSION
     longer = STRETCH * above + S * -np.expm1(-above / T)

@@ -334,7 +334,9 @@ def test_springs_that_follow_with_play_stand_still_while_their_tendons_turn_back
             stretched = alone.initial_elongation[:1] + path[:, t] - half * played(z)
             one = Spring(*(field[t : t + 1] for field in alone))
             return float(
-                np.abs(spring_response(one, time, turns(time).T[t : t + 1], stretched[None], ROOM)[1][0] - found.tension[:, t])[10:].max()
+                np.abs(spring_response(one, time, turns(time).T[t : t + 1], stretched[None], ROOM)[1][0] - found.tension[:, t])[
+                    10:
+                ].max()
             )
 
         best = min(np.linspace(-1.0, 1.0, 81), key=error)
@@ -359,7 +361,9 @@ def cold(twin: Twin, solver: Equilibrium, current: float = 0.0) -> ChainSolution
     """Unloaded; 20 s later, a current in all springs."""
     heating = Heating(np.full(2, ROOM), springs())
     currents = np.full((2, 3), current)
-    path = solver.solve(Problem(np.array([0.0, 20.0]), currents, Loads(np.zeros(3)), twin.effect_chain.route, HEATED, heating=heating))
+    path = solver.solve(
+        Problem(np.array([0.0, 20.0]), currents, Loads(np.zeros(3)), twin.effect_chain.route, HEATED, heating=heating)
+    )
     assert path.status.all()
     return path
 

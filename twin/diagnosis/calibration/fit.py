@@ -33,7 +33,7 @@ NUDGE = 0.02  # of a parameter's step: small against curvature, large against th
 BOUND = 1e-3  # of a parameter's range: closer to an end of it, it stands there
 STEPS = 12  # at most, of a fit
 TRUSTED = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
-# Of an effect's amplitude: what two codes of one law make of it. On the first 69 days of `tools.benchmarks.diagnosis.attribution --seed 70000` they were
+# Of an effect's amplitude: what two codes of one law make of it. On 69 days of `tools.benchmarks.diagnosis.attribution` they were
 # off by 0.5 to 2 % where noise and the trials' disagreement gave errors of 0.2 to 0.7 %.
 LAW = 0.02
 UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
@@ -136,7 +136,9 @@ class Objective:
         """The evaluation of a model whose |z|^2 is `most` at most, else None, without a look at the trials that are left then."""
         at, traces = {k: i for i, k in enumerate(self.trials)}, {}
         raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
-        n = 1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))  # a body that creeps remembers the trials before
+        n = (
+            1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))
+        )  # a body that creeps remembers the trials before
         shares = [self.trials[i::n] for i in range(n)]
         total = np.zeros(n)
 

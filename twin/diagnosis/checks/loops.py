@@ -40,30 +40,30 @@ class Loops:
 
     group: str
     name: str
-    per_tendon_values: tuple[Loop, ...]
+    by_trial: tuple[Loop, ...]
 
     @property
     def lag(self) -> float:
         """Mean over all pairs, SI; NaN without any."""
-        return sum(loop.pairs * loop.lag for loop in self.per_tendon_values) / self._pairs if self.per_tendon_values else float("nan")
+        return sum(loop.pairs * loop.lag for loop in self.by_trial) / self._pairs if self.by_trial else float("nan")
 
     @property
     def noise(self) -> float:
         """Standard error of that mean."""
-        return float(np.sqrt(sum((x.pairs * x.noise) ** 2 for x in self.per_tendon_values))) / self._pairs if self.per_tendon_values else float("nan")
+        return float(np.sqrt(sum((x.pairs * x.noise) ** 2 for x in self.by_trial))) / self._pairs if self.by_trial else float("nan")
 
     @property
     def seen(self) -> bool:
-        return bool(self.per_tendon_values) and abs(self.lag) > LAG * self.noise
+        return bool(self.by_trial) and abs(self.lag) > LAG * self.noise
 
     @property
     def confounded(self) -> bool:
         """Whether every command was visited once in each direction and always in the same order."""
-        return bool(self.per_tendon_values) and all(loop.drift is None for loop in self.per_tendon_values)
+        return bool(self.by_trial) and all(loop.drift is None for loop in self.by_trial)
 
     @property
     def _pairs(self) -> int:
-        return sum(loop.pairs for loop in self.per_tendon_values)
+        return sum(loop.pairs for loop in self.by_trial)
 
 
 def loops(prepared: PreparedRecording) -> Loops:

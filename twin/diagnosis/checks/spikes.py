@@ -31,7 +31,9 @@ def without_spikes(prepared: PreparedRecording, predicted: Sequence[np.ndarray])
     departed = [_departure(prepared.measured[k] - predicted[k], columns) for k in trials]
     moved = np.concatenate([y - y.mean(axis=0) for y in predicted])
     travel = np.array([np.sqrt((moved[:, c] ** 2).sum(axis=1).mean()) for c in columns]) + 1e-9
-    declared = np.array([prepared.outputs[c[0]].channel.noise or OUTPUT_GROUPS[prepared.outputs[c[0]].group].typical_noise for c in columns])
+    declared = np.array(
+        [prepared.outputs[c[0]].channel.noise or OUTPUT_GROUPS[prepared.outputs[c[0]].group].typical_noise for c in columns]
+    )
     alone = _alone(np.concatenate(departed), travel, declared)
     counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
     faulty = {name for name, count in counts.items() if count > RARE * len(alone)}

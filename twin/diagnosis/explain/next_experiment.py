@@ -52,7 +52,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     words = [f"{_shown(d.display_unit[1] * x)} {d.display_unit[0]}" for x, d in zip(top, prepared.drives, strict=True)]
     like = prepared.inputs[0]
     bare = replace(like.loads, force=np.zeros(3))
-    if "torque" in prepared.robot.build().loads.values():
+    if "torque" in prepared.robot.build().load_channels.values():
         torques = [float(np.mean(i.loads.torque)) for i in prepared.inputs]
         least, most = min(torques), max(torques)
         loaded = [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]

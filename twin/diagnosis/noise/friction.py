@@ -23,7 +23,9 @@ def noise_credit(context: FitContext, with_it: ScoredModel, without: ScoredModel
     """By how much more of the readings' noise than `Weighed.unheard` tells, in |z|^2, the one set keeps from a robot whose tendons
     rub in both; 0 where they do not, where all the noise there is would not pay, or shaken the robot has no equilibrium."""
     heard = sum(float(h.sum()) for h in context.objective.whitener.input_noise_energy)
-    if not with_it.score - without.score < heard or not all(w.fit.model.twin.effect_chain.route.mu > 0.0 for w in (with_it, without)):
+    if not with_it.score - without.score < heard or not all(
+        w.fit.model.twin.effect_chain.route.mu > 0.0 for w in (with_it, without)
+    ):
         return 0.0
     try:
         felt = [w.unheard + resimulated_noise(context, w.fit) for w in (with_it, without)]
@@ -42,7 +44,9 @@ def resimulated_noise(context: FitContext, fit: Fit) -> float:
         inputs = tuple(
             replace(i, command=i.command + whitener.noise.drive * rng.normal(size=i.command.shape)) for i in prepared.inputs
         )
-        traces = simulate(twin, replace(prepared, inputs=inputs), trials=context.trials, options=SolveOptions(fit.evaluation.traces))
+        traces = simulate(
+            twin, replace(prepared, inputs=inputs), trials=context.trials, options=SolveOptions(fit.evaluation.traces)
+        )
         moved = [t.outputs(twin, prepared) - y for t, y in zip(traces, at, strict=True)]
         total += sum(float((whitener.trial(k, d) ** 2).sum()) for k, d in enumerate(moved))
     return total / SHAKEN

@@ -53,7 +53,8 @@ def _declared(context: FitContext, found: Fit, groups: Iterable[str]) -> Iterato
         moves = _rms(np.concatenate([(r - _means(r))[:, own].ravel() for r in raw]))
         d, s, w = (f"{factor * x:.2g} {unit}" for x in (declared, scatter, moves))
         yield (
-            f"{OUTPUT_GROUPS[group].kind}: {d} are declared as noise, but rows scatter by {s} within a trial: that is how trials repeat, the "
+            f"{OUTPUT_GROUPS[group].kind}: {d} are declared as noise, but rows scatter by {s} within a trial: that is how trials "
+            "repeat, the "
             f"same throughout one of them. Smaller errors are called noise, whatever makes them; within trials what is left moves "
             f"by {w}, {within_trial(context, found, rows, G, own).words()}"
         )
@@ -84,7 +85,8 @@ def _repeated(context: FitContext, raw: list[np.ndarray], group: str) -> Iterato
         within, between = (_rms(np.array([size[p] for p in pairs if far[p] == apart])) for apart in (False, True))
         parts = f", {shown(within)} within a session and {shown(between)} between sessions"
     yield (
-        f"{OUTPUT_GROUPS[group].kind}: repeated trials are off from one another by {shown(whole)} throughout{parts}, where rows scatter by "
+        f"{OUTPUT_GROUPS[group].kind}: repeated trials are off from one another by {shown(whole)} throughout{parts}, where rows "
+        f"scatter by "
         f"{shown(sigma)}: no law in force explains what changed from one to the other"
     )
 

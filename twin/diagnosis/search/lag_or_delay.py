@@ -190,9 +190,7 @@ def given(context: FitContext, best: ScoredModel) -> list[Given]:
     twin, place = at.model.twin, {k: i for i, k in enumerate(context.trials)}
     laws = [e for e in twin.effects if e.id in LATE]
     chosen = _fastest(prepared, context.trials)
-    G = sensitivity(
-        prepared, chosen, twin, [at.traces[k].outputs(twin, prepared) for k in chosen], at.traces
-    )
+    G = sensitivity(prepared, chosen, twin, [at.traces[k].outputs(twin, prepared) for k in chosen], at.traces)
     noise, late, out = context.objective.whitener.noise, max(0.0, typical(best)), []
     for k, g in zip(chosen, G, strict=True):
         inputs, delivered = prepared.inputs[k], prepared.inputs[k].signals

@@ -26,16 +26,16 @@ def plot(d: Diagnosis) -> Plot | None:
     prepared = d.prepared
     torque = np.array([float(np.mean(i.loads.torque)) for i in prepared.inputs])
     measured = loops(prepared)
-    held = torque[[x.trial for x in measured.per_tendon_values]]
+    held = torque[[x.trial for x in measured.by_trial]]
     if not held.size or np.ptp(held) <= SAME_LOAD_TOLERANCE * np.abs(held).max():
         return None
     unit, factor = DISPLAY_UNITS[measured.group]
 
     def points(found: Loops, name: str, **look: object) -> go.Scatter:
-        trials = [x.trial for x in found.per_tendon_values]
+        trials = [x.trial for x in found.by_trial]
         text = [escape_markup(n) for n in trial_labels(d, tuple(trials))]
         shown = f"%{{text}}: %{{y:.3g}} {unit}<extra></extra>"
-        x, y = single_precision(torque[trials]), single_precision([factor * abs(x.lag) for x in found.per_tendon_values])
+        x, y = single_precision(torque[trials]), single_precision([factor * abs(x.lag) for x in found.by_trial])
         return go.Scatter(x=x, y=y, mode="markers", name=name, marker={"size": 9, **look}, text=text, hovertemplate=shown)
 
     drawn = [points(measured, "measured", color=MEASURED_COLOUR, opacity=0.6)]

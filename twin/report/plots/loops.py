@@ -13,11 +13,11 @@ from twin.report.sentence import trial_labels
 
 def describe_loops(found: Loops) -> str:
     """Say whether pull and release differ, in which direction, and whether time could cause the same."""
-    if not found.per_tendon_values:
+    if not found.by_trial:
         return "Loops: no trial returns over its own commands, so pull and release cannot be compared."
     unit, factor = DISPLAY_UNITS[found.group]
     lag, noise = factor * found.lag, factor * found.noise
-    trials = len(found.per_tendon_values)
+    trials = len(found.by_trial)
     where = f"{found.name}, {trials} trial{'s' if trials > 1 else ''}, noise {format_number(noise)} {unit}"
     if not found.seen:
         return f"Loops: at the same commands release and pull differ by no more than noise ({format_number(lag)} {unit}; {where})."
@@ -35,7 +35,7 @@ def advise_repeat(diagnosis: Diagnosis) -> str | None:
     found = diagnosis.loops
     if not (found.seen and found.confounded):
         return None
-    again = trial_labels(diagnosis, (max(found.per_tendon_values, key=lambda loop: abs(loop.lag)).trial,))[0]
+    again = trial_labels(diagnosis, (max(found.by_trial, key=lambda loop: abs(loop.lag)).trial,))[0]
     return (
         f"run {again} again with its pull interrupted: pull to its largest command, release to half, pull to the largest again, "
         "release. Then some commands are reached by release before pull, which separates friction from creep and drift"
@@ -60,6 +60,6 @@ def loops_json(found: Loops, names: Sequence[str]) -> dict[str, Any]:
                 "drift": finite_or_none(loop.drift, factor),
                 "pairs": loop.pairs,
             }
-            for name, loop in zip(names, found.per_tendon_values, strict=True)
+            for name, loop in zip(names, found.by_trial, strict=True)
         ],
     }

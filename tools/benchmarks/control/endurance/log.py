@@ -34,7 +34,8 @@ def resident() -> float:
 
 
 def line(looks: Sequence[Look], rig: Rig, wall: float) -> Line:
-    """Return the line of a minute: simulated hours until now; distances, mm, in free air (`free`) and over all, mean and largest; the largest and
+    """Return the line of a minute: simulated hours until now; distances, mm, in free air (`free`) and over all, mean and largest; the
+    largest and
     least tensions (N), shortening (mm) and share of the rate allowed; faults since the first step; memory, MB; hours of the clock
     since the first step, and which process it was."""
     error, pushed, twin, plant, shortening, rate, least = np.array(looks or [NOTHING], float).T

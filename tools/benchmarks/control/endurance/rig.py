@@ -155,7 +155,7 @@ class Rig:
 
     @staticmethod
     def of(state: dict[str, np.ndarray]) -> Rig:
-        """Return the rig where it was: the plant to the last bit; the twins find their equilibria anew, within what Newton leaves."""
+        """Return the rig where it was: the plant to the last bit; equilibria are found anew, within what Newton leaves."""
         rig = Rig(int(state["seed"]), int(state["steps"]))
         rig.plant.put({name.removeprefix("plant."): a for name, a in state.items() if name.startswith("plant.")})
         for finger, goal in ((rig.law.finger, state["law"]), (rig.course.finger, rig.course.command(rig.time))):

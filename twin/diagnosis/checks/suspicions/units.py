@@ -78,7 +78,7 @@ def commands(case: Case) -> Iterator[Suspicion]:
 
 def torques(case: Case) -> Iterator[Suspicion]:
     """The same of torque that loads the robot."""
-    loads = case.twin.robot.build().loads
+    loads = case.twin.robot.build().load_channels
     for channel in (c for c in case.prepared.recording.inputs() if loads.get(c.name) == "torque"):
         ratios = {o: _ratio(o, channel.unit, "N*m") for o in others(channel)}
         tried = [(o, lambda i, f=f: replace(i, loads=replace(i.loads, torque=f * i.loads.torque))) for o, f in ratios.items()]

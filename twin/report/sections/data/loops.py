@@ -13,7 +13,7 @@ def section(story: Story) -> Section:
     """Return the section on loops of pull and release."""
     d = story.diagnosis
     unit, factor = DISPLAY_UNITS[d.loops.group]
-    names = trial_labels(d, tuple(loop.trial for loop in d.loops.per_tendon_values))
+    names = trial_labels(d, tuple(loop.trial for loop in d.loops.by_trial))
     rows = [
         {
             "trial": name,
@@ -23,7 +23,7 @@ def section(story: Story) -> Section:
             "pairs": loop.pairs,
             "seen": loop.seen,
         }
-        for name, loop in zip(names, d.loops.per_tendon_values, strict=True)
+        for name, loop in zip(names, d.loops.by_trial, strict=True)
     ]
     plots = {"widths": loop_widths.plot(d), "strains": strain_loops.plot(d)}
     return Section("loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": describe_loops(d.loops), **plots})
