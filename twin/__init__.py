@@ -1,22 +1,12 @@
-"""A digital twin for tendon-driven soft and continuum robots that learns from measured data what it is missing.
+"""A digital twin for tendon-driven robots that learns from measured data what it is missing.
 
-measurements -> twin -> residual -> diagnosis -> better twin -> report
+    recording = twin.read(twin.sample("friday"))    # a measurement set
+    found = twin.diagnose(recording)                # which effect the robot's description lacks
+    found.save("report")                            # report.html, report.json, twin.toml
+    better = twin.Twin.load("report")
+    better.predict(recording)                       # a Recording again
 
-errors        the one family of errors
-quantities    a parameter: value, unit, bounds, prior, source          compiled     machine code for inner loops
-measurements  measurement sets in and out: Recording
-effects       what a description may lack: one physical law per file
-robots        robot.toml -> a MuJoCo body and the names in it
-equilibrium   the static solve                                         dynamics     MuJoCo steps
-bench         what prediction needs of a recording
-twin          Robot + parameters + effects: predict(recording) -> Recording
-residual      measured - predicted in sensor sigmas, and the noise     evaluate     the error of a given twin
-storage       twin.toml                                                rollout      recordings of a twin's own motion
-calibrate     the robot's own uncertain parameters, and those of effects
-diagnose      which effect, or none, explains what is left
-report        report.json, report.html, twin.toml
-env           gymnasium environments                                   viewer       the robot in a browser
-cli           the command line
+README.md in this folder says which package does what.
 """
 
 from importlib import import_module
@@ -25,17 +15,57 @@ from typing import TYPE_CHECKING, Any
 from twin.foundation.errors import TwinError
 
 if TYPE_CHECKING:
+    from twin import effects
+    from twin.diagnosis import Diagnosis, Settings, calibrate, diagnose
     from twin.measurements import Recording, read, write
-    from twin.prediction.storage import read_twin
+    from twin.prediction.evaluate import evaluate
+    from twin.prediction.rollout import commands, rollout
     from twin.prediction.twin import Twin
+    from twin.robots import Robot, sample
 
-__all__ = ["Recording", "Twin", "TwinError", "read", "read_twin", "write"]
+_HOMES = {
+    "Diagnosis": "diagnosis",
+    "Recording": "measurements",
+    "Robot": "robots",
+    "Settings": "diagnosis",
+    "Twin": "prediction.twin",
+    "calibrate": "diagnosis",
+    "commands": "prediction.rollout",
+    "diagnose": "diagnosis",
+    "evaluate": "prediction.evaluate",
+    "read": "measurements",
+    "rollout": "prediction.rollout",
+    "sample": "robots",
+    "write": "measurements",
+}
 
-_HOMES = {"Recording": "measurements", "Twin": "twin", "read": "measurements", "read_twin": "storage", "write": "measurements"}
+__all__ = [
+    "Diagnosis",
+    "Recording",
+    "Robot",
+    "Settings",
+    "Twin",
+    "TwinError",
+    "calibrate",
+    "commands",
+    "diagnose",
+    "effects",
+    "evaluate",
+    "read",
+    "rollout",
+    "sample",
+    "write",
+]
 
 
 def __getattr__(name: str) -> Any:
-    """Public names on first use, so that `twin --help` does not wait for MuJoCo."""
+    """Import a public name on first use, so that `twin --help` does not wait for MuJoCo."""
+    if name == "effects":
+        return import_module("twin.effects")
     if name not in _HOMES:
-        raise AttributeError(f"module 'twin' has no attribute {name!r}")
+        raise AttributeError(f"module 'twin' has no attribute {name!r}; it has {', '.join(__all__)}")
     return getattr(import_module(f"twin.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

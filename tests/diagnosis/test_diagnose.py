@@ -12,7 +12,7 @@ import pytest
 import tomli_w
 
 from tests.recorded_days import half, recorded_day
-from twin.diagnosis import Diagnosis, Settings, calibration, diagnose
+from twin.diagnosis import Diagnosis, Settings, calibrated_fit, diagnose
 from twin.diagnosis.noise.estimate import estimate_noise, repeats
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
@@ -159,7 +159,7 @@ def test_fitted_trials_do_reach_the_fit(friction: Diagnosis) -> None:
     shifted = tuple(
         replace(t, values={**t.values, "disk_8_x": t.values["disk_8_x"] + 1e-4}) if t.name == name else t for t in recording.trials
     )
-    found, *_ = calibration(replace(recording, trials=shifted), Twin.of(ROBOT), Settings())
+    found, *_ = calibrated_fit(replace(recording, trials=shifted), Twin.of(ROBOT), Settings())
     assert found.model.twin != friction.calibrated
 
 

@@ -469,7 +469,7 @@ def test_a_calibration_is_judged_on_trials_it_has_not_seen(plan: PreparedRecordi
     monkeypatch.setattr(pipeline, "without_spikes", clean)
     monkeypatch.setattr(pipeline, "objective_of", lambda bench, twin, trials, settings: ("start", "objective", []))
     monkeypatch.setattr(pipeline, "fit", fit)
-    found, error, notices = pipeline.calibration(None, SimpleNamespace(robot=None))  # type: ignore[arg-type]
+    found, error, notices = pipeline.calibrated_fit(None, SimpleNamespace(robot=None))  # type: ignore[arg-type]
     assert found is fitted
     assert asked["fit"] == ("objective", "start", True)
     open_, sealed = asked["seen"]

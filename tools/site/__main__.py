@@ -15,7 +15,7 @@ from twin.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "build" / "site_pages"
-GITHUB_ONLY = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(#[^)]*)?\)")
+LINK = re.compile(r"\[([^\]]*)\]\((?!https?:|#)([^)#\s]+)(#[^)]*)?\)")
 API = (  # module, what stands on its page
     ("twin", "The public names"),
     ("twin.measurements", "Measurement sets"),
@@ -66,17 +66,17 @@ def _target(path: Path) -> str:
 
 
 def _relinked(path: Path, pages: dict[Path, str]) -> str:
-    """The page's text: links to other pages kept, links to files that are no pages turned into code."""
+    """The page's text: links to other pages kept; of links to files that are no pages the words."""
 
     def link(found: re.Match[str]) -> str:
-        goal = (path.parent / found[1]).resolve()
+        goal = (path.parent / found[2]).resolve()
         goal = goal / "README.md" if goal.is_dir() and (goal / "README.md") in pages else goal
         if goal in pages:
             up = "../" * (len(Path(pages[path]).parts) - 1)
-            return f"]({up}{pages[goal]}{found[2] or ''})"
-        return f"]({found[1]})" if goal.suffix in (".svg", ".png", ".gif") and goal.exists() else "](https://github.com)"
+            return f"[{found[1]}]({up}{pages[goal]}{found[3] or ''})"
+        return found[0] if goal.suffix in (".svg", ".png", ".gif") and goal.exists() else found[1]
 
-    return GITHUB_ONLY.sub(link, path.read_text("utf-8"))
+    return LINK.sub(link, path.read_text("utf-8"))
 
 
 def _write(target: str, text: str) -> None:

@@ -8,22 +8,19 @@ from typing import Any
 from twin.cli.terminal import out
 from twin.foundation.errors import DataError
 
-SAMPLE = "*/samples/friday"
-
 
 def load_set_and_twin(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
     """Return the recording, by default the bundled sample, and the twin to compare with it."""
     from twin.measurements import read
     from twin.prediction.storage import read_twin
     from twin.prediction.twin import Twin
-    from twin.robots import load
-    from twin.robots.robot import models_folder
+    from twin.robots import sample
 
     if folder is None:
-        folder = next(models_folder().glob(SAMPLE))
+        folder = sample("friday")
         out.print("no measurement set given: using the bundled sample (simulated, see its `source`)")
     recording = read(folder)
-    return recording, read_twin(twin) if twin else Twin.of(load(recording.robot, recording.folder))
+    return recording, read_twin(twin) if twin else Twin.of_recording(recording)
 
 
 def load_finger_set(folder: Path, twin: str | None) -> tuple[Any, Any]:

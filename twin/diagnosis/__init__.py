@@ -1,25 +1,25 @@
-"""Which effect, or none, explains what calibration leaves: fitted; chosen by trials left out in turn; reported on sealed ones.
+"""The diagnosis: which effect, or none, explains what calibration leaves.
 
-pipeline.py    the stages in order
+pipeline.py     the stages in order: preview -> calibrate -> screen -> search -> choose -> judge -> held-out error
+diagnosis.py    what a diagnosis finds
+conclusion.py   what the stages decided before held-out trials are used
+fit_context.py  what every stage fits with
+budget.py       the time for the search
+split.py        fitted and held-out trials
+held_out.py     the error on trials that neither fit nor choice has used
+thresholds.py   every threshold, its reason and its evidence
 
-look.py        the robot as described, and suspicions about what the files mean
-calibrate.py   the noise, and the robot's own parameters
-screen.py      what each effect would do, what noise alone would show, what the design can tell
-search.py      beam search over sets of effects
-choose.py      the set that predicts trials left out
-gate.py        what is too small, or cannot be told apart
-settle.py      of two that cannot be told apart the likelier, where one of them is there
-judge.py       the verdict, the claims, how sure they are
-describe.py    what is left, in words
-seal.py        the error on trials that neither fit nor choice has seen
-
-thresholds.py  every threshold, its reason and its evidence
+calibration/    the robot's own parameters                search/    candidates, and sets of effects
+noise/          the noise model                           verdict/   which claims stand, and how sure they are
+checks/         the data and the design                   explain/   what is left, and the next experiment, in words
+evidence/       scores, and what noise alone would show
 """
 
 from twin.diagnosis.checks.preview import DataPreview, preview_data
 from twin.diagnosis.checks.suspicions import Suspicion
 from twin.diagnosis.diagnosis import Claim, Diagnosis, Errors, Fold, Settings
-from twin.diagnosis.pipeline import calibration, diagnose
+from twin.diagnosis.pipeline import calibrate_twin as calibrate
+from twin.diagnosis.pipeline import calibrated_fit, diagnose
 
 __all__ = [
     "Claim",
@@ -29,7 +29,8 @@ __all__ = [
     "Fold",
     "Settings",
     "Suspicion",
-    "calibration",
+    "calibrate",
+    "calibrated_fit",
     "diagnose",
     "preview_data",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -108,3 +109,15 @@ class Diagnosis:
     settings: Settings
     scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
     untried: tuple[str, ...] = ()  # sets of effects for which the budget left no time
+
+    def summary(self) -> str:
+        """Return the verdict in one plain sentence, as the report has it."""
+        from twin import report
+
+        return report.sentence(self)
+
+    def save(self, folder: Path | str) -> None:
+        """Write `folder`/report.html, report.json and twin.toml, all or none. Raises DataError where it cannot."""
+        from twin import report
+
+        report.write(self, folder, report.provenance(self.recording, self.settings, "Diagnosis.save"))

@@ -51,19 +51,18 @@ def ignore_preview(preview: DataPreview) -> None:
 
 def diagnose(
     recording: Recording,
-    twin: Twin,
+    twin: Twin | None = None,
     settings: Settings | None = None,
     progress: Progress = silent,
     on_preview: OnPreview = ignore_preview,
 ) -> Diagnosis:
-    """Diagnose a recording against a twin. Raises TwinError for data that cannot be used.
+    """Diagnose a recording against a twin, by default the robot it names, as described.
 
-    What was seen before anything is fitted is told to `hear`: what the files may mean otherwise, and loops; no number depends on
-    it.
-
-    About a quarter of the trials is sealed; of fewer than `FEW` trials each in turn, the claims coming from all of them.
+    About a quarter of the trials is held out; of fewer than `FEW` trials each in turn, the claims coming from all of them.
+    `on_preview` is called before anything is fitted, with what the files may mean otherwise and with loops; no number depends on
+    it. Raises TwinError for data that cannot be used.
     """
-    settings = settings or Settings()
+    settings, twin = settings or Settings(), twin or Twin.of_recording(recording)
     prepared = prepare(recording, twin.robot)
     if len(prepared.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one sealed")
@@ -208,7 +207,16 @@ def _predictions(
     return out
 
 
-def calibration(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str, tuple[str, ...]]:
+def calibrate_twin(recording: Recording, twin: Twin | None = None, settings: Settings | None = None) -> Twin:
+    """Return the twin with the robot's own uncertain parameters fitted to the recording; no effect is sought.
+
+    By default the robot that the recording names. About a quarter of the trials is held out of the fit. Raises as `diagnose`.
+    """
+    fitted, _, _ = calibrated_fit(recording, twin or Twin.of_recording(recording), settings)
+    return fitted.model.twin
+
+
+def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str, tuple[str, ...]]:
     """The robot's own uncertain parameters fitted, no effect sought; the RMS error on sealed trials in words; and notices."""
     settings = settings or Settings()
     prepared = prepare(recording, twin.robot)

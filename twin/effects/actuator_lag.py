@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
 
@@ -96,6 +96,8 @@ class ActuatorLag(Effect):
     extended_parameters = ("inertia",)
     confusable_with = ("time_delay",)
     moves_with = "the rate of change of the pull"
+    plot_against = "rate"
+    hidden_without = frozenset({DataNeed.TWO_RATES})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import ROPE_FEATURES, Route, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 LIMIT_SHARES = (0.7, 0.85)  # of the largest command: limits from which fits start
@@ -67,6 +67,8 @@ class ActuatorSaturation(Effect):
     inactive_when_off = ("limit", "corner", "stroke", "give", "ceiling", "knee")
     needs = frozenset({"load cells"})
     moves_with = "the pull near its upper end"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.REVERSALS})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

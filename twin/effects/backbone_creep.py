@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from twin.body import Creep
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
 
@@ -41,6 +41,8 @@ class BackboneCreep(Effect):
     guesses = ({"amplitude": 0.06, "time": 3.0}, {"amplitude": 0.06, "time": 15.0}, {"amplitude": 0.06, "time": 80.0})
     needs = frozenset({"viscosity"})
     moves_with = "time held under load"
+    plot_against = "elapsed"
+    hidden_without = frozenset({DataNeed.REVERSALS, DataNeed.TWO_RATES, DataNeed.LONG_HOLDS, DataNeed.RANDOM_ORDER})
 
     def deform(self) -> Creep:
         pairs = [(self["amplitude"], self["time"]), (self["amplitude_2"], self["time_2"])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.body import Body, Route, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 
@@ -35,6 +35,8 @@ class BackbonePrecurvature(Effect):
     extended_parameters = ("slope",)
     needs = frozenset({"rest shape"})
     moves_with = "nothing: it is there at zero tension, and fades as load grows"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.TWO_LOADS, DataNeed.THREE_MARKERS})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

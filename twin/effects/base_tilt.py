@@ -7,7 +7,7 @@ from dataclasses import replace
 from scipy.spatial.transform import Rotation
 
 from twin.body import Loads
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 ROTATION_NAMES = ("about_x", "about_y", "about_z")
@@ -33,6 +33,8 @@ class BaseTilt(Effect):
     guesses = ({"about_x": 0.02, "about_y": 0.02, "about_z": 0.02},)
     needs = frozenset({"weight"})
     moves_with = "payload"
+    plot_against = "payload"
+    hidden_without = frozenset({DataNeed.TWO_LOADS, DataNeed.THREE_MARKERS})
 
     def surround(self, loads: Loads) -> Loads:
         turn = Rotation.from_rotvec([self[a] for a in ROTATION_NAMES]).as_matrix()

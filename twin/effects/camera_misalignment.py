@@ -5,7 +5,7 @@ from __future__ import annotations
 from scipy.spatial.transform import Rotation
 
 from twin.body import Signals
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 TURN_NAMES, SHIFT_NAMES = ("turn_x", "turn_y", "turn_z"), ("shift_x", "shift_y", "shift_z")
@@ -31,6 +31,8 @@ class CameraMisalignment(Effect):
     guesses = ({**dict.fromkeys(TURN_NAMES, 0.01), **dict.fromkeys(SHIFT_NAMES, 1e-3)},)
     needs = frozenset({"markers"})
     moves_with = "the marker's position itself"
+    plot_against = "position"
+    hidden_without = frozenset({DataNeed.TWO_LOADS, DataNeed.THREE_MARKERS})
 
     def sense(self, true: Signals) -> Signals:
         turn = Rotation.from_rotvec([self[a] for a in TURN_NAMES]).as_matrix()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twin.body import Loads, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import dot, jit_internal
 from twin.foundation.parameters import Parameter
 
@@ -102,6 +102,8 @@ class Contact(Effect):
     extended_parameters = ("curvature", "height", "slant", "lean")
     needs = frozenset({"surface"})
     moves_with = "position: only where the robot reaches beyond a line"
+    plot_against = "position"
+    hidden_without = frozenset({DataNeed.EVERY_TENDON})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

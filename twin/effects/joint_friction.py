@@ -41,6 +41,7 @@ class JointFriction(Effect):
     needs = frozenset({"antagonists"})
     guesses = ({"torque": 0.01},)
     moves_with = "the direction of travel (hysteresis loop), alike at every load"
+    plot_against = "loop"
 
     def route(self) -> Route:
         bearing = Bearing(self["torque"], self["presliding"], self["breakaway"], self["stribeck"], self["viscous"])

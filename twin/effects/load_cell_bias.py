@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.body import Signals
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 
@@ -25,6 +25,8 @@ class LoadCellBias(Effect):
     per_tendon = (Parameter("bias", 0.0, "N", -1.0, 1.0, "zero of the cell", std=0.2, scale=0.03),)
     needs = frozenset({"load cells"})
     moves_with = "the pull of one tendon, mostly where the others are slack"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.TWO_LOADS})
 
     def sense(self, true: Signals) -> Signals:
         return true.with_changes(tension=true.tension + self.per_tendon_values("bias"))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 
@@ -28,6 +28,8 @@ class LoadCellCrosstalk(Effect):
     id = "load_cell_crosstalk"
     needs = frozenset({"load cells"})
     moves_with = "the tension of the other tendons"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.EVERY_TENDON})
 
     @classmethod
     def all_parameters(cls, n_tendon: int) -> tuple[Parameter, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.effects.base.saturating_drift import saturated_time, saturating_starts
 from twin.foundation.parameters import Parameter
 
@@ -45,6 +45,8 @@ class LoadCellDrift(Effect):
     inactive_when_off = ("levelling",)
     needs = frozenset({"load cells"})
     moves_with = "the time of day"
+    plot_against = "clock"
+    hidden_without = frozenset({DataNeed.RANDOM_ORDER})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.body import Signals
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 
@@ -25,6 +25,8 @@ class LoadCellGain(Effect):
     per_tendon = (Parameter("gain", 1.0, "1", 0.3, 3.0, "calibration of the cell", std=0.3, scale=0.03),)
     needs = frozenset({"load cells"})
     moves_with = "the tension itself"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.EVERY_TENDON})
 
     def sense(self, true: Signals) -> Signals:
         return true.with_changes(tension=true.tension * self.per_tendon_values("gain"))

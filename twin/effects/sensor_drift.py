@@ -35,6 +35,7 @@ class SensorDrift(Effect):
     inactive_when_off = ("levelling",)
     needs = frozenset({"strain sensors"})
     moves_with = "the time of day"
+    plot_against = "clock"
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

@@ -28,6 +28,7 @@ class SensorGain(Effect):
     )
     needs = frozenset({"strain sensors"})
     moves_with = "the strain itself"
+    plot_against = "reach"
 
     def sense(self, true: Signals) -> Signals:
         if "sensor" not in true.others:

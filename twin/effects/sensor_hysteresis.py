@@ -49,6 +49,7 @@ class SensorHysteresis(Effect):
     inactive_when_off = ("swap", "time")
     needs = frozenset({"strain sensors"})
     moves_with = "the direction of strain"
+    plot_against = "loop"
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

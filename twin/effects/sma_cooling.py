@@ -36,6 +36,7 @@ class SmaCooling(Effect):
     )
     extended_parameters = ("forced", "rate")
     moves_with = "the heat of the springs, so the time held"
+    plot_against = "elapsed"
 
     @classmethod
     def all_parameters(cls, n_tendon: int) -> tuple[Parameter, ...]:

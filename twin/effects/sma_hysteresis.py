@@ -38,6 +38,7 @@ class SmaHysteresis(Effect):
     )
     extended_parameters = ("spread", "plateau")
     moves_with = "the direction of travel of the springs (hysteresis loop)"
+    plot_against = "loop"
 
     @classmethod
     def all_parameters(cls, n_tendon: int) -> tuple[Parameter, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.body import Body
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 # Hinges are in the principal planes, which a change d of e turns by up to d / 2e. A derivative by one Newton step from the shape in
@@ -34,6 +34,8 @@ class StiffnessAsymmetry(Effect):
     guesses = ({"along": 0.03, "across": 0.03},)
     needs = frozenset({"planes"})
     moves_with = "the direction of bending"
+    plot_against = "azimuth"
+    hidden_without = frozenset({DataNeed.EVERY_TENDON})
 
     def edit(self, body: Body) -> None:
         if self["along"] or self["across"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.body import Body
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 
@@ -21,6 +21,8 @@ class StiffnessGradient(Effect):
     guesses = ({"gradient": 0.1},)
     needs = frozenset({"length"})
     moves_with = "the place along the body"
+    plot_against = "reach"
+    hidden_without = frozenset({DataNeed.THREE_MARKERS})
 
     def edit(self, body: Body) -> None:
         body.set_stiffness_gradient(self["gradient"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 REFERENCE_TEMPERATURE = 296.15  # K, 23 degC: to which the described stiffness refers
@@ -25,6 +25,8 @@ class TemperatureSoftening(Effect):
     guesses = ({"rate": 0.005},)
     needs = frozenset({"elasticity"})
     moves_with = "the room's temperature"
+    plot_against = "temperature"
+    hidden_without = frozenset({DataNeed.TEMPERATURES, DataNeed.RANDOM_ORDER})
 
     def soften(self, temperature: np.ndarray, clock: np.ndarray) -> np.ndarray:
         return np.maximum(MIN_STIFFNESS_SHARE, 1.0 - self["rate"] * (temperature - REFERENCE_TEMPERATURE))

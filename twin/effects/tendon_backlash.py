@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Route, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
 
@@ -59,6 +59,8 @@ class TendonBacklash(Effect):
     extended_parameters = ("slack",)
     extended_needs = frozenset({"elasticity"})
     moves_with = "the direction of travel"
+    plot_against = "loop"
+    hidden_without = frozenset({DataNeed.REVERSALS, DataNeed.DISPLACEMENTS})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

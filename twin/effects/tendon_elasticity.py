@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from twin.body import ROPE_FEATURES, Route, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 TOE_TENSION_SHARES = (0.1, 0.3)  # of the largest tension: tensions of the toe from which fits start
@@ -47,6 +47,8 @@ class TendonElasticity(Effect):
     inactive_when_off = ("toe_tension", "hooked")
     extended_parameters = ("stretch",)  # of a toe; alone it is the plain law
     moves_with = "tension against displacement, a pull's first newtons most; between antagonists loops that narrow under load"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.DISPLACEMENTS})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

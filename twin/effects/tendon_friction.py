@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from twin.body import Route, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
 
@@ -53,6 +53,8 @@ class TendonFriction(Effect):
     confusable_with = ("joint_friction",)
     guesses = ({"mu": 0.1},)
     moves_with = "the direction of pull (hysteresis loop)"
+    plot_against = "loop"
+    hidden_without = frozenset({DataNeed.REVERSALS})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.body import Body
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 
@@ -23,6 +23,8 @@ class TendonRouting(Effect):
     )
     needs = frozenset({"holes"})
     moves_with = "the pull of one tendon"
+    plot_against = "tension"
+    hidden_without = frozenset({DataNeed.EVERY_TENDON, DataNeed.THREE_MARKERS})
 
     def edit(self, body: Body) -> None:
         for i in range(1, self.n_tendon + 1):

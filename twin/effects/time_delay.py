@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.effects.base.effect import Effect
+from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
 
@@ -28,6 +28,8 @@ class TimeDelay(Effect):
     confusable_with = ("actuator_lag",)
     guesses = ({"delay": 0.1},)
     moves_with = "the rate of change of the pull"
+    plot_against = "rate"
+    hidden_without = frozenset({DataNeed.TWO_RATES})
 
     def command(self, reported: Signals) -> Signals:
         t = reported.time

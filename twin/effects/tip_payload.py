@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from twin.body import Loads, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 
@@ -30,6 +30,8 @@ class TipPayload(Effect):
     inactive_when_off = ("zeroed",)
     needs = frozenset({"weight"})
     moves_with = "the bending of the body under its weight"
+    plot_against = "reach"
+    hidden_without = frozenset({DataNeed.TWO_LOADS})
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

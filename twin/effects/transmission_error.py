@@ -41,6 +41,7 @@ class TransmissionError(Effect):
     inactive_when_off = ("turn",)
     needs = frozenset({"elasticity"})
     moves_with = "the pull of one tendon, by how far it is drawn in"
+    plot_against = "tension"
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:

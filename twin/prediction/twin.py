@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -39,6 +40,30 @@ class Twin:
         """Return the robot as described: nominal parameters, and the effects that its `robot.toml` declares."""
         robot = load(robot) if isinstance(robot, str) else robot
         return Twin(robot, {}, tuple(effect_class(name)(values, robot.n_tendon) for name, values in robot.effects))
+
+    @staticmethod
+    def of_recording(recording: Recording) -> Twin:
+        """Return the robot that a recording names, as described. Raises DataError for a robot that is not found."""
+        return Twin.of(load(recording.robot, recording.folder))
+
+    @staticmethod
+    def load(source: str | Path) -> Twin:
+        """Read a twin from a `twin.toml`, a report's folder, a robot's folder or a robot's name. Raises as `read_twin`."""
+        from twin.prediction.storage import read_twin
+
+        return read_twin(source)
+
+    def save(self, path: str | Path) -> None:
+        """Write the twin as a `twin.toml`, whole or not at all; parameters without standard errors."""
+        from twin.prediction.provenance import run_provenance
+        from twin.prediction.storage import twin_table, write_twin
+
+        path = Path(path)
+        write_twin(path, twin_table(self, path.parent, {}, {}), run_provenance("Twin.save", 0, ""))
+
+    def with_effect(self, effect: Effect) -> Twin:
+        """Return the twin with this effect added, in the place of one of the same kind."""
+        return replace(self, effects=(*(e for e in self.effects if e.id != effect.id), effect))
 
     @property
     def effect_chain(self) -> EffectChain:

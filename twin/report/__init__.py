@@ -14,8 +14,8 @@ plots/          the figures and the predictions they compare
 
 from twin.report.console import render_diagnosis, render_preview
 from twin.report.contents import contents
-from twin.report.provenance import provenance, run_provenance
+from twin.report.provenance import provenance
 from twin.report.sentence import sentence
 from twin.report.write import write
 
-__all__ = ["contents", "provenance", "render_diagnosis", "render_preview", "run_provenance", "sentence", "write"]
+__all__ = ["contents", "provenance", "render_diagnosis", "render_preview", "sentence", "write"]

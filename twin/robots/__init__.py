@@ -9,6 +9,6 @@ starter.py        a folder to start one's own robot (`twin new`)
 """
 
 from twin.robots.family import Family, family_names, load_family
-from twin.robots.robot import Robot, load, robot_names
+from twin.robots.robot import Robot, load, robot_names, sample
 
-__all__ = ["Family", "Robot", "family_names", "load", "load_family", "robot_names"]
+__all__ = ["Family", "Robot", "family_names", "load", "load_family", "robot_names", "sample"]

@@ -69,6 +69,13 @@ class Robot:
         """The parameters in which a built robot may differ from its description."""
         return tuple(p for p in self.parameters if p.std is not None)
 
+    def value(self, name: str) -> float:
+        """Return a parameter's nominal value, SI. Raises UnknownNameError, listing those that exist."""
+        values = {p.name: p.value for p in self.parameters}
+        if name not in values:
+            raise UnknownNameError("parameter", name, list(values))
+        return values[name]
+
     @cached_property
     def size(self) -> Size:
         """Its size, as described, relative to the reference robot, for which effects' numbers are written."""
@@ -112,6 +119,14 @@ class Robot:
     def springs(self, n: int, values: Values | None = None) -> Spring:
         """Return the SMA springs of n tendons at these parameter values. Raises DataError if the robot describes none."""
         return build_springs(fill_defaults(self.parameters, values or {}), n)
+
+
+def sample(name: str) -> Path:
+    """Return the folder of a measurement set that ships with the program. Raises UnknownNameError, listing those that exist."""
+    samples = {path.name: path for path in sorted(models_folder().glob("*/samples/*")) if path.is_dir()}
+    if name not in samples:
+        raise UnknownNameError("sample", name, list(samples))
+    return samples[name]
 
 
 def models_folder() -> Path:

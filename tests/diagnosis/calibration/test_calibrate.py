@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 
 from tests.recorded_days import half, recorded_day
 from tools.simulators.rod.nuisance import built
-from twin.diagnosis import Settings, calibration
+from twin.diagnosis import Settings, calibrated_fit
 from twin.diagnosis.calibration.fisher_information import solve, unidentifiable
 from twin.diagnosis.calibration.fit import Evaluation, Fit, Free, Model, Objective, fit, prior_weight
 from twin.diagnosis.checks.fit_warnings import strained, unlikely
@@ -38,7 +38,7 @@ PRIOR = {p.name: p for p in ROBOT.nuisance}
 
 
 def calibrated(recording: Recording, **settings: int) -> Fit:
-    return calibration(recording, Twin.of(ROBOT), Settings(**settings))[0]
+    return calibrated_fit(recording, Twin.of(ROBOT), Settings(**settings))[0]
 
 
 @cache

@@ -21,6 +21,7 @@ from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
 from twin.diagnosis.thresholds import CLEAR
 from twin.effects import FitStart, catalogue
+from twin.effects.base.effect import DataNeed
 from twin.prediction.prepared import PreparedRecording
 from twin.prediction.twin import Twin
 
@@ -127,9 +128,12 @@ def test_where_a_rival_leaves_nothing_no_size_is_told_apart(left: float, monkeyp
 
 
 def test_what_a_design_lacks_is_said_of_what_it_blinds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stage, "shortcomings", lambda bench: [("holds", {"time_delay"}), ("loads", {"tendon_friction", "contact"})])
+    monkeypatch.setattr(stage, "shortcomings", lambda bench: [DataNeed.TWO_RATES, DataNeed.REVERSALS, DataNeed.RANDOM_ORDER])
     found = by_hand(along(1, 0), along(0, 1), robot=along(1, 0))
-    assert {e: v.lacking for e, v in found.items()} == {"tendon_friction": ("loads",), "time_delay": ("holds",)}
+    assert {e: v.lacking for e, v in found.items()} == {
+        "tendon_friction": ("loading and unloading",),
+        "time_delay": ("two rates of pull, ten times apart",),
+    }
     assert np.isinf(found["tendon_friction"].seen)
 
 

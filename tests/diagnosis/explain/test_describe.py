@@ -15,7 +15,7 @@ from tools.simulators.rod.design import bench_day
 from tools.simulators.rod.effects.clamp_slip import ClampSlip
 from tools.simulators.rod.effects.soft_spot import SoftSpot
 from tools.simulators.rod.effects.vibration import Vibration
-from twin.diagnosis import Settings, calibration
+from twin.diagnosis import Settings, calibrated_fit
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.evidence.discrepancy import Discrepancy, Evidence, Spectrum
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
@@ -40,7 +40,7 @@ def calibrated(effect: str | None, strength: float = 2.0) -> tuple[PreparedRecor
     recording = half(recorded_day(effect, strength)[0])
     bench = prepare(recording, ROBOT)
     fitted = split(bench, Settings().seed)[0]
-    found = calibration(recording, Twin.of(ROBOT))[0]
+    found = calibrated_fit(recording, Twin.of(ROBOT))[0]
     return bench, fitted, found, Evidence(bench, fitted, np.zeros(bench.n_tendon)).discrepancy(found.z)
 
 

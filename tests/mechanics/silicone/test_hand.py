@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from twin.body import Drive, Loads, Problem, Route
-from twin.diagnosis import Settings, calibration
+from twin.diagnosis import Settings, calibrated_fit
 from twin.diagnosis.calibration.fit import Fit
 from twin.foundation.errors import DataError, SolveError
 from twin.measurements import Channel, Recording, Trial, read
@@ -120,7 +120,7 @@ def three_days() -> Recording:
 
 
 def fitted(recording: Recording) -> Fit:
-    return calibration(recording, Twin.of(recording.robot), Settings(jobs=1))[0]
+    return calibrated_fit(recording, Twin.of(recording.robot), Settings(jobs=1))[0]
 
 
 def test_a_hand_s_set_is_calibrated_finger_by_finger() -> None:

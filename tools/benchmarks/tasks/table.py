@@ -20,7 +20,7 @@ import numpy as np
 import tyro
 
 from tools.benchmarks.table import markdown
-from twin.report import run_provenance
+from twin.prediction.provenance import run_provenance
 from twin.robots import load
 from twin.tasks import Outcome, make_task, tasks
 from twin.tasks.imitation import lerobot

@@ -36,7 +36,7 @@ class Calibrate:
 
     def run(self) -> None:
         from twin import report
-        from twin.diagnosis import Settings, calibration
+        from twin.diagnosis import Settings, calibrated_fit
         from twin.prediction.storage import twin_table, write_twin
 
         if self.out.exists() and not self.force:
@@ -46,7 +46,7 @@ class Calibrate:
         recording, twin = load_set_and_twin(self.set, self.twin)
         settings = Settings(seed=self.seed, jobs=self.jobs)
         with show_progress(f"calibrating on {recording.title}"):
-            fitted, held_out, notices = calibration(recording, twin, settings)
+            fitted, held_out, notices = calibrated_fit(recording, twin, settings)
         for notice in notices:
             out.print(f"note: {printable(notice)}", highlight=False, markup=False)
         found = fitted.fitted(None)

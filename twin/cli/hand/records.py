@@ -14,7 +14,7 @@ HAND = "hand"  # the robot of all tasks
 
 def write_provenance(folder: Path, name: str, command: str, seed: int) -> None:
     """Write the origin of recorded trials beside them; the data hash is that of the demonstrations."""
-    from twin.report import run_provenance
+    from twin.prediction.provenance import run_provenance
     from twin.tasks.imitation import lerobot
     from twin.tasks.imitation.demonstrate import write_json
     from twin.tasks.imitation.episode_store import episode_path

@@ -1,4 +1,4 @@
-"""What an experiment lacks, in words, and the effects it then hides or confuses (diagnosis needs reversals, rates, loads, ...)."""
+"""What an experiment lacks. An effect declares what it is hidden without (`Effect.hidden_without`)."""
 
 from __future__ import annotations
 
@@ -9,43 +9,32 @@ import numpy as np
 
 from twin.body import Drive
 from twin.diagnosis.thresholds import FAST, ONE_WAY, PULLED, RESOLVED, STEADY, STILL, WARM
+from twin.effects.base.effect import DataNeed
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import Inputs, PreparedRecording
 
 
-def shortcomings(prepared: PreparedRecording) -> list[tuple[str, set[str]]]:
-    """What the design lacks, in words, and the effects it then hides or confuses."""
+def shortcomings(prepared: PreparedRecording) -> list[DataNeed]:
+    """Return what the design lacks."""
     inputs = prepared.inputs
-    out: list[tuple[str, set[str]]] = []
     top = max(float(np.abs(i.command).max()) for i in inputs)
     changes = np.concatenate([np.diff(i.command, axis=0) for i in inputs])
     rising, falling = (float(np.maximum(c, 0.0).sum()) for c in (changes, -changes))
-    if min(rising, falling) < ONE_WAY * max(rising, falling):
-        out.append(("loading and unloading", {"tendon_friction", "tendon_backlash", "backbone_creep", "actuator_saturation"}))
     every = np.array([r for i in inputs for r in rates(i, top)])
-    if every.size == 0 or np.quantile(every, 0.9) < FAST**0.5 * np.quantile(every, 0.1):  # one pull alone may be sealed
-        out.append(("two rates of pull, ten times apart", {"backbone_creep", "time_delay", "actuator_lag"}))
-    if max(longest_rest(i, top) for i in inputs) < STEADY:
-        out.append(("holds of a minute", {"backbone_creep"}))
-    loads = {(round(i.loads.payload, 6), *np.round(i.loads.gravity, 3)) for i in inputs}
-    if len(loads) < 2:
-        hidden = {"base_tilt", "camera_misalignment", "tip_payload", "backbone_precurvature", "load_cell_bias"}
-        out.append(("two payloads, or two mounts", hidden))
-    if len(set().union(*(pulled(i, top) for i in inputs))) < prepared.n_tendon:
-        hidden = {"stiffness_asymmetry", "load_cell_crosstalk", "load_cell_gain", "tendon_routing", "contact"}
-        out.append(("pulls of every tendon, alone and together", hidden))
-    if len({o.index for o in prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) < 3:
-        hidden = {"stiffness_gradient", "camera_misalignment", "backbone_precurvature", "tendon_routing", "base_tilt"}
-        out.append(("three markers along the body", hidden))
-    if Drive.DISPLACEMENT not in prepared.drives and not any(o.group == "displacement" for o in prepared.outputs):
-        out.append(("tendon displacements", {"tendon_backlash", "tendon_elasticity"}))
-    if np.ptp(np.concatenate([i.temperature for i in inputs])) < WARM:
-        out.append((f"a logged room temperature that varies by {WARM:.0f} K or more", {"temperature_softening"}))
-    if len(inputs) > 2 and _ordered(prepared):
-        out.append(
-            ("a random order of the trials", {"load_cell_drift", "backbone_ageing", "temperature_softening", "backbone_creep"})
-        )
-    return out
+    lacking = {
+        DataNeed.REVERSALS: min(rising, falling) < ONE_WAY * max(rising, falling),
+        # Quantiles, not extremes: one pull alone may be held out.
+        DataNeed.TWO_RATES: every.size == 0 or np.quantile(every, 0.9) < FAST**0.5 * np.quantile(every, 0.1),
+        DataNeed.LONG_HOLDS: max(longest_rest(i, top) for i in inputs) < STEADY,
+        DataNeed.TWO_LOADS: len({(round(i.loads.payload, 6), *np.round(i.loads.gravity, 3)) for i in inputs}) < 2,
+        DataNeed.EVERY_TENDON: len(set().union(*(pulled(i, top) for i in inputs))) < prepared.n_tendon,
+        DataNeed.THREE_MARKERS: len({o.index for o in prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) < 3,
+        DataNeed.DISPLACEMENTS: Drive.DISPLACEMENT not in prepared.drives
+        and not any(o.group == "displacement" for o in prepared.outputs),
+        DataNeed.TEMPERATURES: np.ptp(np.concatenate([i.temperature for i in inputs])) < WARM,
+        DataNeed.RANDOM_ORDER: len(inputs) > 2 and _ordered(prepared),
+    }
+    return [need for need, is_lacking in lacking.items() if is_lacking]
 
 
 def pulled(inputs: Inputs, top: float) -> list[int]:

@@ -51,13 +51,13 @@ def identifiability(objective: Objective, base: Fit, known: Dictionary, material
     groups: dict[tuple[str, str], list[Pattern]] = {}
     for p in known.patterns:
         groups.setdefault((p.effect, effect_class(p.effect).form(p.start.free)), []).append(p)
-    gaps = shortcomings(objective.prepared)
+    lacks = shortcomings(objective.prepared)
     rows = []
     for (effect, form), patterns in groups.items():
         p = max(patterns, key=lambda p: len(p.where))
         i = np.array(p.where)
         own = float(np.trace(A[np.ix_(i, i)]))
-        lacking = tuple(words for words, blinds in gaps if effect in blinds)
+        lacking = tuple(str(need) for need in lacks if need in effect_class(effect).hidden_without)
         if own < INVISIBLE * float(raw[i].sum()) or own <= 0.0:
             nowhere = (p.amplitudes[0], np.inf, _unit(effect, p.amplitudes[0], objective))
             rows.append(Visibility(effect, np.inf, np.inf, 0.0, "", nowhere, lacking, form))

@@ -28,6 +28,25 @@ IN_WORDS = {
 }
 
 
+# What a regressor's name begins or ends with -> the kind of variable to plot against, as `Effect.plot_against`; the first counts.
+PLOT_KINDS = (
+    (("direction of ",), "loop"),
+    (("rate of ",), "rate"),
+    (("trial ", "time"), "clock"),
+    (("temperature",), "temperature"),
+    (("payload",), "payload"),
+    (("torque",), "torque"),
+)
+
+
+def plot_kind(regressor: str) -> str | None:
+    """Return the kind of variable that a regressor is plotted against; None for the constant."""
+    if " over the last " in regressor:
+        return "elapsed"
+    kind = next((kind for starts, kind in PLOT_KINDS if regressor.startswith(starts)), "tension")
+    return None if regressor == "1" else kind
+
+
 @dataclass(frozen=True)
 class Regressors:
     """Phi (n, p), the component of each column (p,), and names for reports."""

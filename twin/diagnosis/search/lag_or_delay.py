@@ -27,11 +27,13 @@ from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.command_spline import SmoothedCommand, smooth_command
 from twin.diagnosis.search.search import Search
 from twin.diagnosis.thresholds import CLEAR, LATE_ROWS, TAILS
-from twin.effects.actuator_lag import lag_response
+from twin.effects.actuator_lag import ActuatorLag, lag_response
+from twin.effects.time_delay import TimeDelay
 from twin.foundation.errors import SolveError
 from twin.prediction.prepared import PreparedRecording
 
-LATE = frozenset({"actuator_lag", "time_delay"})  # laws for which it counts when a command came
+LAG, DELAY = ActuatorLag.id, TimeDelay.id
+LATE = frozenset({LAG, DELAY})  # effects for which it counts when a command came
 LateEffects = frozenset[str]
 Form = Callable[[np.ndarray], tuple[float, float, float]]  # free numbers -> delay (s), lag (s), inertia
 
@@ -103,7 +105,7 @@ def _rest(w: ScoredModel) -> frozenset[tuple[str, str]]:
 def typical(best: ScoredModel) -> float:
     """By how much (s) a steady pull is late."""
     laws = {e.id: e for e in best.fit.model.twin.effects if e.id in LATE}
-    return sum(e["time" if n == "actuator_lag" else "delay"] for n, e in laws.items())
+    return sum(e["time" if n == LAG else "delay"] for n, e in laws.items())
 
 
 def _in_place(context: FitContext, best: ScoredModel, likely: Weight) -> ScoredModel | None:
@@ -128,20 +130,20 @@ def weighed(trials: list[Given], late: float) -> dict[LateEffects, Weight] | Non
     if late <= 0.0:
         return None
     n = sum(g.pull.size for g in trials)
-    lag, delay = frozenset({"actuator_lag"}), frozenset({"time_delay"})
+    lag, delay = frozenset({LAG}), frozenset({DELAY})
     delayed = _best(trials, lambda x: (x[0], 0.0, 0.0), np.array([late]))
     first = _best(trials, lambda x: (0.0, x[0], 0.0), np.array([late]))
     second = _best(trials, lambda x: (0.0, x[0], x[1]), np.array([first[1][1], 0.25]))
     both = _best(trials, lambda x: (x[0], x[1], 0.0), 0.5 * np.array([late, late]))
     cost = float(np.log(n))
     lagging = max(
-        Weight(first[0] - cost, {"actuator_lag": {"time": first[1][1]}}),
-        Weight(second[0] - 2 * cost - CLEAR, {"actuator_lag": {"time": second[1][1], "inertia": second[1][2]}}),
+        Weight(first[0] - cost, {LAG: {"time": first[1][1]}}),
+        Weight(second[0] - 2 * cost - CLEAR, {LAG: {"time": second[1][1], "inertia": second[1][2]}}),
         key=lambda w: w.score,
     )
-    together = {"time_delay": {"delay": both[1][0]}, "actuator_lag": {"time": both[1][1]}}
+    together = {DELAY: {"delay": both[1][0]}, LAG: {"time": both[1][1]}}
     return {
-        delay: Weight(delayed[0] - cost, {"time_delay": {"delay": delayed[1][0]}}),
+        delay: Weight(delayed[0] - cost, {DELAY: {"delay": delayed[1][0]}}),
         lag: lagging,
         delay | lag: Weight(both[0] - 2 * cost - 2 * CLEAR, together),
     }

@@ -21,6 +21,7 @@ import re
 from abc import ABC
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
@@ -29,6 +30,20 @@ from twin.body import Body, Creep, Loads, Route, Signals
 from twin.body.spring import Spring
 from twin.foundation.errors import TwinError
 from twin.foundation.parameters import Parameter, Values, fill_defaults
+
+
+class DataNeed(StrEnum):
+    """What the trials of an experiment need, so that an effect shows and is not taken for another."""
+
+    REVERSALS = "loading and unloading"
+    TWO_RATES = "two rates of pull, ten times apart"
+    LONG_HOLDS = "holds of a minute"
+    TWO_LOADS = "two payloads, or two mounts"
+    EVERY_TENDON = "pulls of every tendon, alone and together"
+    THREE_MARKERS = "three markers along the body"
+    DISPLACEMENTS = "tendon displacements"
+    TEMPERATURES = "a logged room temperature that varies by 2 K or more"
+    RANDOM_ORDER = "a random order of the trials"
 
 
 @dataclass(frozen=True)
@@ -48,7 +63,10 @@ class Effect(ABC):
     `extended_parameters`: parameters of an extended law, which stay OFF until the plain law is accepted.
     `confusable_with`: effects that look so much like this one that both are never claimed together.
     `needs`: features of a body that the effect acts on (`twin.body.Body.features`); `extended_needs` those of its extended law.
-    `guesses`: values from which fits start. `moves_with`: the quantity that shows the effect in a plot, in words.
+    `guesses`: values from which fits start. `moves_with`: the quantity that the effect varies with, in words.
+    `plot_against`: the kind of variable that shows it in a plot (`twin.report.plots.variables`): azimuth, clock, elapsed, loop,
+    payload, position, rate, reach, temperature, tension or torque.
+    `hidden_without`: what an experiment needs, or the effect is hidden or taken for another.
     """
 
     id: ClassVar[str]
@@ -61,6 +79,8 @@ class Effect(ABC):
     extended_needs: ClassVar[frozenset[str]] = frozenset()
     guesses: ClassVar[tuple[Values, ...]] = ()
     moves_with: ClassVar[str]
+    plot_against: ClassVar[str] = "tension"
+    hidden_without: ClassVar[frozenset[DataNeed]] = frozenset()
 
     def __init__(self, values: Values | None = None, n_tendon: int | None = None, **named: float) -> None:
         """Make the effect with these values; the others are those of the reference robot (see `scaled_effect` for other sizes).

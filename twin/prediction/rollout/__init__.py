@@ -4,7 +4,7 @@ controls.py   controls from a table, a measurement set's inputs, or a seed
 rollout.py    the rollouts, in parallel
 """
 
-from twin.prediction.rollout.controls import Drawing, controls_from_set, controls_from_table, draw_controls, full_pull
+from twin.prediction.rollout.controls import Drawing, commands, controls_from_set, controls_from_table, draw_controls, full_pull
 from twin.prediction.rollout.rollout import LostRollout, Rollouts, can_step_controls, rollout
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "LostRollout",
     "Rollouts",
     "can_step_controls",
+    "commands",
     "controls_from_set",
     "controls_from_table",
     "draw_controls",

@@ -53,6 +53,25 @@ def full_pull(twin: Twin) -> FullPull:
     raise DataError(f"not every tendon of robot {twin.robot.name!r} moves a tip sideways: no controls are drawn for it; give them")
 
 
+def commands(twin: Twin, columns: Mapping[str, np.ndarray], rate: float) -> Recording:
+    """Return one trial of commands at `rate` (Hz), to be predicted or rolled out; tendons without a column rest at zero.
+
+    `columns` holds arrays (n,) by channel, in SI: tendon_I_tension (N), tendon_I_displacement (m) or sma_I_current (A), one kind.
+    Raises DataError for other channels, columns of different lengths, and a rate that is not above zero.
+    """
+    drive = next((d for d in INPUT_UNITS if any(name.endswith(f"_{d}") for name in columns)), Drive.TENSION)
+    names = _input_names(twin.robot, drive)
+    lengths = {len(column) for column in columns.values()}
+    if not columns or set(columns) - set(names) or len(lengths) != 1:
+        sizes = ", ".join(f"{name} ({len(column)} rows)" for name, column in columns.items()) or "no columns"
+        raise DataError(f"{sizes} came; columns of one length are needed, of {', '.join(names)}")
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise DataError(f"a rate of {rate:g} Hz; a number above zero is needed")
+    n = lengths.pop()
+    trial = Trial("commands", np.arange(n) / rate, {name: np.asarray(columns.get(name, np.zeros(n)), float) for name in names})
+    return _controls_recording(twin, [trial], drive, "given commands")
+
+
 def controls_from_table(twin: Twin, path: Path) -> Recording:
     """Return one rollout from a CSV or Parquet file in SI: `time` (s), and a column for each tendon's drive.
 

@@ -1,17 +1,17 @@
 """Choose the variable to plot a residual against, so that the effect is visible.
 
-The words of `Effect.moves_with` choose the kind of variable (the loop of a tendon's pull, time, payload, ...). The tendon, axis and
-channel are those whose binned curve carries most of the difference between the two predictions, in sigmas.
+`Effect.plot_against` is the kind of variable (the loop of a tendon's pull, time, payload, ...). The tendon, axis and channel are
+those whose binned curve carries most of the difference between the two predictions, in sigmas.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from twin.diagnosis import Diagnosis
+from twin.diagnosis.evidence.discrepancy import plot_kind
 from twin.effects import effect_class
 from twin.foundation.display_names import display_name
 from twin.report.plots.predictions import compared_stages, residuals
@@ -19,20 +19,6 @@ from twin.report.plots.variables import Variable, variables
 
 MOST_BINS = 14
 FEWEST_SAMPLES_PER_BIN = 4  # bins with fewer have no mean drawn
-KIND_PATTERNS = (  # pattern of an effect's or regressor's words -> kind of variable; the first match counts
-    (r"^trial ", "clock"),
-    (r"\bdirection of (pull|travel|strain|[td]\d)", "loop"),
-    (r"\bdirection of bending", "azimuth"),
-    (r"\brate\b", "rate"),
-    (r"\btime held|over the last", "elapsed"),
-    (r"\btime\b|\bsession\b", "clock"),
-    (r"\btemperature\b", "temperature"),
-    (r"\bpayload\b", "payload"),
-    (r"\btorque\b", "torque"),
-    (r"\bposition\b", "position"),
-    (r"\bbending\b|\bstrain\b|\balong the body\b", "reach"),
-    (r"\btension|\bpull\b|\bload|^[td]\d", "tension"),
-)
 
 
 @dataclass(frozen=True)
@@ -51,20 +37,15 @@ def choose_residual_plots(diagnosis: Diagnosis) -> list[ResidualPlot]:
     before, after = residuals(d, first), residuals(d, second)
     if d.claims:
         changed = [a - b for a, b in zip(before, after, strict=True)]
-        effects = [(display_name(c.effect), effect_class(c.effect).moves_with) for c in d.claims]
-        wanted = [(variable_kind(moves), f"{name} varies with {moves}") for name, moves in effects]
+        effects = [(display_name(c.effect), effect_class(c.effect)) for c in d.claims]
+        wanted = [(effect.plot_against, f"{name} varies with {effect.moves_with}") for name, effect in effects]
     elif d.verdict == "unexplained" and d.strongest:
         changed, name = after, d.strongest[0][0]
-        wanted = [(variable_kind(name), f"the remaining error varies most with {name!r}")]
+        wanted = [(plot_kind(name), f"the remaining error varies most with {name!r}")]
     else:
         changed, wanted = after, [("tension", "for comparison, the residual against the strongest pull")]
     found = [_choose_plot(d, changed, kind, reason) for kind, reason in wanted]
     return list({(g.column, g.variable.title): g for g in found if g is not None}.values())
-
-
-def variable_kind(words: str) -> str | None:
-    """Return the kind of variable that the words name; None where they name none."""
-    return next((kind for pattern, kind in KIND_PATTERNS if re.search(pattern, words.lower())), None)
 
 
 def _choose_plot(diagnosis: Diagnosis, changed: list[np.ndarray], kind: str | None, reason: str) -> ResidualPlot | None:

@@ -29,7 +29,7 @@ class Variable:
 
 
 def variables(prepared: PreparedRecording) -> Iterator[tuple[str, Variable]]:
-    """Yield each variable with its kind, as named in `effect_plot.KIND_PATTERNS`."""
+    """Yield each variable with its kind, as named in `Effect.plot_against`."""
     inputs, n = prepared.inputs, prepared.n_sample
     factor = np.array([d.display_unit[1] for d in prepared.drives])
     pull = np.concatenate([i.command for i in inputs]) * factor

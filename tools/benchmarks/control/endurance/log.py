@@ -19,7 +19,7 @@ import numpy as np
 from tools.benchmarks.control.endurance.rig import Look, Rig
 from tools.benchmarks.table import markdown, read_rows
 from twin.foundation.errors import DataError
-from twin.report import run_provenance
+from twin.prediction.provenance import run_provenance
 from twin.tasks.imitation.demonstrate import write_json
 
 MINUTES, STATE, RUN = "minutes.jsonl", "state.npz", "run.json"
@@ -34,8 +34,8 @@ def resident() -> float:
 
 
 def line(looks: Sequence[Look], rig: Rig, wall: float) -> Line:
-    """Return the line of a minute: simulated hours until now; distances, mm, in free air (`free`) and over all, mean and largest; the
-    largest and
+    """Return the line of a minute: simulated hours until now; distances, mm, in free air (`free`) and over all;
+    mean and largest; the largest and
     least tensions (N), shortening (mm) and share of the rate allowed; faults since the first step; memory, MB; hours of the clock
     since the first step, and which process it was."""
     error, pushed, twin, plant, shortening, rate, least = np.array(looks or [NOTHING], float).T
