@@ -20,7 +20,7 @@ import numpy as np
 from tools.simulators.rod.bench import run
 from tools.simulators.rod.design import bench_day
 from tools.simulators.rod.effects import all_effects
-from tools.simulators.rod.effects.backbone_ageing import BackboneAgeing
+from tools.simulators.rod.effects.backbone import BackboneAgeing
 from tools.simulators.rod.effects.effect import Effect
 from tools.simulators.rod.nuisance import built
 from tools.simulators.rod.sensors import Noise

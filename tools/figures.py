@@ -5,14 +5,17 @@ python -m tools.figures
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
-from tools.benchmarks.figure import FIGURES, axes, save
 from twin.diagnosis import Settings, diagnose
 from twin.measurements import read
 from twin.prediction.twin import Twin
 from twin.robots.robot import models_folder
 
+OUT = Path(__file__).parent / "figures/friday.svg"
+STYLE = {"font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"}
 STAGES = {"calibrated": ("#b0413e", "calibrated"), "after": ("#1f6f8b", "with tendon friction")}
 
 
@@ -25,7 +28,13 @@ def main() -> None:
     pulls = {k: int(np.argmax(np.ptp(bench.inputs[k].command, axis=0))) for k in d.held_out_trials}
     trial = max(pulls, key=lambda k: float(np.ptp(bench.inputs[k].command)))
     tension = bench.inputs[trial].command[:, pulls[trial]]
-    figure, (loop, bars) = axes(2, (8.0, 2.9), width_ratios=(1.7, 1.0))
+    import matplotlib
+
+    matplotlib.use("svg")
+    import matplotlib.pyplot as plt
+
+    plt.rcParams.update(STYLE)
+    figure, (loop, bars) = plt.subplots(1, 2, figsize=(8.0, 2.9), layout="constrained", width_ratios=(1.7, 1.0))
     for stage, (colour, label) in STAGES.items():
         error = 1e3 * np.linalg.norm(bench.measured[trial][:, tip] - d.predictions[stage][trial][:, tip], axis=1)
         loop.plot(tension, error, ".-", color=colour, lw=0.7, ms=3, label=label)
@@ -40,7 +49,8 @@ def main() -> None:
         bars.text(v, y, f" {v:.2f}", va="center")
     bars.set(xlabel="RMS error on held-out trials, mm", xlim=(0, 1.2 * max(values)))
     bars.set_title("dashed: noise floor", fontsize=9, loc="left")
-    save(figure, FIGURES / "friday.svg")
+    figure.savefig(OUT, metadata={"Date": None})
+    print(OUT)
 
 
 if __name__ == "__main__":

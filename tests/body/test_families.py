@@ -157,7 +157,7 @@ def test_every_family_says_what_its_bodies_can() -> None:
                 assert ask(body) is body
 
 
-HOME = ("robots", "soft", "equilibrium")  # families, and the mechanics that they are made of
+HOME = ("robots", "mechanics")  # families, and the mechanics that they are made of
 
 
 def of_families() -> set[str]:
@@ -174,7 +174,7 @@ def of_families() -> set[str]:
 
 def told_apart(tree: ast.Module, classes: set[str]) -> Iterator[int]:
     """Lines that ask which family a body is of: by its class, by the family's name or by the family's own module."""
-    modules = {f"twin.robots.{name}{end}" for name in family_names() for end in ("", "_schema")}
+    modules = {f"twin.robots.families.{name}{end}" for name in family_names() for end in ("", "_schema")}
     for node in ast.walk(tree):
         named: set[str] = set()
         match node:
@@ -213,7 +213,7 @@ def test_outside_a_family_nobody_asks_which_it_is() -> None:
         "solver = cast('Equilibrium', solver)",
         "if robot.family != 'hand': pass",
         "from twin.robots.families.hand_schema import Hand",
-        "from twin.robots import continuum",
+        "from twin.robots.families import continuum",
     ],
 )
 def test_and_who_asks_is_found(line: str) -> None:

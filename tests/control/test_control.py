@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tools.benchmarks.control.baselines import PITensionLoop
-from tools.benchmarks.control.tracking import KNOWN, LENGTH, RADIUS, Bench, Run, attempt, controller, track, unknown
+from tools.benchmarks.control.tracking import KNOWN_TWIN, RADIUS, ROBOT_LENGTH, Bench, Run, attempt, controller, track, unknown
 from twin.body import Loads
 from twin.control import HeatingGuard, PIController, RBFNetwork, TensionLoop
 from twin.control import tip_controller as tip_module
@@ -258,7 +258,7 @@ def test_a_steady_error_of_the_displacements_is_believed_for_what_it_is() -> Non
 
 
 def test_paths_are_closed_and_lie_on_the_surface() -> None:
-    for name, path in tip_paths(LENGTH, RADIUS).items():
+    for name, path in tip_paths(ROBOT_LENGTH, RADIUS).items():
         points = np.array([path(u) for u in np.linspace(0.0, 1.0, 101)])
         assert np.hypot(points[:, 0], points[:, 1]).max() <= 1.02 * RADIUS
         if name != "spiral":
@@ -266,14 +266,14 @@ def test_paths_are_closed_and_lie_on_the_surface() -> None:
         for x, y, z in points[::10]:
             theta = 2.0 * np.arctan2(np.hypot(x, y), z)
             np.testing.assert_allclose(
-                bent_tip(theta * np.array([x, y]) / max(np.hypot(x, y), 1e-12), LENGTH), [x, y, z], atol=1e-9
+                bent_tip(theta * np.array([x, y]) / max(np.hypot(x, y), 1e-12), ROBOT_LENGTH), [x, y, z], atol=1e-9
             )
-    assert tip_on_surface(0.0, 0.0, LENGTH) == pytest.approx([0.0, 0.0, LENGTH])
+    assert tip_on_surface(0.0, 0.0, ROBOT_LENGTH) == pytest.approx([0.0, 0.0, ROBOT_LENGTH])
 
 
 def test_each_path_goes_where_its_name_says() -> None:
     """Corners and turning points, by hand; the tip's height is that of its bend."""
-    r, every = RADIUS, tip_paths(LENGTH, RADIUS)
+    r, every = RADIUS, tip_paths(ROBOT_LENGTH, RADIUS)
     a = r / np.sqrt(2.0)
     for name, u, x, y in (
         ("circle", 0.25, 0.0, r), ("circle", 0.5, -r, 0.0), ("square", 0.0, a, a), ("square", 0.25, -a, a),
@@ -304,14 +304,14 @@ def test_less_of_a_controller_is_worse(kind: str) -> None:
 
 def test_a_path_that_is_foreseen_is_followed_closer() -> None:
     """Springs turn some seconds late; where the path goes is known. On the path with the fastest turns."""
-    rose = tip_paths(LENGTH, RADIUS)["rose (3-D)"]
+    rose = tip_paths(ROBOT_LENGTH, RADIUS)["rose (3-D)"]
     told, untold = (track(Bench(unknown(), 0.0), controller("full"), rose, until=40.0, foresee=f).rms for f in (True, False))
     assert told < 0.8 * untold
 
 
 def test_it_knows_of_the_robot_what_its_sensors_say() -> None:
     """The same readings give the same voltages, with no robot there to look at."""
-    path, seen, bench = tip_paths(LENGTH, RADIUS)["circle"], [], Bench(unknown(), 0.01)
+    path, seen, bench = tip_paths(ROBOT_LENGTH, RADIUS)["circle"], [], Bench(unknown(), 0.01)
     read = bench.read
 
     def noted() -> tuple[np.ndarray, np.ndarray]:
@@ -324,7 +324,7 @@ def test_it_knows_of_the_robot_what_its_sensors_say() -> None:
     for (tension, displacement), wanted, voltage in zip(seen, run.wanted, run.voltage, strict=True):
         np.testing.assert_array_equal(again.step(wanted, tension, displacement, 0.05), voltage)
     assert len(seen) > 100
-    assert unknown() != KNOWN
+    assert unknown() != KNOWN_TWIN
 
 
 @pytest.mark.parametrize("bend", [(0.0, 0.0), (3e-7, -5e-7), (2e-6, 1e-6), (0.4, -0.3), (0.0, 1.2)])
@@ -340,12 +340,14 @@ def test_the_tip_of_an_arc_is_its_integral(bend: tuple[float, float]) -> None:
 def test_what_the_model_is_off_by_is_taken_from_where_it_is_sent(reset: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
     """tip* = wanted later + v + (tip of the model - tip estimated); without shape feedback the model is believed."""
     aims: list[np.ndarray] = []
-    robot = TipController(KNOWN, Loads(np.array([0.0, 0.0, 9.81])), SimpleNamespace(step=lambda target, *seen: target), reset=reset)  # type: ignore[arg-type]
+    robot = TipController(
+        KNOWN_TWIN, Loads(np.array([0.0, 0.0, 9.81])), SimpleNamespace(step=lambda target, *seen: target), reset=reset
+    )  # type: ignore[arg-type]
     monkeypatch.setattr(
         tip_module, "inverse", lambda robot, aim, **limits: aims.append(aim) or SimpleNamespace(tension=limits["resting"])
     )
     tension = np.array([2.0, 1.9, 1.9])
-    told = LoadedRobot(KNOWN, Loads(np.array([0.0, 0.0, 9.81]))).pull(tension)
+    told = LoadedRobot(KNOWN_TWIN, Loads(np.array([0.0, 0.0, 9.81]))).pull(tension)
     further = told.displacement + robot.robot.lever_arms[0] @ np.array(
         [0.05, 0.0]
     )  # bent by 0.05 rad more towards +x than it knows

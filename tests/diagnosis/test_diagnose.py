@@ -355,4 +355,4 @@ def test_of_few_trials_each_is_sealed_in_turn_and_all_are_diagnosed() -> None:
     assert [f["effects"] for f in error["folds"]] == [list(f.effects) for f in d.folds]
     # Calibrated without the friction some 1.3 of the floor and more; a fold that misses it pays with its own trial.
     assert d.errors.after["marker"] < d.errors.calibrated["marker"]
-    assert "the diagnosis was made 4 times" in error["summary"]
+    assert "the diagnosis was run 4 times" in error["summary"]

@@ -33,9 +33,9 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
     stage("screen", screening)
     stage("search", "found")
     stage("choose", "chosen")
-    stage("lateness", "told")
+    stage("lag_or_delay", "told")
     stage("gate", "gated")
-    stage("settle", ("all told", "settled"))
+    stage("resolve_ties", ("all told", "settled"))
     stage("judge", "judged")
     stage("with_systematic", "as unsure as it is")
     settings = Settings(seed=7)
@@ -45,9 +45,9 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         "screen": (study, "base", 7),
         "search": (study, "base", "patterns", "bars"),
         "choose": (study, "found", "bars"),
-        "lateness": (study, "chosen"),
+        "lag_or_delay": (study, "chosen"),
         "gate": (study, "told", screening),
-        "settle": (study, "told", "gated", "bars"),
+        "resolve_ties": (study, "told", "gated", "bars"),
         "judge": (study, "all told", "settled", "bars"),
         "with_systematic": (study, "judged", "patterns"),
     }

@@ -26,7 +26,7 @@ from twin.diagnosis.evidence.discrepancy import COMPONENTS, Discrepancy
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.explain.words import components, mixed, since, structure, undecided, unlike, worst_channel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import DOUBTFUL, FEW, SHOWN
+from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, TRIALS_NAMED, UNLIKELY_PARAMETER_DISTANCE
 from twin.effects import effect_class
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parameters import Parameter
@@ -123,8 +123,8 @@ def test_two_robots_and_what_does_not_hold_elsewhere_are_told_in_words(plan: Pre
         return mixed(plan, MixedRobots(tuple(range(other, len(names))), tuple(range(other)), 1.0))
 
     assert f"{len(names) - 2} the one, 2 the other ({names[0]}, {names[1]}), more than" in said(2)
-    assert f"({', '.join(names[:SHOWN])}), more" in said(SHOWN)
-    assert f"({', '.join(names[:SHOWN])} and 1 more), more" in said(SHOWN + 1)
+    assert f"({', '.join(names[:TRIALS_NAMED])}), more" in said(TRIALS_NAMED)
+    assert f"({', '.join(names[:TRIALS_NAMED])} and 1 more), more" in said(TRIALS_NAMED + 1)
     assert unlike(0.5, 0.1).startswith(
         " On trials left out of the fit in turn a smooth error of 0.50 sigma is left, on the others 0.10:"
     )
@@ -142,7 +142,11 @@ def fitted(value: float, effect: str | None = None, ended: bool = False, low: fl
 
 
 def test_a_parameter_far_from_its_description_is_doubted_and_an_effects_own_is_not() -> None:
-    assert unlikely(fitted(2.0 - 0.5 * (DOUBTFUL - 0.1))) == unlikely(fitted(2.0 + 0.5 * (DOUBTFUL - 0.1))) == []
+    assert (
+        unlikely(fitted(2.0 - 0.5 * (UNLIKELY_PARAMETER_DISTANCE - 0.1)))
+        == unlikely(fitted(2.0 + 0.5 * (UNLIKELY_PARAMETER_DISTANCE - 0.1)))
+        == []
+    )
     assert unlikely(fitted(4.0, effect="friction")) == unlikely(fitted(9.0, std=None)) == []
     for value in (0.0, 4.0):
         said = unlikely(fitted(value))
@@ -223,7 +227,9 @@ def test_a_law_that_lets_tendons_fall_slack_lacks_what_they_would_hear(
         "twin.diagnosis.fit_context.transmitted_noise",
         lambda twin, share, noise, pair: share if (twin, len(noise)) == ("twin", 2) else 0.0,
     )
-    study = FitContext(SimpleNamespace(whitener=SimpleNamespace(heard=heard, noise=noise), trials=[2, 0], prepared=bench), None)  # type: ignore[arg-type]
+    study = FitContext(
+        SimpleNamespace(whitener=SimpleNamespace(input_noise_energy=heard, noise=noise), trials=[2, 0], prepared=bench), None
+    )  # type: ignore[arg-type]
     tension = {0: np.array([[0.0, 0.09]]), 1: np.zeros((5, 2)), 2: np.array([[0.19, 0.0], [0.1, 0.09]])}
     traces = {k: SimpleNamespace(true=SimpleNamespace(tension=t, antagonists=False)) for k, t in tension.items()}
     fit = SimpleNamespace(evaluation=SimpleNamespace(traces=traces), model=SimpleNamespace(twin="twin"))
@@ -329,7 +335,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(
     monkeypatch.setattr(look, "simulate", lambda twin, bench: [trace(i.name) for i in bench.inputs])
     monkeypatch.setattr(look, "unstable_starts", lambda bench, traces: [traces[1].true])
     monkeypatch.setattr(look, "suspicions", lambda bench, twin, s, nominal: sealed.append((list(s), nominal)) or ("odd",))
-    for n, count in ((FEW - 1, 0), (FEW, 2)):
+    for n, count in ((FEWEST_TRIALS_FOR_HELD_OUT - 1, 0), (FEWEST_TRIALS_FOR_HELD_OUT, 2)):
         day = few(plan, n)
         found = preview_data(day, SimpleNamespace(effects=()), Settings(), told.append)  # type: ignore[arg-type]
         assert len(found.held_out) == count
@@ -367,9 +373,10 @@ class Piped:
         monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: bench)
         monkeypatch.setattr(pipeline, "preview_data", lambda bench, twin, settings, progress: looked)
         monkeypatch.setattr(pipeline, "conclude", self.conclude)
-        monkeypatch.setattr(pipeline, "_by_hand", lambda recording, found: found)
         monkeypatch.setattr(
-            pipeline, "_reported", lambda looked, twin, found, parts, settings: self.reported.append((found, parts, settings))
+            pipeline,
+            "_reported",
+            lambda recording, looked, twin, found, parts, settings: self.reported.append((found, parts, settings)),
         )
 
     def conclude(self, bench: Any, twin: Any, sealed: Any, nominal: Any, settings: Settings, progress: Any) -> str:
@@ -386,7 +393,7 @@ class Piped:
 def test_fewer_than_six_trials_are_each_sealed_in_turn_and_share_the_time(
     plan: PreparedRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    few_trials = Piped(few(plan, FEW - 1), monkeypatch)
+    few_trials = Piped(few(plan, FEWEST_TRIALS_FOR_HELD_OUT - 1), monkeypatch)
     few_trials.run(Settings(budget=60.0))
     assert few_trials.asked == [*(([k], 10.0) for k in range(5)), ([], 10.0)]  # six diagnoses within the minute
     found, parts, settings = few_trials.reported[0]
@@ -400,7 +407,7 @@ def test_fewer_than_six_trials_are_each_sealed_in_turn_and_share_the_time(
 
 
 def test_six_trials_are_diagnosed_once_and_one_is_too_few(plan: PreparedRecording, monkeypatch: pytest.MonkeyPatch) -> None:
-    six = Piped(few(plan, FEW), monkeypatch)
+    six = Piped(few(plan, FEWEST_TRIALS_FOR_HELD_OUT), monkeypatch)
     six.run(Settings(budget=60.0))
     assert six.asked == [([1, 3], 60.0)]
     assert six.reported[0][:2] == ("without [1, 3]", [("without [1, 3]", (1, 3))])

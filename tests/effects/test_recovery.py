@@ -14,8 +14,8 @@ import pytest
 
 from tests.recorded_days import RECOVERED, Day, half, recorded_day
 from tools.benchmarks.diagnosis.attribution_table import held
-from tools.benchmarks.diagnosis.compared import COMPARED, KNOWN, OTHER, distance
-from tools.simulators.rod.effects.tendon_backlash import TendonBacklash as Play
+from tools.benchmarks.diagnosis.compared import COMPARABLE, COMPARED, OTHER_LAW_ERROR, distance
+from tools.simulators.rod.effects.tendon import TendonBacklash as Play
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.fit import Fit, fit
 from twin.diagnosis.calibration.objective import objective_of
@@ -26,7 +26,7 @@ from twin.diagnosis.evidence.scored_model import score_model, with_effect_added,
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.lag_or_delay import given, lag_or_delay, typical, weighed
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import ACCEPT, CLEAR
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LEAST_EVIDENCE
 from twin.effects import catalogue
 from twin.prediction.prepared import prepare
 from twin.prediction.twin import Twin
@@ -62,7 +62,7 @@ def fitted_alone(day: Day) -> tuple[Fit, Fit]:
     assert found, "the screening must see an effect of this size"
     fits = [fit(objective, base.model.with_effect(effect, c.start.values, c.start.free, 3), J=base.J) for c in found]
     best = score_model(study, min(fits, key=lambda f: f.cost))
-    return base, with_extended_law(study, best, ACCEPT).fit
+    return base, with_extended_law(study, best, LEAST_EVIDENCE).fit
 
 
 # test_finger_day.py and test_transmission.py
@@ -76,13 +76,15 @@ def test_it_recovers_its_own_parameters(day: Day) -> None:
     values = next(e for e in fitted.model.twin.effects if e.id == effect).values
     true, found, tolerance = COMPARED[effect](truth, values)
     assert distance(true, found) < tolerance, f"true {true}, found {found}"
-    known = KNOWN[effect](asdict(truth)) if effect in KNOWN else {}  # what the benchmark holds intervals against: the same numbers
+    known = (
+        COMPARABLE[effect](asdict(truth)) if effect in COMPARABLE else {}
+    )  # what the benchmark holds intervals against: the same numbers
     assert not known or distance(list(known.values()), [values.get(n, 0.0) for n in known]) < tolerance, f"{known}, found {values}"
     # White residuals have a mean square of one; of what stood above it the effect must take three quarters, whatever its law,
     # and nearly all where the law is the bench's own.
     before, after = (float(np.mean(f.z[f.z != 0] ** 2)) for f in (base, fitted))
     assert after - 1.0 < 0.25 * (before - 1.0)
-    assert tolerance == OTHER or effect == "contact" or after < 1.15
+    assert tolerance == OTHER_LAW_ERROR or effect == "contact" or after < 1.15
 
 
 @pytest.mark.parametrize(("seed", "worn"), [(5, (0.0, 0.0, 1.0)), (7, (1.0, 1.0, 1.0))])
@@ -125,7 +127,7 @@ def test_a_delay_that_was_taken_for_a_lag_is_nearly_as_likely_as_the_lag() -> No
     weights = weighed(given(study, before.best), typical(before.best))
     assert weights is not None
     delay, lag = (weights[frozenset({law})] for law in ("time_delay", "actuator_lag"))
-    assert abs(delay.score - lag.score) < CLEAR
+    assert abs(delay.score - lag.score) < CLEAR_CHI_SQUARE
     assert delay.values["time_delay"]["delay"] == pytest.approx(0.08, rel=0.05)
 
 

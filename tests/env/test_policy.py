@@ -10,8 +10,8 @@ import pytest
 
 from tools.benchmarks.tasks.policy.bench_reach import BenchReach, robot_of
 from tools.benchmarks.tasks.policy.cells import Cell, plan, run
-from tools.benchmarks.tasks.policy.days import DAYS
-from tools.benchmarks.tasks.policy.reach import SEEN, TASK, acting, distances, episodes_of, task, train
+from tools.benchmarks.tasks.policy.days import EFFECT_DAYS
+from tools.benchmarks.tasks.policy.reach import SENSORS_SEEN, TASK, acting, distances, episodes_of, task, train
 from tools.benchmarks.tasks.policy_table import reached, table
 from tools.simulators.rod.bench import run as run_day
 from tools.simulators.rod.design import Day, Trial
@@ -90,7 +90,7 @@ def test_goals_on_the_bench_are_the_same_for_every_policy_and_within_its_reach(t
         TWIN.replace("[[effect]]", '[parameters]\n"backbone.youngs_modulus" = { value = 70, unit = "GPa" }\n[[effect]]')
     )
     robot = a_robot("tip_payload")
-    one, other = (BenchReach(robot, twin, sensors=SEEN[True], **TASK) for twin in ("continuum", tmp_path / "twin.toml"))
+    one, other = (BenchReach(robot, twin, sensors=SENSORS_SEEN[True], **TASK) for twin in ("continuum", tmp_path / "twin.toml"))
     for env in (one, other):
         env.reset(seed=5)
     np.testing.assert_array_equal(one.goal, other.goal)
@@ -124,7 +124,7 @@ def test_the_table_does_no_cell_twice(tmp_path: Path) -> None:
     # It knows the payload; what is left are a built robot's tolerances, 2 or 3 mm of the 30 to 70 that the tip goes.
     assert reached(json.loads(written)["bench"]["tip_payload"]) == 100.0
     assert not list(tmp_path.glob("*.part"))
-    assert len(plan(2)) == len({c.file for c in plan(2)}) == 2 * (1 + 2 * len(DAYS)) + 2 * 2 * (1 + 3 * len(DAYS))
+    assert len(plan(2)) == len({c.file for c in plan(2)}) == 2 * (1 + 2 * len(EFFECT_DAYS)) + 2 * 2 * (1 + 3 * len(EFFECT_DAYS))
 
 
 def test_a_policy_learns_and_is_tried_on_the_bench(tmp_path: Path) -> None:
@@ -135,6 +135,6 @@ def test_a_policy_learns_and_is_tried_on_the_bench(tmp_path: Path) -> None:
     act = acting(train(env, seed=0, steps=1000, look=lambda step, act: seen.append(step)))
     assert seen == [1000]
     before = acting(train(task("continuum", blind=False), seed=0, steps=20))
-    tried = episodes_of(BenchReach(robot_of(tmp_path / "days" / "tip_payload"), "continuum", sensors=SEEN[False], **TASK))
+    tried = episodes_of(BenchReach(robot_of(tmp_path / "days" / "tip_payload"), "continuum", sensors=SENSORS_SEEN[False], **TASK))
     # 600 updates: still 1 to 3 mm off in the end; one that has learned nothing stands centimetres away.
     assert np.median(distances(tried, act, 5)) < 0.5 * np.median(distances(tried, before, 5))

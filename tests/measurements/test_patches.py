@@ -111,13 +111,13 @@ def test_a_patch_whose_points_share_four_errors_is_known_to_half_a_points_scatte
     outwards = np.tile(np.stack([camera - across, camera + across]) / np.sqrt(2.0), (N_BANDS, 1))
     quarter = np.zeros(len(points), int)
     for j in range(N_PATCHES):
-        own = np.flatnonzero(true.of[0] == j)
+        own = np.flatnonzero(true.patch_of_points[0] == j)
         quarter[own[np.argsort(points[own, 2])]] = 4 * np.arange(len(own)) // len(own)
     off = []
     for _ in range(200):
-        error, of = SHIFT * rng.normal(size=(N_PATCHES, 4))[true.of[0], quarter], true.of[0]
+        error, of = SHIFT * rng.normal(size=(N_PATCHES, 4))[true.patch_of_points[0], quarter], true.patch_of_points[0]
         moved = points + error[:, None] * outwards[of]
-        off.append([np.median((moved @ outwards.T)[of == j, j]) for j in range(N_PATCHES)] - true.place[0])
+        off.append([np.median((moved @ outwards.T)[of == j, j]) for j in range(N_PATCHES)] - true.positions[0])
     at_one_place = np.array([np.std(x) for x in np.array(off).T]) / SHIFT
     assert np.median(at_one_place) == pytest.approx(SHARED_NOISE_SHARE, rel=0.2)
 
@@ -152,7 +152,7 @@ def test_a_patch_of_just_enough_points_says_where_it_is(missing: int) -> None:
     z = np.repeat(np.arange(1.0, N_BANDS + 1), 2 * MIN_PATCH_POINTS) * LENGTH / N_BANDS
     y = np.tile(np.repeat([-RADIUS, RADIUS], MIN_PATCH_POINTS), N_BANDS)
     points = np.column_stack([np.zeros(len(z)), y, z])[: len(z) - missing]
-    place = cut_patches(frames(points), np.array([1.0, 0.0, 0.0])).place[0]
+    place = cut_patches(frames(points), np.array([1.0, 0.0, 0.0])).positions[0]
     assert np.isnan(place).tolist() == [False] * (N_PATCHES - 1) + [bool(missing)]
     np.testing.assert_allclose(place[: N_PATCHES - 1], RADIUS / np.sqrt(2.0))
 
@@ -275,7 +275,7 @@ def test_an_experiment_to_come_shows_the_tip_in_place_of_patches(day: Recording)
     assert [o.channel.name for o in ahead.outputs] == [f"sensor_{i}_resistance" for i in (1, 2, 3, 4)] + ["tip_x", "tip_y", "tip_z"]
     np.testing.assert_array_equal(then.sigma, [*noise.sigma[:4], *3 * [noise.sigma[-1]]])  # that of the worst patch
     np.testing.assert_array_equal(then.rho, [*noise.rho[:4], 0.0, 0.0, 0.0])
-    short = replace(ahead.inputs[0], seen=None)
+    short = replace(ahead.inputs[0], clouds=None)
     trace = simulate_alone(Twin.of("finger"), short)
     np.testing.assert_array_equal(output_columns(ahead, trace.true)[:, 4:], trace.true.markers[:, -1])
     assert _foreseen(ahead, then) == (ahead, then)

@@ -98,8 +98,8 @@ def test_the_statics_benchmark_times_warm_solves(capsys: pytest.CaptureFixture[s
     """On a few samples: a problem is built of times, tensions, loads and route."""
     rng, solver = np.random.default_rng(0), Equilibrium(load("continuum").build())
     time, tension = statics.wandering_tensions(rng, 30)
-    for route in (statics.Route(), statics.FRICTION):
-        assert 0.0 < statics.seconds(solver.solve, time, tension, statics.CASES["hanging"], route) < 10.0
-        assert solver.solve(Problem(time, tension, statics.CASES["hanging"], route)).status.all()
+    for route in (statics.Route(), statics.FRICTION_ROUTE):
+        assert 0.0 < statics.seconds(solver.solve, time, tension, statics.LOAD_CASES["hanging"], route) < 10.0
+        assert solver.solve(Problem(time, tension, statics.LOAD_CASES["hanging"], route)).status.all()
     statics.convergence(solver, rng, 3)
     assert "0 not found" in capsys.readouterr().out

@@ -13,9 +13,8 @@ from tools.simulators.finger.bench import make_finger, run
 from tools.simulators.finger.body import Body, assemble
 from tools.simulators.finger.camera import Points, cloud, scatter
 from tools.simulators.finger.effects import all_effects
-from tools.simulators.finger.effects.sensor_gain import SensorGain
-from tools.simulators.finger.effects.sensor_hysteresis import SensorHysteresis
-from tools.simulators.finger.effects.tendon_backlash import TendonBacklash
+from tools.simulators.finger.effects.outside import TendonBacklash
+from tools.simulators.finger.effects.sensor import SensorGain, SensorHysteresis
 from tools.simulators.finger.equilibria import equilibrium
 from tools.simulators.finger.hand import Hand
 from tools.simulators.finger.mesh import cone, radius

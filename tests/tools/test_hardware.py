@@ -89,7 +89,7 @@ def test_a_camera_that_moved_is_registered_by_four_sweeps_and_judged_by_the_othe
     assert every[0] == (0, 1, 2, 3)
     assert len(set(every)) == len(every) == 35
     drawn = sweeps.ways(20)
-    assert (drawn[0], len(drawn), drawn) == ((0, 1, 2, 3), sweeps.WAYS + 1, sweeps.ways(20))
+    assert (drawn[0], len(drawn), drawn) == ((0, 1, 2, 3), sweeps.MOST_CHOICES + 1, sweeps.ways(20))
     assert all(len(set(way)) == sweeps.REGISTERED for way in drawn)
 
 
@@ -156,7 +156,7 @@ def test_the_diagnosed_cable_tool_meets_its_bars(raw: Path) -> None:
     assert len(recording.trials) == 4
     claimed = {c.effect for c in found.claims}
     assert "tendon_elasticity" in claimed
-    assert claimed & comparison.FRICTION
+    assert claimed & comparison.FRICTION_EFFECTS
     assert all(row.met is not False for row in rows if "time" not in row.what)
 
 
@@ -165,7 +165,7 @@ def test_any_runs_of_the_cable_tool_are_told_by_what_was_measured_and_loads_not_
     fitted at two loads holds for all but the pair that never comes near no load."""
     every = {r.title.split()[1]: r for r in cable_tool.read_all(raw / "cable-tool")}
     assert {t.name for t in every[cable_tool.TOOL].trials} == {t.name for t in cable_tool.read(raw / "cable-tool")[0].trials}
-    for tool in cable_tool.OTHERS:
+    for tool in cable_tool.MIRRORED_TOOLS:
         assert [t.name for t in every[tool].trials] == ["load20_0.3Hz.csv", "load80_0.3Hz.csv"]
     steady = tuple(t for t in every[cable_tool.TOOL].trials if "0.3Hz" in t.name)
     for chosen in ({20, 40}, {10, 40}):

@@ -16,22 +16,30 @@ from scipy.special import spence
 
 from tools.benchmarks.diagnosis.second_bench_days import exact, totals
 from tools.simulators.second_rod import write
-from tools.simulators.second_rod.contact import POST, WALL, obstacle
+from tools.simulators.second_rod.contact import POST_OBSTACLE, WALL_OBSTACLE, obstacle
 from tools.simulators.second_rod.day import draw_day
-from tools.simulators.second_rod.effects import KINDS, KNOWN, ODD, Effect
+from tools.simulators.second_rod.effects import CATALOGUE_KINDS, EFFECT_KINDS, ODD_KINDS, Effect
 from tools.simulators.second_rod.equilibrium import Equilibrium, Loads, Model, Problem, empty_memory, residual
 from tools.simulators.second_rod.fields import Magnet
 from tools.simulators.second_rod.loom import Loom
-from tools.simulators.second_rod.plan import BLOCK, Planned, plan
-from tools.simulators.second_rod.robot import BACKBONE_MASS, BACKBONE_RADIUS, DISK_MASS, HOLE_RADIUS, LENGTH, YOUNGS_MODULUS, Robot
-from tools.simulators.second_rod.rod import INTERVALS, STEPS, shape
+from tools.simulators.second_rod.plan import DAYS_PER_PLAN, Planned, plan
+from tools.simulators.second_rod.robot import (
+    BACKBONE_MASS,
+    BACKBONE_RADIUS,
+    DISK_MASS,
+    HOLE_RADIUS,
+    ROD_LENGTH,
+    YOUNGS_MODULUS,
+    Robot,
+)
+from tools.simulators.second_rod.rod import INTERVALS, PIECES_PER_INTERVAL, shape
 from tools.simulators.second_rod.simulate import simulate, without_effects
 from tools.simulators.second_rod.tendons import SLACK_ROUNDING, segments, tension_of_stretch, tensions
 from twin.measurements import read
 
 BENDING = YOUNGS_MODULUS * np.pi * BACKBONE_RADIUS**4 / 4  # N m^2
 WEIGHTLESS, HANGING = np.zeros(3), np.array([0.0, 0.0, 9.81])
-INTERVAL = LENGTH / INTERVALS
+INTERVAL = ROD_LENGTH / INTERVALS
 
 
 def at_rest(robot: Robot, drive: list[float], gravity: np.ndarray, payload: float = 0.0, functions: int = 7) -> Equilibrium:
@@ -63,8 +71,8 @@ def test_a_weak_sideways_weight_bends_it_as_a_beam() -> None:
     """w L^4 / 8 E I for the backbone and m g a^2 (3 L - a) / 6 E I for each disk, small deflection."""
     gravity = 0.02 * 9.81
     arms = INTERVAL * np.arange(1, INTERVALS + 1)
-    backbone = BACKBONE_MASS * gravity * LENGTH**3 / (8 * BENDING)
-    disks = DISK_MASS * gravity * np.sum(arms**2 * (3 * LENGTH - arms)) / (6 * BENDING)
+    backbone = BACKBONE_MASS * gravity * ROD_LENGTH**3 / (8 * BENDING)
+    disks = DISK_MASS * gravity * np.sum(arms**2 * (3 * ROD_LENGTH - arms)) / (6 * BENDING)
     tip = at_rest(Robot(), [0.0, 0.0, 0.0], np.array([gravity, 0.0, 0.0])).disks()[0][-1]
     # masses in points twice an interval and curvature at the middle of a quarter: (1 / 32)^2 = 0.1 %
     assert tip[0] == pytest.approx(backbone + disks, rel=1e-3)
@@ -79,14 +87,16 @@ def energy(coefficients: np.ndarray, rest: np.ndarray, drive: np.ndarray, gravit
     density = xx * strain[:, 0] ** 2 + 2 * xy * strain[:, 0] * strain[:, 1] + yy * strain[:, 1] ** 2
     density += rod.twisting * strain[:, 2] ** 2
     total = 0.5 * np.sum(rod.steps * density) - np.sum(rod.masses[:, None] * positions @ gravity)
-    total -= np.sum(model.disk_masses * (positions[STEPS::STEPS] @ gravity))
+    total -= np.sum(model.disk_masses * (positions[PIECES_PER_INTERVAL::PIECES_PER_INTERVAL] @ gravity))
     mass, lever = model.outboard
     total -= mass * (positions[-1] + lever * rotations[-1, :, 2]) @ gravity + model.loom.mass * positions[-1] @ gravity
     stretches = segments(rotations, positions, model.tendons.holes)[1].sum(1) - model.tendons.rest_lengths + drive
     for stretch in stretches:
         total += quad(tension_of_stretch, -0.02, stretch, args=(model.tendons,), points=[0.0], epsabs=1e-13, limit=200)[0]
     wall = model.obstacle
-    depth = (wall.clearance - (positions[STEPS :: STEPS // 2] - wall.point) @ wall.direction) / wall.rounding
+    depth = (
+        wall.clearance - (positions[PIECES_PER_INTERVAL :: PIECES_PER_INTERVAL // 2] - wall.point) @ wall.direction
+    ) / wall.rounding
     total += wall.hardness * wall.rounding**2 * np.sum(-spence(1 + np.exp(depth)))  # softplus integrates to -Li2(-exp x)
     square = np.sum((positions[-1] - model.magnet.place) ** 2)
     total += model.magnet.energy * model.magnet.core**6 / (square + model.magnet.core**2) ** 3
@@ -101,7 +111,9 @@ def test_the_residual_is_the_gradient_of_the_energy() -> None:
         stiffening=200.0,
         asymmetry=(0.2, 0.4),
         outboard=(2e-3, 5e-3),
-        obstacle=obstacle(WALL, np.array([0.02, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]))._replace(hardness=50.0, rounding=2e-3),
+        obstacle=obstacle(WALL_OBSTACLE, np.array([0.02, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]))._replace(
+            hardness=50.0, rounding=2e-3
+        ),
         magnet=Magnet(np.array([0.03, 0.01, 0.1]), 1e-3, 0.025),
         loom=Loom(np.array([0.9, 0.5, 0.25]), np.full(3, 1e3), 1e-3),
     )
@@ -120,7 +132,7 @@ def test_the_residual_is_the_gradient_of_the_energy() -> None:
 
 @pytest.mark.parametrize("touching", [False, True])
 def test_more_polynomials_move_no_marker(touching: bool) -> None:
-    post = obstacle(POST, np.array([0.03, 0.0, 0.07]), np.array([0.0, 0.95, 0.3122]) / np.hypot(0.95, 0.3122), 7e-3)
+    post = obstacle(POST_OBSTACLE, np.array([0.03, 0.0, 0.07]), np.array([0.0, 0.95, 0.3122]) / np.hypot(0.95, 0.3122), 7e-3)
     robot = replace(Robot(), obstacle=post) if touching else Robot()
     seven, ten = (at_rest(robot, [2.5, 1.2, 0.1], np.array([0.0, 9.81, 0.0]), 10e-3, n).disks()[0] for n in (7, 10))
     # a fiftieth of the noise of a marker, so that it shows in no residual
@@ -173,7 +185,7 @@ def test_displacement_and_tension_drives_invert_each_other() -> None:
 
 def test_a_wall_keeps_the_rims_out() -> None:
     free = at_rest(Robot(), [2.0, 0.1, 0.1], HANGING).disks()[0]
-    wall = obstacle(WALL, np.array([0.04, 0.0, 0.06]), np.array([-1.0, 0.0, 0.0]))
+    wall = obstacle(WALL_OBSTACLE, np.array([0.04, 0.0, 0.06]), np.array([-1.0, 0.0, 0.0]))
     stopped = at_rest(Robot(obstacle=wall), [2.0, 0.1, 0.1], HANGING).disks()[0]
     assert free[-1, 0] > 0.05
     # 3 kN/m and a force of the order of EI / L^2 = 0.1 N: less than 0.2 mm into a wall 40 mm away, rims of 9 mm
@@ -181,13 +193,13 @@ def test_a_wall_keeps_the_rims_out() -> None:
 
 
 def test_every_thirty_days_have_their_proportions_and_all_kinds_come_up() -> None:
-    days = plan(2 * BLOCK, 3)
-    for block in (days[:BLOCK], days[BLOCK:]):
-        odd = [day for day in block if set(day.kinds) & set(ODD)]
+    days = plan(2 * DAYS_PER_PLAN, 3)
+    for block in (days[:DAYS_PER_PLAN], days[DAYS_PER_PLAN:]):
+        odd = [day for day in block if set(day.kinds) & set(ODD_KINDS)]
         numbers = [len(day.kinds) for day in block if day not in odd]
         assert (numbers.count(0), numbers.count(1), numbers.count(2), len(odd)) == (4, 16, 5, 5)
-        assert {kind for day in block for kind in day.kinds} >= set(KNOWN)
-    assert all(day.drive in KINDS[kind].drives for day in days for kind in day.kinds)
+        assert {kind for day in block for kind in day.kinds} >= set(CATALOGUE_KINDS)
+    assert all(day.drive in EFFECT_KINDS[kind].drives for day in days for kind in day.kinds)
     assert plan(7, 3) == days[:7]
 
 
@@ -275,9 +287,9 @@ def test_the_totals_count_effects_hardly_told_apart_as_one() -> None:
     assert totals([pair, (answer("explained", "contact", "base_tilt"), truth("contact"))])[-1].endswith(" 3.00, 3.80")
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", sorted(EFFECT_KINDS))
 def test_an_effect_moves_the_markers_more_when_larger(kind: str) -> None:
-    law = KINDS[kind]
+    law = EFFECT_KINDS[kind]
     random = np.random.default_rng(8)
     day = draw_day(random, sorted(law.drives)[-1], law.wants, trials=3)
     drawn = law.draw(random, day)

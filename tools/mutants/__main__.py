@@ -17,10 +17,10 @@ from tools.mutants.groups import GROUPS, group_of
 from tools.mutants.mutant import Mutant
 from tools.mutants.operators import mutants
 
-HERE = Path(__file__).parent
-OUTCOMES, REASONS = HERE / "outcomes.json", HERE / "reasons.toml"
-KINDS = ("killed", "timed out", "survived")
-SHOWN = (*KINDS, "with a reason")
+MUTANTS_FOLDER = Path(__file__).parent
+OUTCOMES, REASONS = MUTANTS_FOLDER / "outcomes.json", MUTANTS_FOLDER / "reasons.toml"
+OUTCOME_KINDS = ("killed", "timed out", "survived")
+COLUMNS_SHOWN = (*OUTCOME_KINDS, "with a reason")
 NEW = "survived"  # or never tried
 
 
@@ -42,7 +42,7 @@ def run(groups: list[str], drawn: Callable[[dict[str, str]], list[Mutant]], pati
     """Tries the mutants drawn from each group's files, by name, and those by hand; the killed are not tried again, nor survivors
     with a reason, and those whose line is no more are forgotten. Raises SystemExit where a group's tests fail on the tree as it
     is."""
-    tree = Tree(HERE.parents[1])
+    tree = Tree(MUTANTS_FOLDER.parents[1])
     try:
         texts = tree.texts()
         there = {m.key for m in every(texts)}
@@ -85,11 +85,13 @@ def table(known: dict[str, str]) -> str:
         counts.setdefault(package, Counter())[outcome] += 1
         counts[package]["with a reason"] += outcome == "survived" and reason(key) is not None
     counts["all"] = sum(counts.values(), Counter())
-    lines = [f"{'':14}{'tried':>8}" + "".join(f"{k:>15}" for k in SHOWN) + f"{'rate':>8}{'of the others':>15}"]
+    lines = [f"{'':14}{'tried':>8}" + "".join(f"{k:>15}" for k in COLUMNS_SHOWN) + f"{'rate':>8}{'of the others':>15}"]
     for package, c in counts.items():
-        seen, tried = c["killed"] + c["timed out"], sum(c[k] for k in KINDS)
+        seen, tried = c["killed"] + c["timed out"], sum(c[k] for k in OUTCOME_KINDS)
         others = seen / max(tried - c["with a reason"], 1)
-        lines.append(f"{package:14}{tried:8}" + "".join(f"{c[k]:15}" for k in SHOWN) + f"{seen / max(tried, 1):8.1%}{others:15.1%}")
+        lines.append(
+            f"{package:14}{tried:8}" + "".join(f"{c[k]:15}" for k in COLUMNS_SHOWN) + f"{seen / max(tried, 1):8.1%}{others:15.1%}"
+        )
     survivors = sorted(k for k, outcome in known.items() if outcome == "survived")
     return "\n".join([*lines, *(f"{reason(k) or 'NO TEST SEES IT'}: {k}" for k in survivors)])
 

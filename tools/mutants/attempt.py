@@ -15,7 +15,7 @@ from tools.mutants.mutant import Mutant
 
 PARTS = ("twin", "tools", "tests", "models", "pyproject.toml")
 LIBRARIES = ["numpy", "scipy.optimize", "scipy.interpolate", "mujoco", "numba", "pydantic", "pint", "pytest"]
-COMPILING = 600.0  # s
+COMPILING_SECONDS = 600.0  # s
 LEAST_DIFFERENT = 10  # s by which a file's time is moved, for readers that keep what they made of it
 
 
@@ -48,7 +48,7 @@ class Tree:
         try:
             path.write_text(mutant.applied(text))
             os.utime(path, (stat.st_atime, stat.st_mtime + LEAST_DIFFERENT))  # bytecode is kept by time and size
-            code = self.run(str(group_of(mutant.file)), store, patience + COMPILING * compiled)
+            code = self.run(str(group_of(mutant.file)), store, patience + COMPILING_SECONDS * compiled)
         finally:
             path.write_text(text)
             os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))

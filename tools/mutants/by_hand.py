@@ -32,7 +32,7 @@ CHANGES = (  # (file, what a line holds, what it is to hold)
     # radians called degrees
     ("twin/prediction/evaluate.py", '"angle": OutputGroup("deg", 180.0 / np.pi', '"angle": OutputGroup("deg", 1.0'),
     # a drift ten times as fast
-    ("twin/effects/load_cell_drift.py", 'self.each("rate") * levelled(', '10.0 * self.each("rate") * levelled('),
+    ("twin/effects/load_cell_drift.py", 'return self.per_tendon_values("rate")', 'return 10.0 * self.per_tendon_values("rate")'),
     ("twin/report/numbers.py", '"N/s": ("N/h", 3600.0)', '"N/s": ("N/h", 36000.0)'),
     # currents are not delayed
     ("twin/effects/time_delay.py", "current=self._heating(reported))", "current=reported.current)"),

@@ -18,7 +18,7 @@ SWAPPED: dict[type[ast.AST], tuple[str, str]] = {
     ast.IsNot: ("is not", "is"), ast.In: ("in", "not in"), ast.NotIn: ("not in", "in"),
     ast.And: ("and", "or"), ast.Or: ("or", "and"),
 }  # fmt: skip
-TWINS = {
+FUNCTIONS_EXCHANGED = {
     "min": "max",
     "max": "min",
     "maximum": "minimum",
@@ -77,9 +77,9 @@ def _changes(node: ast.AST, lines: list[str]) -> Iterator[Change]:
         case ast.Constant(float() as value) if value:
             yield *_span(node), repr(2.0 * value), "constant"
             yield *_span(node), repr(0.5 * value), "constant"
-        case ast.Name(id=name) | ast.Attribute(attr=name) if name in TWINS:
+        case ast.Name(id=name) | ast.Attribute(attr=name) if name in FUNCTIONS_EXCHANGED:
             number, _, end = _span(node)
-            yield number, end - len(name), end, TWINS[name], "function"
+            yield number, end - len(name), end, FUNCTIONS_EXCHANGED[name], "function"
     yield from _dropped(node)
 
 

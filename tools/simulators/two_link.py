@@ -21,11 +21,11 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-G = 9.81  # m/s^2
+TWO_LINK_GRAVITY = 9.81  # m/s^2
 DAMPING = 1e-4  # N m s/rad: slow motions lag by less than the encoders show
 GIVES = 5e-5  # m, D: over which a tendon comes from sticking to sliding
-STEP = 5e-4  # s: a tenth of the fastest mode's time, friction sticking
-REST = 5.0  # s before that, under the loads alone
+INTEGRATION_STEP = 5e-4  # s: a tenth of the fastest mode's time, friction sticking
+REST_UNDER_LOADS = 5.0  # s before that, under the loads alone
 SIDEWAYS = 0.5 * np.pi
 EASE = 8.0  # s over which the first tensions come on, before the log starts
 SIGMA = {"angle": np.deg2rad(0.1), "tip": 2e-4, "tension": 0.01}
@@ -109,21 +109,21 @@ def march(T, k, g, plant, masses):
     y, q = np.zeros(8), np.zeros((n + 1, 2))
     for i in range(n):
         a = rates(y, T[2 * i], k, g, plant, masses)
-        b = rates(y + 0.5 * STEP * a, T[2 * i + 1], k, g, plant, masses)
-        c = rates(y + 0.5 * STEP * b, T[2 * i + 1], k, g, plant, masses)
-        d = rates(y + STEP * c, T[2 * i + 2], k, g, plant, masses)
-        y = y + STEP / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        b = rates(y + 0.5 * INTEGRATION_STEP * a, T[2 * i + 1], k, g, plant, masses)
+        c = rates(y + 0.5 * INTEGRATION_STEP * b, T[2 * i + 1], k, g, plant, masses)
+        d = rates(y + INTEGRATION_STEP * c, T[2 * i + 2], k, g, plant, masses)
+        y = y + INTEGRATION_STEP / 6.0 * (a + 2.0 * b + 2.0 * c + d)
         q[i + 1] = y[:2]
     return q
 
 
 def moved(plant: Plant, trial: Planned, warm: float, time: np.ndarray) -> np.ndarray:
     """Joint angles (n, 2) rad at the times: straight, its loads, the first tensions, the log; `warm` K above 23 degC."""
-    t = np.arange(-EASE - REST, trial.seconds + STEP, 0.5 * STEP)
+    t = np.arange(-EASE - REST_UNDER_LOADS, trial.seconds + INTEGRATION_STEP, 0.5 * INTEGRATION_STEP)
     t = t[: len(t) - 1 + len(t) % 2]
     T = np.minimum(trial.tension(np.maximum(t, 0.0)), plant.limit) * np.clip(1.0 + t / EASE, 0.0, 1.0)[:, None]
     turned = plant.tilt + trial.mount
-    g = G * np.array([np.sin(turned), np.cos(turned)])
+    g = TWO_LINK_GRAVITY * np.array([np.sin(turned), np.cos(turned)])
     numbers = np.array([*plant.length, *plant.radius, *plant.rest, plant.wrap, plant.mu])
     masses = np.array([*plant.mass, trial.payload + plant.hung])
     q = march(np.ascontiguousarray(T), plant.stiffness * (1.0 - plant.softer * warm), g, numbers, masses)
@@ -229,13 +229,13 @@ def _toml(trials: list[Planned], effect: str | None) -> str:
     channels += [(f"joint_{j}_angle", "output", "rad", SIGMA["angle"]) for j in (1, 2)]
     channels += [(f"tip_{a}", "output", "m", SIGMA["tip"]) for a in "xyz"]
     lines = ['format = "twin-measurements/1"', 'robot = "two_link"', f'title = "Two-link bench day ({effect or "as described"})"']
-    lines += ['source = "simulation: Lagrange equations"', f"gravity = [0.0, 0.0, {G}]"]
+    lines += ['source = "simulation: Lagrange equations"', f"gravity = [0.0, 0.0, {TWO_LINK_GRAVITY}]"]
     for name, role, unit, noise in channels:
         lines += ["", "[[channel]]", f'name = "{name}"', f'role = "{role}"', f'unit = "{unit}"', f"noise = {noise:.6g}"]
     lines += ["", "[[channel]]", 'name = "ambient_temperature"', 'role = "context"', 'unit = "degC"']
     for t in trials:
         lines += ["", "[[trial]]", f'file = "{t.name}.csv"', f"start = {t.start}", f'tip_payload = "{1e3 * t.payload:g} g"']
-        lines += [f"gravity = [{G * np.sin(t.mount):.6f}, 0.0, {G * np.cos(t.mount):.6f}]"]
+        lines += [f"gravity = [{TWO_LINK_GRAVITY * np.sin(t.mount):.6f}, 0.0, {TWO_LINK_GRAVITY * np.cos(t.mount):.6f}]"]
     return "\n".join(lines) + "\n"
 
 

@@ -15,7 +15,7 @@ from rich.text import Text
 
 out = Console()
 err = Console(stderr=True)
-COMPILING = "compiling inner loops, once on this machine (half a minute or more)"
+COMPILING_NOTE = "compiling inner loops, once on this machine (half a minute or more)"
 REPLACEMENTS = {  # characters of our own texts that small encodings lack
     "±": "+/-", "−": "-", "–": "-", "°": " deg", "²": "^2", "×": "x", "→": "->", "·": "-", "•": "*", "…": "...",  # noqa: RUF001
 }  # fmt: skip
@@ -54,7 +54,7 @@ def show_progress(title: str) -> Iterator[Callable[[str], None]]:
             step = f"{title}: {words}"
             status.update(step)
 
-        with report_compiling(lambda on: status.update(f"{title}: {COMPILING}" if on else step)):
+        with report_compiling(lambda on: status.update(f"{title}: {COMPILING_NOTE}" if on else step)):
             yield now
 
 

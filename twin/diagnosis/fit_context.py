@@ -12,7 +12,7 @@ from twin.diagnosis.budget import Budget
 from twin.diagnosis.calibration.fit import Fit, Objective
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.noise.transmission import transmitted_noise
-from twin.diagnosis.noise.whitening import SILENT
+from twin.diagnosis.noise.whitening import SLACK_READING
 from twin.foundation.parameters import parameter_array
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
@@ -42,10 +42,10 @@ class FitContext:
 
     def blocked_input_noise(self, fit: Fit) -> float:
         """What the fitted trials' |z|^2 lacks of the readings' noise (`Whitener.heard`): the law averages it away (`passed`), or
-        lets tendons fall slack, or so near it that noise is cut off there (`SILENT`)."""
+        lets tendons fall slack, or so near it that noise is cut off there (`SLACK_READING`)."""
         traces, whitener, prepared = fit.evaluation.traces, self.objective.whitener, self.prepared
         drive = whitener.noise.drive
-        near = np.where(prepared.driven_by(Drive.TENSION), SILENT * drive, 0.0)
+        near = np.where(prepared.driven_by(Drive.TENSION), SLACK_READING * drive, 0.0)
         lacking = 0.0
         for k, heard in zip(self.trials, whitener.input_noise_energy, strict=True):
             true = traces[k].true

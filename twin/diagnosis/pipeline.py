@@ -30,7 +30,7 @@ from twin.diagnosis.search.lag_or_delay import lag_or_delay
 from twin.diagnosis.search.screen import screen
 from twin.diagnosis.search.search import search
 from twin.diagnosis.split import blind, split
-from twin.diagnosis.thresholds import FEW, FIRST
+from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, ROWS_FOR_ZERO
 from twin.diagnosis.verdict.gate import gate
 from twin.diagnosis.verdict.judge import judge
 from twin.diagnosis.verdict.resolve_ties import resolve_ties
@@ -58,9 +58,9 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose a recording against a twin, by default the robot it names, as described.
 
-    About a quarter of the trials is held out; of fewer than `FEW` trials each in turn, the claims coming from all of them.
-    `on_preview` is called before anything is fitted, with what the files may mean otherwise and with loops; no number depends on
-    it. Raises TwinError for data that cannot be used.
+    About a quarter of the trials is held out; of fewer than `FEWEST_TRIALS_FOR_HELD_OUT` trials each in turn, the claims coming
+    from all of them. `on_preview` is called before anything is fitted, with what the files may mean otherwise and with loops; no
+    number depends on it. Raises TwinError for data that cannot be used.
     """
     settings, twin = settings or Settings(), twin or Twin.of_recording(recording)
     prepared = prepare(recording, twin.robot)
@@ -75,7 +75,7 @@ def diagnose(
 def _sealed(recording: Recording, preview: DataPreview, twin: Twin, settings: Settings, progress: Progress) -> Diagnosis:
     n = len(preview.prepared.inputs)
     prepared, nominal = preview.prepared, preview.nominal
-    if n >= FEW:
+    if n >= FEWEST_TRIALS_FOR_HELD_OUT:
         found = conclude(prepared, twin, preview.held_out, nominal, settings, progress)
         return _reported(recording, preview, twin, found, [(found, preview.held_out)], settings)
     parts, share = [], replace(settings, budget=settings.budget and settings.budget / (n + 1))
@@ -179,7 +179,7 @@ def _anew(found: Conclusion, opened: HeldOut) -> Iterator[str]:
         yield (
             f"held-out trials, {OUTPUT_GROUPS[group].kind}: {fitted:.3g} {unit} with the zeros that were fitted, "
             f"{own:.3g} {unit} where each "
-            f"trial's is taken from its own first {FIRST} rows; the first counts"
+            f"trial's is taken from its own first {ROWS_FOR_ZERO} rows; the first counts"
         )
 
 

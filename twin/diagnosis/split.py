@@ -10,10 +10,10 @@ import numpy as np
 
 from twin.diagnosis.checks.design import longest_rest, pulled, rates
 from twin.diagnosis.noise.estimate import repeats
-from twin.diagnosis.thresholds import EDGE, PACE, SEALED, STEADY
+from twin.diagnosis.thresholds import HELD_OUT_SHARE, RANGE_END_SHARE, SAME_RATE_RATIO, SHORTEST_HOLD
 from twin.prediction.prepared import PreparedRecording
 
-LOADS = ("payload", "mount", "force")
+LOAD_CONDITIONS = ("payload", "mount", "force")
 
 
 def split(prepared: PreparedRecording, seed: int) -> tuple[list[int], list[int]]:
@@ -26,10 +26,10 @@ def split(prepared: PreparedRecording, seed: int) -> tuple[list[int], list[int]]
     shown = list(_conditions(prepared))
     repeated = {k for pair in repeats(prepared) for k in pair}
     place = np.random.default_rng(seed).permutation(n)
-    open_, wanted = set(range(n)), max(1, round(SEALED * n))
+    open_, wanted = set(range(n)), max(1, round(HELD_OUT_SHARE * n))
     while n - len(open_) < wanted:
         count = Counter(c for k in open_ for c in shown[k])
-        lost = {k: sum(1 + (c[0] in LOADS) for c in shown[k] if count[c] == 1) for k in open_}
+        lost = {k: sum(1 + (c[0] in LOAD_CONDITIONS) for c in shown[k] if count[c] == 1) for k in open_}
         open_.remove(min(open_, key=lambda k: (lost[k] + (k in repeated), k in repeated, place[k])))
     return sorted(open_), [k for k in range(n) if k not in open_]
 
@@ -56,12 +56,16 @@ def _conditions(prepared: PreparedRecording) -> Iterator[set[tuple[Hashable, ...
             ("force", *np.round(i.loads.force, 3)),
             ("together", *moved),
             *(("pull of", t) for t in moved),
-            *(("pace", round(float(np.log(r) / np.log(PACE)))) for r in rates(i, float(tops.max()))),
+            *(("pace", round(float(np.log(r) / np.log(SAME_RATE_RATIO)))) for r in rates(i, float(tops.max()))),
         }
-        if longest_rest(i, float(tops.max())) >= STEADY:
+        if longest_rest(i, float(tops.max())) >= SHORTEST_HOLD:
             shown.add(("hold",))
         for name, values in ranges.items():
             span = np.ptp(values, axis=0)
-            shown |= {("most", name, c) for c in np.flatnonzero(values[k] >= values.max(axis=0) - EDGE * span) if span[c] > 0}
-            shown |= {("least", name, c) for c in np.flatnonzero(values[k] <= values.min(axis=0) + EDGE * span) if span[c] > 0}
+            shown |= {
+                ("most", name, c) for c in np.flatnonzero(values[k] >= values.max(axis=0) - RANGE_END_SHARE * span) if span[c] > 0
+            }
+            shown |= {
+                ("least", name, c) for c in np.flatnonzero(values[k] <= values.min(axis=0) + RANGE_END_SHARE * span) if span[c] > 0
+            }
         yield shown

@@ -19,7 +19,7 @@ from twin.diagnosis.checks.identifiability import Visibility, identifiability
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern, dictionary
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
-from twin.diagnosis.thresholds import CLEAR
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE
 from twin.effects import FitStart, catalogue
 from twin.effects.base.effect import DataNeed
 from twin.prediction.prepared import PreparedRecording
@@ -71,7 +71,7 @@ def test_what_is_told_apart_is_the_angle_between_patterns(angle: float) -> None:
         assert v.apart == pytest.approx(0.5 / s, rel=1e-5)
         assert v.smallest[1] == pytest.approx(0.5 / s, rel=1e-5)  # one unit leaves one sigma
     assert found["time_delay"].smallest[::2] == ("delay", "s")
-    assert CLEAR == 25.0
+    assert CLEAR_CHI_SQUARE == 25.0
 
 
 def test_each_law_of_a_name_has_its_own_row_and_is_no_rival_of_the_other() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.recorded_days import half, recorded_day
 from twin.diagnosis.checks.spikes import without_spikes
-from twin.diagnosis.thresholds import RARE, SPIKE
+from twin.diagnosis.thresholds import MOST_SPIKES_SHARE, SPIKE_SIZE
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
@@ -87,7 +87,7 @@ def test_a_marker_that_is_wrong_too_often_is_left_in_and_named(quiet: tuple[Prep
     bench, predicted = quiet
     columns, rng, worse = of_marker(bench, 4), np.random.default_rng(1), bench
     for k, y in enumerate(bench.measured):
-        rows = np.flatnonzero(rng.random(len(y)) < 2.0 * RARE).tolist()
+        rows = np.flatnonzero(rng.random(len(y)) < 2.0 * MOST_SPIKES_SHARE).tolist()
         worse = planted(worse, k, rows, columns, np.array([8e-3, 8e-3, 0.0]))
     found, words = without_spikes(worse, predicted)
     assert missing(found) == missing(worse)
@@ -100,7 +100,7 @@ def test_a_delay_of_fast_motion_leaves_no_spikes() -> None:
     prepared, twin = prepare(recording, load("continuum")), Twin.of(load("continuum"))
     predicted = [t.outputs(twin, prepared) for t in simulate(twin, prepared)]
     off = np.concatenate([y - p for y, p in zip(prepared.measured, predicted, strict=True)])[:, of_marker(prepared, 7)]
-    assert np.nanmax(np.abs(np.diff(off, axis=0))) > SPIKE * 2.5e-4, "the delay must jump further than a spike has to"
+    assert np.nanmax(np.abs(np.diff(off, axis=0))) > SPIKE_SIZE * 2.5e-4, "the delay must jump further than a spike has to"
     assert not without_spikes(prepared, predicted)[1]
 
 

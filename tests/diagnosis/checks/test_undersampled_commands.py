@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from twin.diagnosis.checks.undersampled_commands import undersampled_commands
-from twin.diagnosis.thresholds import LEAP, LEFT_THERE
+from twin.diagnosis.thresholds import COMMAND_STEP_SHARE, ERROR_AFTER_STEP_RATIO
 from twin.effects import effect_class
 
 STEPS = np.repeat([0.0, 2.0, 0.5, 4.0], 10)[:, None]  # N: leaps of 50, 37.5 and 87.5 % of the range, 0.5 s wide
@@ -49,12 +49,12 @@ def test_a_row_that_is_missing_is_left_out(missing: int) -> None:
 
 
 def test_nothing_is_said_without_leaps_without_lateness_or_of_noise() -> None:
-    assert said(STEPS, left_after(LEFT_THERE - 0.01)) == []
-    assert said(STEPS, left_after(LEFT_THERE + 0.01)) != []
+    assert said(STEPS, left_after(ERROR_AFTER_STEP_RATIO - 0.01)) == []
+    assert said(STEPS, left_after(ERROR_AFTER_STEP_RATIO + 0.01)) != []
     assert said(STEPS, left_after(2.0), "tendon_friction") == []
     slow = np.linspace(0.0, 1.0, 40)[:, None]
     assert said(slow, left_after(2.0)) == []
     below = np.minimum(slow, 0.0)
-    below[AFTER[0] :] = LEAP - 0.01
+    below[AFTER[0] :] = COMMAND_STEP_SHARE - 0.01
     below[-1] = 1.0  # the range; the one leap, with what is left after it elsewhere
     assert said(below, left_after(2.0)) == []

@@ -29,7 +29,7 @@ from twin.diagnosis.checks.zero_jumps import (
     without_zero_jumps,
     words,
 )
-from twin.diagnosis.thresholds import CLEAR, NEARBY
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, TRIALS_AROUND_JUMP
 from twin.foundation.errors import SolveError
 from twin.measurements import Channel
 from twin.prediction.prepared import Output, PreparedRecording
@@ -53,8 +53,8 @@ def test_what_a_step_takes_off_the_scatter_is_that_of_two_means(rng: np.random.G
     S = rng.normal(size=(14, 3))
     taken = jumps._explained(S[None])[0]
     for k in range(14):
-        for a in range(NEARBY + 1):
-            for b in range(NEARBY + 1):
+        for a in range(TRIALS_AROUND_JUMP + 1):
+            for b in range(TRIALS_AROUND_JUMP + 1):
                 there = min(a, b) >= 2 and a <= k <= 14 - b
                 whole, one, other = S[k - a : k + b], S[k - a : k], S[k : k + b]
                 off = scattered(whole) - scattered(one) - scattered(other) if there else 0.0
@@ -76,7 +76,7 @@ def test_hardly_a_white_series_has_so_clear_a_step(rng: np.random.Generator) -> 
     assert largest(1e3 * S) == pytest.approx(largest(S))
 
 
-def steps(S: np.ndarray, start: np.ndarray | None = None, bar: float = CLEAR) -> list[tuple[int, int, int]]:
+def steps(S: np.ndarray, start: np.ndarray | None = None, bar: float = CLEAR_CHI_SQUARE) -> list[tuple[int, int, int]]:
     return list(jumps._steps(S[:, None], np.arange(float(len(S))) if start is None else start, bar))
 
 
@@ -402,7 +402,8 @@ def test_a_jump_is_taken_if_its_fit_says_so(
         return fitted
 
     for name, stand_in in (
-        ("next_jump", lambda study, found, jumps: CAMERA if found is base else None), ("jumping", lambda *_: None), ("fit", fit),
+        ("next_jump", lambda study, found, jumps: CAMERA if found is base else None), ("with_zero_jumps", lambda *_: None),
+        ("fit", fit),
         ("stands", lambda *_: stands), ("may_be_clamp", lambda study, before, after, jump: clamp and before is base),
     ):  # fmt: skip
         monkeypatch.setattr(stage, name, stand_in)

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from twin.diagnosis.evidence.discrepancy import COMPONENTS, Evidence, Spectrum, quiet, regressors, slope
-from twin.diagnosis.thresholds import HIGHEST, LOWEST, MEMORY, NOTHING
+from twin.diagnosis.thresholds import LARGEST_VARIANCE, LEAST_VARIANCE, MEMORY_TIMES, NEGLIGIBLE_VARIANCE
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.robots import load
@@ -89,7 +89,7 @@ def test_no_other_variances_are_likelier(residual: np.ndarray) -> None:
     found = EVIDENCE.discrepancy(residual)
     best, tried = likelihood(residual, found.variance), 0
     for g, c in np.ndindex(*found.variance.shape):
-        if 10.0 * max(NOTHING, LOWEST) < found.variance[g, c] < 0.5 * HIGHEST:
+        if 10.0 * max(NEGLIGIBLE_VARIANCE, LEAST_VARIANCE) < found.variance[g, c] < 0.5 * LARGEST_VARIANCE:
             for factor in (0.8, 1.25):
                 other = found.variance.copy()
                 other[g, c] *= factor
@@ -153,14 +153,14 @@ def test_what_an_error_could_move_with_is_what_its_name_says() -> None:
         u, y = i.command[:, 0] / top, i.command[0, 0] / top
         for k in range(N):
             if k:
-                keep = np.exp(-(i.time[k] - i.time[k - 1]) / MEMORY[0])
+                keep = np.exp(-(i.time[k] - i.time[k - 1]) / MEMORY_TIMES[0])
                 y = keep * y + (1.0 - keep) * u[k]
             late.append(u[k] - y)
     for name, column in {
         "1": np.ones(N * TRIALS), "T1": T1, "T1 T2": T1 * T2, "T1 T1 T2": T1**2 * T2, "payload": payload,
         "payload T2": payload * T2,
         "direction of T1": np.tanh(d1 / typical), "direction of T1 x T1": np.tanh(d1 / typical) * T1, "rate of T1": d1,
-        "rate of T1 x T1": d1 * T1, f"T1 over the last {MEMORY[0]:g} s": np.array(late), "time": clock - clock.mean(),
+        "rate of T1 x T1": d1 * T1, f"T1 over the last {MEMORY_TIMES[0]:g} s": np.array(late), "time": clock - clock.mean(),
         "time^2": (clock - clock.mean()) ** 2, "time x T2": (clock - clock.mean()) * T2,
         "temperature": np.repeat([-1.0, 0.0, 1.0], N), "temperature x T1": np.repeat([-1.0, 0.0, 1.0], N) * T1,
         "trial 1.csv": np.repeat([0.0, 1.0, 0.0], N),

@@ -11,7 +11,7 @@ import pytest
 
 from twin.diagnosis.evidence import left_out as stage
 from twin.diagnosis.evidence.left_out import LeftOut, left_out, proven
-from twin.diagnosis.thresholds import COARSELY, FAR_OFF, LITTLE
+from twin.diagnosis.thresholds import FIRST_ORDER_LIMIT, HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE
 from twin.foundation.errors import SolveError
 
 TRIALS = (5, 8, 7)  # rows
@@ -80,13 +80,13 @@ def test_trials_a_step_throws_far_off_are_fitted_again(monkeypatch: pytest.Monke
         asked.append(objective.trials)
         (k,) = set(range(3)) - set(objective.trials)
         np.testing.assert_array_equal(J, np.delete(fitted.J[:, :1], slice(ends[k], ends[k + 1]), axis=0))
-        assert (near, tolerance, worth) == (fitted.evaluation, COARSELY, LITTLE)
+        assert (near, tolerance, worth) == (fitted.evaluation, HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE)
         return SimpleNamespace(model=f"without {k}")
 
     study.objective.of = of
     monkeypatch.setattr(stage, "fit", refit)
     thrown = fitted.z.copy()
-    for k, times in enumerate((FAR_OFF, 5.0, FAR_OFF + 0.01)):
+    for k, times in enumerate((FIRST_ORDER_LIMIT, 5.0, FIRST_ORDER_LIMIT + 0.01)):
         thrown[ends[k] : ends[k + 1]] *= np.sqrt(times) * (1.0 - 1e-12)
     found = proven(study, fitted, LeftOut(study, thrown[:, None])).z.ravel()
     np.testing.assert_array_equal(found[ends[1] : ends[2]], 7.0)

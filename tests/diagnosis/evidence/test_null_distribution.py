@@ -17,7 +17,7 @@ from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.evidence.first_order import dictionary
 from twin.diagnosis.evidence.null_distribution import NullDraws, acceptance_limits, draws, quantile
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import ACCEPT, DRAWS, LEFT, LINE, MATERIAL
+from twin.diagnosis.thresholds import LARGEST_SPECTRAL_LINE, LEAST_CONTRIBUTION, LEAST_EVIDENCE, NO_EFFECT_DRAWS, STRUCTURE_AS_BUILT
 from twin.prediction.prepared import prepare
 from twin.prediction.twin import Twin
 from twin.robots import load
@@ -55,10 +55,11 @@ def test_noise_alone_stays_below_the_thresholds(calibrated: Any) -> None:
     bars = acceptance_limits(calibrated.context, calibrated.base, calibrated.patterns, 0)
     d = [draws(calibrated.context, calibrated.base, calibrated.patterns, seed) for seed in range(5)]
     for name, bar, floor in (
-        ("gain", bars.accept, ACCEPT), ("moved", bars.material, MATERIAL), ("left", bars.left, LEFT), ("line", bars.line, LINE),
+        ("gain", bars.accept, LEAST_EVIDENCE), ("moved", bars.material, LEAST_CONTRIBUTION), ("left", bars.left, STRUCTURE_AS_BUILT),
+        ("line", bars.line, LARGEST_SPECTRAL_LINE),
     ):  # fmt: skip
         x = np.concatenate([getattr(one, name) for one in d])
-        assert len(x) == 5 * DRAWS
+        assert len(x) == 5 * NO_EFFECT_DRAWS
         assert np.mean(x > bar) <= 0.05
         assert bar == max(floor, quantile(getattr(d[0], name)))
         assert quantile(d[0].__dict__[name]) > np.quantile(x, 0.9), "a quantile shifted down would lie within the draws"

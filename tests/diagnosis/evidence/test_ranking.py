@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from twin.diagnosis.evidence import ranking as stage
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern
 from twin.diagnosis.evidence.ranking import gains, projected, rank
-from twin.diagnosis.thresholds import STARTS
+from twin.diagnosis.thresholds import STARTS_PER_EFFECT
 from twin.effects import FitStart
 
 N = 60
@@ -141,7 +141,7 @@ def test_one_that_leads_by_both_measures_takes_a_place_in_both(monkeypatch: pyte
 
 
 def test_what_promises_nothing_is_not_tried_and_no_effect_crowds_out_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert STARTS == 2
+    assert STARTS_PER_EFFECT == 2
     many = [("a", 9.0 - i, -1.0) for i in range(4)]
     assert ranked(monkeypatch, [*many, ("b", 1.0, -1.0), ("c", 0.0, 0.0)], 3) == [many[0], many[1], ("b", 1.0, -1.0)]
     assert ranked(monkeypatch, [("c", 0.0, -np.inf)], 3) == []

@@ -12,7 +12,7 @@ from twin.diagnosis.budget import Budget
 from twin.diagnosis.calibration.fit import Model
 from twin.diagnosis.evidence import scored_model as stage
 from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, score_model, with_effect_added, with_extended_law
-from twin.diagnosis.thresholds import LITTLE, ROUGHLY
+from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue, effect_class
 from twin.foundation.errors import SolveError
 from twin.prediction.twin import Twin
@@ -30,7 +30,7 @@ def study(budget: Budget | None = None) -> Any:
     evidence = SimpleNamespace(log_likelihood_gain=lambda z: (100.0 - float(z @ z), "smooth"))
     return SimpleNamespace(
         objective=SimpleNamespace(n=N), evidence=evidence, prepared=bench, progress=lambda words: None, budget=budget or Budget(),
-        unheard=lambda fit: 7.0,
+        blocked_input_noise=lambda fit: 7.0,
     )  # fmt: skip
 
 
@@ -85,7 +85,7 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     ((model, how),) = fits.asked
     assert model.twin.effects[-1]["mu"] == 0.1
     assert [f.label for f in model.free[len(member.fit.model.free) :]] == ["tendon_friction.mu"]
-    assert how == {"near": HERE, "J": member.fit.J, "tolerance": ROUGHLY, "worth": LITTLE, "beat": 7.0}
+    assert how == {"near": HERE, "J": member.fit.J, "tolerance": REFIT_TOLERANCE, "worth": REFIT_SCORE_TOLERANCE, "beat": 7.0}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
 
@@ -115,7 +115,7 @@ def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: p
     assert how == {"near": HERE, "J": member.fit.J, "worth": np.inf}  # a fit that ends with its first step
     assert [f.label for f in whole.free[len(member.fit.model.free) :]] == [f"{drift}.{n}" for n in start.free]
     assert whole.twin.effects[-1].values == {**effect_class(drift)({}, 3).values, **start.values, **stepped}
-    assert then == {"near": after, "J": member.fit.J, "tolerance": ROUGHLY, "worth": LITTLE, "beat": 7.0}
+    assert then == {"near": after, "J": member.fit.J, "tolerance": REFIT_TOLERANCE, "worth": REFIT_SCORE_TOLERANCE, "beat": 7.0}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, drift, start) is None
     for effect, begun in (
@@ -229,7 +229,7 @@ def test_laws_are_effects_with_the_form_that_is_fitted() -> None:
     toe = weighed(model.with_effect(ropes, {"toe": 1e-4}, ("toe", "toe_tension"), 3))
     stretch = weighed(model.with_effect(ropes, {"stretch": 1e-4}, ("stretch",), 3))
     assert toe.effects == stretch.effects == ("base_tilt", ropes)
-    assert toe.laws == (("base_tilt", ""), (ropes, "toe"))
-    assert stretch.laws == (("base_tilt", ""), (ropes, "stretch"))
-    assert toe.laws_without("base_tilt") == ((ropes, "toe"),)
-    assert toe.laws_without(ropes) == (("base_tilt", ""),)
+    assert toe.forms == (("base_tilt", ""), (ropes, "toe"))
+    assert stretch.forms == (("base_tilt", ""), (ropes, "stretch"))
+    assert toe.forms_without("base_tilt") == ((ropes, "toe"),)
+    assert toe.forms_without(ropes) == (("base_tilt", ""),)

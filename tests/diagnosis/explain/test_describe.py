@@ -12,9 +12,7 @@ import pytest
 from tests.diagnosis.checks.test_design import bench as planned
 from tests.recorded_days import half, recorded_day
 from tools.simulators.rod.design import bench_day
-from tools.simulators.rod.effects.clamp_slip import ClampSlip
-from tools.simulators.rod.effects.soft_spot import SoftSpot
-from tools.simulators.rod.effects.vibration import Vibration
+from tools.simulators.rod.effects.unknown import ClampSlip, SoftSpot, Vibration
 from twin.diagnosis import Settings, calibrated_fit
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.evidence.discrepancy import Discrepancy, Evidence, Spectrum
@@ -36,8 +34,10 @@ ROBOT = load("continuum")
 
 @cache
 def calibrated(effect: str | None, strength: float = 2.0) -> tuple[PreparedRecording, list[int], Fit, Discrepancy]:
-    """The calibrated robot's residual on the fitted trials of half a day, no effect sought."""
-    recording = half(recorded_day(effect, strength)[0])
+    """The calibrated robot's residual on the fitted trials of half a day, no effect sought; of a step, which needs many trials to
+    be told from their scatter, of the whole day."""
+    day = recorded_day(effect, strength)[0]
+    recording = day if effect == "clamp_slip" else half(day)
     bench = prepare(recording, ROBOT)
     fitted = split(bench, Settings().seed)[0]
     found = calibrated_fit(recording, Twin.of(ROBOT))[0]

@@ -11,7 +11,7 @@ import pytest
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.explain import describe as stage
 from twin.diagnosis.explain.describe import Description, describe
-from twin.diagnosis.thresholds import MUCH
+from twin.diagnosis.thresholds import LARGE_STRUCTURE
 
 SIGMA = np.array([2.0, 5.0])  # SI
 MEASURED, LEFT = np.array([[10.0, 20.0], [30.0, 40.0]]), np.array([[1.0, 2.0], [3.0, 4.0]])
@@ -31,7 +31,7 @@ class World:
         self.runners: list[Any] = []
         self.doubtful: tuple[str, ...] = ()
         self.doubts: list[Any] = []
-        for name in ("structure", "where", "since", "beyond", "unlikely", "left_out", "nearest"):
+        for name in ("structure", "describe_location", "since", "extrapolation", "unlikely", "left_out", "nearest"):
             monkeypatch.setattr(stage, name, getattr(self, name))
         self.pulled: Any = None
         monkeypatch.setattr(stage, "pose_dependent_force", lambda study, final: self.pulled)
@@ -54,7 +54,7 @@ class World:
         assert (z.shape, strongest, line, bars) == ((2, 2), "T1", (31.0, 0.5), BARS)
         return "Structure."
 
-    def where(self, bench: Any, trials: Any, off: np.ndarray, predicted: list[np.ndarray]) -> str:
+    def describe_location(self, bench: Any, trials: Any, off: np.ndarray, predicted: list[np.ndarray]) -> str:
         np.testing.assert_allclose(off, MEAN * SIGMA)
         np.testing.assert_allclose(predicted, [MEASURED - LEFT])
         return " where."
@@ -63,7 +63,7 @@ class World:
         np.testing.assert_array_equal(z, np.arange(4.0).reshape(2, 2))
         return " since."
 
-    def beyond(self, study: Any, final: Any, gated: Any, by_time: bool) -> list[Any]:
+    def extrapolation(self, study: Any, final: Any, gated: Any, by_time: bool) -> list[Any]:
         assert by_time is (self.verdict == "partly_explained")
         return [SimpleNamespace(words=lambda: "far")]
 
@@ -155,7 +155,7 @@ def test_two_rigs_and_laws_at_their_limit_are_said_in_words_and_as_notices(monke
 
 def test_a_smooth_error_on_trials_left_out_is_said_above_both_bars(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch)
-    assert BARS.left > MUCH
+    assert BARS.left > LARGE_STRUCTURE
     world.verdict = "partly_explained"
     for unseen, said in ((0.5, ""), (0.51, " unlike 0.51 0.7.")):
         world.unseen = unseen

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.recorded_days import half, recorded_day
-from tools.simulators.rod.effects.magnet import Magnet
+from tools.simulators.rod.effects.unknown import Magnet
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.fit import fit
 from twin.diagnosis.calibration.objective import objective_of

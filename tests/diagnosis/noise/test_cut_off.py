@@ -12,9 +12,9 @@ import pytest
 from scipy.stats import norm
 
 from twin.body import Drive, Loads
-from twin.diagnosis.calibration.fit import NUDGE, Evaluation, Model, Objective, fit
+from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Evaluation, Model, Objective, fit
 from twin.diagnosis.noise.model import Noise
-from twin.diagnosis.noise.whitening import BLUR, SILENT, Whitener
+from twin.diagnosis.noise.whitening import SLACK_BLUR, SLACK_READING, Whitener
 from twin.effects import catalogue
 from twin.prediction.prepared import Inputs
 from twin.prediction.twin import Twin
@@ -36,7 +36,7 @@ def whitener(drive: Sequence[float] = (CELL,) * 3) -> Whitener:
 def test_half_of_the_noise_is_cut_off_four_tenths_above_slack() -> None:
     """And all of it where a law has the tendon far below, none far above, none of a reading without noise."""
     made = whitener((CELL, CELL, 0.0))
-    tension = np.tile([SILENT * CELL, (SILENT + BLUR) * CELL, 0.0], (N, 1))
+    tension = np.tile([SLACK_READING * CELL, (SLACK_READING + SLACK_BLUR) * CELL, 0.0], (N, 1))
     cut = made.clipped_input_noise(0, tension) / np.maximum(made.input_noise_energy[0], 1e-300)
     np.testing.assert_allclose(cut[:, :2], np.tile([0.5, norm.cdf(-1.0)], (N, 1)), rtol=1e-9)
     np.testing.assert_array_equal(made.clipped_input_noise(0, tension)[:, 2], 0.0)
@@ -50,7 +50,7 @@ def test_in_the_mean_it_is_what_the_noise_loses() -> None:
     P, p = norm.cdf(x), norm.pdf(x)
     lost = 1.0 - ((x**2 + 1.0) * P + x * p - (x * P + p) ** 2)
     e, weight = np.polynomial.hermite_e.hermegauss(60)
-    told = norm.cdf((SILENT - x[:, None] - e) / BLUR) @ (weight / weight.sum())
+    told = norm.cdf((SLACK_READING - x[:, None] - e) / SLACK_BLUR) @ (weight / weight.sum())
     np.testing.assert_allclose(told, lost, atol=0.04)
 
 
@@ -79,8 +79,8 @@ class Bending(Objective):
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
         x, out = at.model.vector(), np.zeros((at.z.size, len(which)))
         for j, i in enumerate(which):
-            moved = at.model.at(x + NUDGE * (np.arange(x.size) == i))
-            out[:, j] = (self.whitener.trial(0, self.raw(moved)).ravel() - at.z) / NUDGE
+            moved = at.model.at(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i))
+            out[:, j] = (self.whitener.trial(0, self.raw(moved)).ravel() - at.z) / PARAMETER_DIFFERENCE
         return out
 
     def cut_off(self, twin: Twin) -> np.ndarray:

@@ -58,7 +58,7 @@ def studied(*effects: Effect, at: PreparedRecording = BENCH) -> tuple[Any, Any]:
 def test_a_body_without_friction_feels_all_of_it() -> None:
     """What its readings' noise is told to add: pulls change so slowly that SYNC adds nothing. 1,920 squares: 3 %."""
     study, fit = studied()
-    assert resimulated_noise(study, fit) == pytest.approx(float(study.objective.whitener.heard[0].sum()), rel=0.1)
+    assert resimulated_noise(study, fit) == pytest.approx(float(study.objective.whitener.input_noise_energy[0].sum()), rel=0.1)
 
 
 def test_shaken_once_more_friction_stills_as_much_as_it_did() -> None:
@@ -73,7 +73,7 @@ def test_shaken_once_more_friction_stills_as_much_as_it_did() -> None:
         moved = output_columns(BENCH, EffectChain((FRICTION,)).sense(shaky.evaluation.traces[0].true)) - still
         drawn.append(float((study.objective.whitener.trial(0, moved) ** 2).sum()))
         told.append(resimulated_noise(noisy, shaky))
-    heard = float(study.objective.whitener.heard[0].sum())
+    heard = float(study.objective.whitener.input_noise_energy[0].sum())
     assert np.mean(told) == pytest.approx(np.mean(drawn), abs=0.08 * heard)
     assert np.mean(drawn) < 0.8 * heard, "friction stills it, or this tells nothing"
 
@@ -99,7 +99,7 @@ def weighed(score: float, unheard: float, felt: float, *effects: Effect) -> Any:
 def test_a_set_is_paid_what_it_feels_less_than_told(
     monkeypatch: pytest.MonkeyPatch, lead: float, with_it: Any, without: Any, due: float
 ) -> None:
-    study: Any = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(heard=[np.full((50, 3), 10.0)])))
+    study: Any = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(input_noise_energy=[np.full((50, 3), 10.0)])))
     monkeypatch.setattr(stilled, "resimulated_noise", lambda study, fit: fit.felt)
     assert with_it.score - without.score == lead
     assert noise_credit(study, with_it, without) == pytest.approx(due)
@@ -110,5 +110,5 @@ def test_a_robot_that_shaken_has_no_equilibrium_is_compared_as_told(monkeypatch:
         raise SolveError("lost")
 
     monkeypatch.setattr(stilled, "resimulated_noise", lost)
-    study: Any = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(heard=[np.full((50, 3), 10.0)])))
+    study: Any = SimpleNamespace(objective=SimpleNamespace(whitener=SimpleNamespace(input_noise_energy=[np.full((50, 3), 10.0)])))
     assert noise_credit(study, weighed(70.0, 0.0, 0.0, FRICTION), weighed(0.0, 0.0, 0.0, FRICTION)) == 0.0

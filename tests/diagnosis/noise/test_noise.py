@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from twin.diagnosis.noise.estimate import estimate_noise, repeats
 from twin.diagnosis.noise.model import Noise
-from twin.diagnosis.noise.whitening import SILENT, SYNC, Whitener
+from twin.diagnosis.noise.whitening import ROW_SYNCHRONY, SLACK_READING, Whitener
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.robots import load
@@ -216,7 +216,7 @@ def test_whitened_noise_is_white_whatever_drives_and_wherever_samples_lack() -> 
 
 def test_whitening_turns_the_covariance_into_one_exactly() -> None:
     """W C W' = 1: of rows, C_ij = sigma^2 rho^|i - j| with any of them missing; of channels, C = sigma^2 + G s s' G' with
-    s^2 = drive^2 + (SYNC times the larger of the command's changes before and after the row)^2."""
+    s^2 = drive^2 + (ROW_SYNCHRONY times the larger of the command's changes before and after the row)^2."""
     n, rho, sigma = 6, 0.6, 2.0
     rows = np.arange(n)
     for lacking in ([], [0], [2], [2, 3], [0, 1], [5]):
@@ -232,7 +232,7 @@ def test_whitening_turns_the_covariance_into_one_exactly() -> None:
     whitener = Whitener(Noise(sigmas, np.array([drive]), np.zeros(3), "made"), [np.zeros((n, 3))], [G], [command])
     W = np.stack([whitener.trial(0, np.broadcast_to(e, (n, 3))) for e in np.eye(3)], axis=2)
     for i, change in enumerate([0.0, 1.0, 2.0, 2.0, 0.0, 0.0]):
-        C = np.diag(sigmas**2) + G[i] @ G[i].T * (drive**2 + (SYNC * change) ** 2)
+        C = np.diag(sigmas**2) + G[i] @ G[i].T * (drive**2 + (ROW_SYNCHRONY * change) ** 2)
         np.testing.assert_allclose(W[i] @ C @ W[i].T, np.eye(3), atol=1e-12)
 
 
@@ -330,7 +330,7 @@ def test_the_noise_that_slack_cuts_off_is_the_share_of_readings_that_it_silences
     x = np.linspace(-4.0, 4.0, 81)
     P, p = norm.cdf(x), norm.pdf(x)
     cut = 1.0 - ((x**2 + 1.0) * P + x * p - (x * P + p) ** 2)
-    np.testing.assert_allclose(norm.cdf(SILENT - x), cut, atol=0.03)
+    np.testing.assert_allclose(norm.cdf(SLACK_READING - x), cut, atol=0.03)
     assert np.abs(norm.cdf(-x) - cut).max() > 0.15
     e = np.random.default_rng(11).normal(size=400_000)  # the closed form, to four standard errors of a variance
     for at in (-1.0, 0.0, 1.0):

@@ -12,7 +12,7 @@ import pytest
 from twin.diagnosis.noise import repeatability as stage
 from twin.diagnosis.noise.model import DECLARED, Noise
 from twin.diagnosis.noise.repeatability import repeatability
-from twin.diagnosis.thresholds import BREAK, LASTING, OVERSTATED
+from twin.diagnosis.thresholds import LASTING_DIFFERENCE, LONG_PAUSE, OVERSTATED_NOISE_RATIO
 from twin.foundation.errors import SolveError
 
 ROWS, OUTPUTS, SCATTER = 400, 6, 2e-4  # m
@@ -53,7 +53,7 @@ def millimetres(words: str) -> list[float]:
 
 @pytest.mark.parametrize(("factor", "said"), [(0.8, False), (1.25, True)])
 def test_noise_declared_far_above_what_rows_scatter_by_is_how_trials_repeat(factor: float, said: bool) -> None:
-    sigma = factor * OVERSTATED * SCATTER
+    sigma = factor * OVERSTATED_NOISE_RATIO * SCATTER
     notices = repeatability(study(5, sigma, DECLARED), fitted(np.zeros((5, OUTPUTS)), slope=3e-4))
     assert bool(notices) is said
     if said:
@@ -100,10 +100,10 @@ def test_repeats_that_differ_throughout_are_named_with_what_is_between_sessions(
     apart = np.array([abs(offset[a, 0] - offset[b, 0]) for a, b in pairs]) / np.sqrt(2.0)
     night = np.array([False, True, True, True, True, False])
     said = [1e3 * np.sqrt(np.mean(x**2)) for x in (apart, apart[~night], apart[night])]
-    (words,) = repeatability(study(4, SCATTER, "6 pairs", {2: 2.0 * BREAK}), fitted(offset))
+    (words,) = repeatability(study(4, SCATTER, "6 pairs", {2: 2.0 * LONG_PAUSE}), fitted(offset))
     assert millimetres(words) == pytest.approx([*said, 0.2], rel=0.1)
     assert "within a session" in words
-    (words,) = repeatability(study(4, SCATTER, "6 pairs", {2: 0.9 * BREAK}), fitted(offset))
+    (words,) = repeatability(study(4, SCATTER, "6 pairs", {2: 0.9 * LONG_PAUSE}), fitted(offset))
     assert "session" not in words
     assert millimetres(words) == pytest.approx([said[0], 0.2], rel=0.1)
 
@@ -119,7 +119,7 @@ def test_repeats_that_differ_by_less_than_counts_or_by_chance_are_not(
     """Means of four rows scatter by half of the noise, of which three times are asked; so do those of 16 rows that each take 0.6 of
     the one before: (1 + rho) / (1 - rho) = 4."""
     monkeypatch.setattr(stage, "repeats", lambda bench: [(0, 1)])
-    offset = np.sqrt(2.0) * share * LASTING * SCATTER * np.array([0.0, 1.0])[:, None] * np.ones(OUTPUTS)
+    offset = np.sqrt(2.0) * share * LASTING_DIFFERENCE * SCATTER * np.array([0.0, 1.0])[:, None] * np.ones(OUTPUTS)
     whole = study(2, SCATTER, "1 pair", rows=rows)
     whole.objective.whitener.noise.rho[:] = rho
     assert bool(repeatability(whole, fitted(offset, rows=rows))) is said

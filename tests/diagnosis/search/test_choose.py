@@ -13,7 +13,7 @@ from twin.diagnosis.evidence.scored_model import better
 from twin.diagnosis.search import choose as stage
 from twin.diagnosis.search.choose import add_one_effect, choose, halved, most_predictive, predicting, solves
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import FAR
+from twin.diagnosis.thresholds import SETS_FITTED_TO_HALVES
 from twin.foundation.errors import SolveError
 
 STUDY = cast(Any, SimpleNamespace(accuracy=0.0))
@@ -28,7 +28,7 @@ def weighed(
     beyond = errors(unseen, headline) if far is None else errors(far, far)
     fit = SimpleNamespace(model=model, unseen=unseen, headline=headline, far=beyond)
     laws, left = tuple((e, form) for e in effects), SimpleNamespace(beyond=lambda accuracy: size - accuracy)
-    return SimpleNamespace(effects=effects, laws=laws, score=score, discrepancy=left, fit=fit)
+    return SimpleNamespace(effects=effects, forms=laws, score=score, discrepancy=left, fit=fit)
 
 
 def errors(rms: float, headline: float) -> Any:
@@ -187,10 +187,10 @@ def test_halves_are_fitted_for_the_sets_that_promise_most(monkeypatch: pytest.Mo
     monkeypatch.setattr(stage, "predictive_errors", lambda study, w: asked.append(w.effects) or seen(study, w))
     base = weighed(score=30.0, size=6.0, unseen=4.0)
     worse = weighed("worse", score=25.0, size=5.0, unseen=4.1)
-    sets = [weighed(f"law {k}", score=20.0 - k, size=5.0, unseen=3.5 - 0.1 * k, far=1.0) for k in range(FAR + 2)]
+    sets = [weighed(f"law {k}", score=20.0 - k, size=5.0, unseen=3.5 - 0.1 * k, far=1.0) for k in range(SETS_FITTED_TO_HALVES + 2)]
     pair = weighed("a", "b", score=20.0, size=5.0, unseen=2.9)  # every effect pays for itself: less than the last of the singles
     assert most_predictive(STUDY, searched(base, worse, pair, *sets)) is sets[-1]
-    assert set(asked) == {(), *(w.effects for w in sets[-FAR:])}
+    assert set(asked) == {(), *(w.effects for w in sets[-SETS_FITTED_TO_HALVES:])}
 
 
 def test_of_two_fits_of_one_law_the_lower_cost_wins_and_of_two_laws_the_evidence() -> None:

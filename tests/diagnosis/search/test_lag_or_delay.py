@@ -108,7 +108,7 @@ class Set:
     form: str = ""
 
     @property
-    def laws(self) -> tuple[tuple[str, str], ...]:
+    def forms(self) -> tuple[tuple[str, str], ...]:
         return tuple((e, self.form if e == "tendon_elasticity" else "") for e in self.effects)
 
 

@@ -16,7 +16,11 @@ from twin.diagnosis.search.search import _material, search
 from twin.foundation.parameters import Parameter
 
 STUDY: Any = SimpleNamespace(
-    objective=SimpleNamespace(n=10_000), evidence=None, progress=lambda words: None, fall=lambda a, b: np.zeros(1), budget=Budget()
+    objective=SimpleNamespace(n=10_000),
+    evidence=None,
+    progress=lambda words: None,
+    fall_by_group=lambda a, b: np.zeros(1),
+    budget=Budget(),
 )
 
 
@@ -27,7 +31,7 @@ def told(effects: tuple[str, ...], score: float, fit: Any, form: str) -> Any:
     def without(effect: str) -> tuple[tuple[str, str], ...]:
         return tuple(law for law in laws if law[0] != effect)
 
-    return SimpleNamespace(effects=effects, laws=laws, laws_without=without, score=score, fit=fit, discrepancy=None, unheard=0.0)
+    return SimpleNamespace(effects=effects, forms=laws, forms_without=without, score=score, fit=fit, discrepancy=None, unheard=0.0)
 
 
 class World:
@@ -254,7 +258,7 @@ def test_a_candidate_must_promise_what_would_be_material() -> None:
     """|z|^2 of bar^2 n, or of 15 % (an amplitude) of what the set explains in the group in which it explains least."""
     fit = SimpleNamespace(fit=None)
     for fall, least in (([4e5, 9e5], 0.15**2 * 4e5), ([1e4, 9e5], 0.5**2 * 1e4), ([-5.0, 9e5], 0.5**2 * 1e4)):
-        study: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), fall=lambda a, b, fall=fall: np.array(fall))
+        study: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), fall_by_group=lambda a, b, fall=fall: np.array(fall))
         assert _material(study, fit, fit, 0.5) == pytest.approx(least)  # type: ignore[arg-type]
 
 
@@ -272,7 +276,7 @@ def test_a_set_is_weighed_with_each_law_of_a_name(monkeypatch: pytest.MonkeyPatc
         return [SimpleNamespace(effect=e, start=f, gain=1e6) for e in left for f in (("stretch", "toe") if e == "ropes" else ("",))]
 
     def extended(study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
-        form = start or dict(member.laws).get("ropes", "")
+        form = start or dict(member.forms).get("ropes", "")
         made = world.of(*member.effects, effect)
         worth = {("stretch", 1): 50.0, ("toe", 2): 80.0}.get((form, len(made.effects)), 0.0)
         return told(made.effects, made.score + worth, made.fit, form)
@@ -280,9 +284,9 @@ def test_a_set_is_weighed_with_each_law_of_a_name(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(stage, "rank", rank)
     monkeypatch.setattr(stage, "with_effect_added", extended)
     found = world.found()
-    scores = {w.laws: w.score for w in found.all}
+    scores = {w.forms: w.score for w in found.all}
     assert scores[("ropes", "stretch"),] == 550.0
     assert scores[("ropes", "toe"),] == 500.0
-    assert found.best.laws == (("creep", ""), ("ropes", "toe"))
+    assert found.best.forms == (("creep", ""), ("ropes", "toe"))
     assert found.best.score == 880.0
     assert scores[("creep", ""), ("ropes", "stretch")] == 800.0

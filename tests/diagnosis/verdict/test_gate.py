@@ -28,8 +28,8 @@ class World:
         self.plainly: dict[str, float] = {}  # by how many sigmas an effect moves the outputs as they are; negative: away from them
         self.plain_history = 0.0  # what of that depends on more than the pose
         self.context: Any = SimpleNamespace(
-            objective=SimpleNamespace(n=N), progress=lambda words: None, fall=lambda a, b: a.z**2 - b.z**2,
-            evidence=SimpleNamespace(beyond_pose=self.beyond_pose), plain=lambda fit: fit.plain, accuracy=0.0,
+            objective=SimpleNamespace(n=N), progress=lambda words: None, fall_by_group=lambda a, b: a.z**2 - b.z**2,
+            evidence=SimpleNamespace(beyond_pose=self.beyond_pose), unwhitened=lambda fit: fit.plain, accuracy=0.0,
             excused=np.full(2, np.inf),
         )  # fmt: skip
         self.harmful: set[str] = set()
@@ -55,7 +55,7 @@ class World:
         size_of = self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[0]
         laws = tuple((e, "toe" if e == "ropes" else "") for e in sorted(effects))
         size = SimpleNamespace(beyond=lambda accuracy: size_of - accuracy, size=size_of)
-        return SimpleNamespace(effects=tuple(sorted(effects)), laws=laws, fit=fit, score=-square, discrepancy=size)
+        return SimpleNamespace(effects=tuple(sorted(effects)), forms=laws, fit=fit, score=-square, discrepancy=size)
 
     def left_out(self, effects: tuple[str, ...]) -> Any:
         hurt = len(self.harmful & set(effects))

@@ -13,7 +13,7 @@ import pytest
 
 from tests.effects.test_conformance import by_length, is_of_antagonists, is_of_sensors
 from twin.diagnosis import Settings
-from twin.diagnosis.calibration.fit import NUDGE, Evaluation, Model, Objective
+from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Evaluation, Model, Objective
 from twin.diagnosis.calibration.objective import objective_of
 from twin.effects import catalogue
 from twin.measurements import Channel, Recording, Trial
@@ -69,7 +69,7 @@ def test_a_neighbour_to_first_order_is_the_one_in_full(effect: str, drive: str) 
     labels = [f.label for f in there.free]
     for i in (0, labels.index("disks.pitch_3"), len(labels) - 1):
         x = there.vector()
-        x[i] += NUDGE
+        x[i] += PARAMETER_DIFFERENCE
         full, once = (moved(objective, at, there.at(x), once=o) for o in (False, True))
         # Second order in a fiftieth of a step: 2 %; and rows in which a tendon falls slack or a wall is met.
         assert np.linalg.norm(once - full) < 0.05 + 0.05 * np.linalg.norm(full), labels[i]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tools.simulators.finger.effects.backbone_precurvature import BackbonePrecurvature
+from tools.simulators.finger.effects.silicone import BackbonePrecurvature
 from tools.simulators.finger.equilibria import Finger, equilibrium
 from twin.body import DIRECT, NOT_FOUND, Drive, Loads, Problem, Push, Route, Signals
 from twin.body.strain_cords import Cords, resistance, strain

@@ -16,7 +16,7 @@ from scipy.optimize import root
 from tests.command_line import twin
 from tools.simulators.rod.bench import run
 from tools.simulators.rod.design import bench_day
-from tools.simulators.rod.effects.tendon_elasticity import TendonElasticity
+from tools.simulators.rod.effects.tendon import TendonElasticity
 from tools.simulators.rod.rod import Rod, follow
 from tools.simulators.rod.sensors import Noise
 from tools.simulators.rod.springs import GF, Springs

@@ -5,8 +5,7 @@
 An independent Kirchhoff rod with hidden tolerances and tendon friction (mu 0.15, Iwan pre-sliding) is the robot. The twin is
 diagnosed on a noisy day of trials with the other tip loads, never the one it is then asked for, and predicts sweeps 0 to 4 N and
 back of one, two and three tendons from noisy load cells; errors are against the robot's true positions. "Without friction" is the
-same twin less its friction; "flex" a MuJoCo rod flex with the calibrated numbers, frictionless, tendon 1 alone (the paper's finite
-elements); "tip wrench" the paper's own rod, told the same numbers.
+same twin less its friction; "tip wrench" the paper's own rod, told the same numbers.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from tools.simulators.rod.nuisance import built
 from tools.simulators.rod.rod import Rod
 from tools.simulators.rod.sensors import Noise
 from tools.simulators.rod.write import write_set
-from tools.simulators.rod_flex import build, settle
 from twin.body import Loads
 from twin.diagnosis import Diagnosis, Settings, diagnose
 from twin.measurements import read
@@ -34,33 +32,33 @@ from twin.prediction.kinematics import LoadedRobot, inverse
 from twin.prediction.twin import Twin
 from twin.robots import load
 
-LOADS = (0.0, 0.01, 0.02, 0.03)  # kg
+TIP_LOADS = (0.0, 0.01, 0.02, 0.03)  # kg
 THEIRS = {0.0: "0.92", 0.03: "1.42"}  # mm, mean tip error; the rows between are not public
-GRAVITY = (0.0, 0.0, 9.81)
-TOP = 4.0  # N
-NOISE = Noise()
+BENCH_GRAVITY = (0.0, 0.0, 9.81)
+LARGEST_TENSION = 4.0  # N
+BENCH_NOISE = Noise()
 
 
 def sweeps(payload: float) -> tuple[Trial, ...]:
     """Up to 4 N and back: each tendon alone, two, and all a third apart; the last pulls tendon 1 as the paper pulls its SMA 2."""
     when = np.linspace(0.0, 60.0, 81)
     up = np.sin(np.pi * when / 60.0) ** 2
-    around = [0.5 * TOP * up * (0.5 + 0.5 * np.cos(2 * np.pi * (when / 60.0 - i / 3))) for i in range(3)]
-    pulls = [np.outer(up, TOP * np.eye(3)[i]) for i in range(3)]
-    pulls += [np.outer(up, 0.7 * TOP * (1 - np.eye(3)[i])) for i in range(3)] + [np.stack(around, axis=1)]
+    around = [0.5 * LARGEST_TENSION * up * (0.5 + 0.5 * np.cos(2 * np.pi * (when / 60.0 - i / 3))) for i in range(3)]
+    pulls = [np.outer(up, LARGEST_TENSION * np.eye(3)[i]) for i in range(3)]
+    pulls += [np.outer(up, 0.7 * LARGEST_TENSION * (1 - np.eye(3)[i])) for i in range(3)] + [np.stack(around, axis=1)]
     return tuple(Trial(f"sweep_{k}", payload, when, when, u, start=200.0 * k) for k, u in enumerate(pulls))
 
 
 def calibrated(folder: Path, rod: Rod, effect: Effect, day: Day, without: float) -> Diagnosis:
     """The diagnosis of a noisy day without the trials of one tip load."""
     kept = replace(day, trials=tuple(t for t in day.trials if t.payload != without))
-    write_set(folder, f"all loads but {1e3 * without:g} g", kept, run(rod, [effect], kept), NOISE, np.random.default_rng(2))
+    write_set(folder, f"all loads but {1e3 * without:g} g", kept, run(rod, [effect], kept), BENCH_NOISE, np.random.default_rng(2))
     return diagnose(read(folder), Twin.of(load("continuum")), Settings(jobs=1))
 
 
 def follow(twin: Twin, log: Log, seen: np.ndarray) -> np.ndarray:
     """Tips (n, 3) m predicted from load-cell readings, in their order."""
-    robot = LoadedRobot(twin, Loads(np.array(GRAVITY), payload=log.trial.payload))
+    robot = LoadedRobot(twin, Loads(np.array(BENCH_GRAVITY), payload=log.trial.payload))
     return np.array([robot.pull(T).tip for T in seen])
 
 
@@ -72,14 +70,14 @@ def main(out: Path) -> None:
     noise = np.random.default_rng(4)
     print("| known tip load | ours, mean tip error (95 %) | without friction | tip wrench | theirs |\n|---|---|---|---|---|")
     found: Diagnosis | None = None
-    for payload in LOADS:
+    for payload in TIP_LOADS:
         found = calibrated(out / f"without_{1e3 * payload:g}g", rod, effect, day, payload)
         plain = replace(found.twin, effects=())
         ours, off, wrench = [], [], []
-        for log in run(rod, [effect], Day(sweeps(payload), GRAVITY, day.room)):
-            seen = np.maximum(log.tension + NOISE.load_cell * noise.normal(size=log.tension.shape), 0.0)
+        for log in run(rod, [effect], Day(sweeps(payload), BENCH_GRAVITY, day.room)):
+            seen = np.maximum(log.tension + BENCH_NOISE.load_cell * noise.normal(size=log.tension.shape), 0.0)
             true = log.markers[:, -1]
-            loads = Loads(np.array(GRAVITY), payload=payload)
+            loads = Loads(np.array(BENCH_GRAVITY), payload=payload)
             rods = np.array([tip_wrench(found.twin.robot, T, loads, found.twin.values)[-1] for T in seen])
             for errors, tips in ((ours, follow(found.twin, log, seen)), (off, follow(plain, log, seen)), (wrench, rods)):
                 errors.append(1e3 * np.linalg.norm(tips - true, axis=1))
@@ -96,30 +94,23 @@ def main(out: Path) -> None:
 
 
 def _single(rod: Rod, effect: Effect, twin: Twin, day: Day, noise: np.random.Generator) -> None:
-    """One tendon 0 to 4 N and back without a load: what the tension modification is worth, and the flex beside it."""
-    log = run(rod, [effect], Day(sweeps(0.0)[:1], GRAVITY, day.room))[0]
-    seen = np.maximum(log.tension + NOISE.load_cell * noise.normal(size=log.tension.shape), 0.0)
+    """One tendon 0 to 4 N and back without a load: what the tension modification is worth."""
+    log = run(rod, [effect], Day(sweeps(0.0)[:1], BENCH_GRAVITY, day.room))[0]
+    seen = np.maximum(log.tension + BENCH_NOISE.load_cell * noise.normal(size=log.tension.shape), 0.0)
     true, rising = log.markers[:, -1], np.arange(len(seen)) <= len(seen) // 2
     on, off = (np.linalg.norm(follow(t, log, seen) - true, axis=1) for t in (twin, replace(twin, effects=())))
-    values = {p.name: p.value for p in twin.robot.parameters} | dict(twin.values)
-    began = time.perf_counter()
-    model = build(twin.robot.structure, values, np.array(GRAVITY))
-    flex = np.linalg.norm(settle(model, seen[rising, 0])[:, -1] - true[rising], axis=1)
-    seconds = time.perf_counter() - began
     print("| tip, tendon 1 alone, 0-4 N | friction on | off | ratio | theirs |\n|---|---|---|---|---|")
     for name, rows in (("loading", rising), ("unloading", ~rising)):
         a, b = 1e3 * on[rows].mean(), 1e3 * off[rows].mean()
         print(f"| {name} | {a:.2f} mm | {b:.2f} mm | {b / a:.0f}x | 3.34 / 11.65 mm, 3.5x |")
     print("\n| largest tip error, 0-4 N in the plane, loading | ours | theirs |\n|---|---|---|")
     print(f"| friction-corrected rod | {1e3 * on[rising].max():.2f} mm | 4.3 mm |")
-    print(f"| finite elements without friction (flex) | {1e3 * flex.max():.2f} mm | 16 mm |")
-    print(f"| time of a finite-element case | {seconds:.2f} s | 30 min |")
 
 
 def _times(twin: Twin) -> None:
     """Medians of a forward step (0.1 N on) and of an inverse solve with friction, and how many points are found or refused."""
     rng = np.random.default_rng(5)
-    robot = LoadedRobot(twin, Loads(np.array(GRAVITY), payload=0.01))
+    robot = LoadedRobot(twin, Loads(np.array(BENCH_GRAVITY), payload=0.01))
     forward, back, missed, said = [], [], 0, 0
     T = np.full(3, 0.5)
     for _ in range(2000):

@@ -26,12 +26,12 @@ from twin.prediction.prepared import ROOM_TEMPERATURE
 from twin.prediction.twin import Twin
 from twin.robots import load
 
-GRAVITY = np.array([0.0, 0.0, 9.81])
-LENGTH, RADIUS = 0.12, 0.014  # m
-LAP, LEAD, SETTLE = 120.0, 10.0, 20.0  # s: one lap; from rest to the path's start; there
+DOWNWARD_GRAVITY = np.array([0.0, 0.0, 9.81])
+ROBOT_LENGTH, RADIUS = 0.12, 0.014  # m
+LAP, SECONDS_TO_START, SETTLE = 120.0, 10.0, 20.0  # s: one lap; from rest to the path's start; there
 DT = 0.05  # s
-LOADS = (0.0, 0.01, 0.02, 0.03)  # kg
-KNOWN = Twin(load("continuum"), {}, (effect_class("tendon_friction")({"mu": 0.1}, 3),))
+PAYLOADS = (0.0, 0.01, 0.02, 0.03)  # kg
+KNOWN_TWIN = Twin(load("continuum"), {}, (effect_class("tendon_friction")({"mu": 0.1}, 3),))
 DOUBTS = {"payload": 0.01}  # kg
 
 
@@ -54,7 +54,7 @@ class Bench:
     """A plant behind its instruments: voltages in, noisy load cells and displacements out, the true tip for the referee alone."""
 
     def __init__(self, twin: Twin, payload: float, seed: int = 0) -> None:
-        self.robot = HeatedRobot(twin, Loads(GRAVITY, payload=payload))
+        self.robot = HeatedRobot(twin, Loads(DOWNWARD_GRAVITY, payload=payload))
         self.noise = np.random.default_rng(seed)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
@@ -73,14 +73,14 @@ class Bench:
 
 def controller(kind: str, payload: float = 0.0) -> TipController:
     """`full`, `PI only` (with inverse kinematics), `no friction` (`full` told mu = 0), `no tip feedback`; told `payload` (kg)."""
-    loads, guard = Loads(GRAVITY, payload=payload), HeatingGuard(twin_springs(KNOWN), ROOM_TEMPERATURE)
+    loads, guard = Loads(DOWNWARD_GRAVITY, payload=payload), HeatingGuard(twin_springs(KNOWN_TWIN), ROOM_TEMPERATURE)
     if kind == "PI only":
-        return TipController(KNOWN, loads, PITensionLoop(guard), reset=None)
+        return TipController(KNOWN_TWIN, loads, PITensionLoop(guard), reset=None)
     if kind == "no friction":
-        return TipController(replace(KNOWN, effects=()), loads, TensionLoop(guard), doubts=DOUBTS)
+        return TipController(replace(KNOWN_TWIN, effects=()), loads, TensionLoop(guard), doubts=DOUBTS)
     if kind == "no tip feedback":
-        return TipController(KNOWN, loads, TensionLoop(guard), reset=None)
-    return TipController(KNOWN, loads, TensionLoop(guard), doubts=DOUBTS)
+        return TipController(KNOWN_TWIN, loads, TensionLoop(guard), reset=None)
+    return TipController(KNOWN_TWIN, loads, TensionLoop(guard), doubts=DOUBTS)
 
 
 @dataclass(frozen=True)
@@ -107,11 +107,15 @@ def track(
     """One lap, or the part of it `until` (s), by a controller or by voltages (n, n_tendon) noted before. `disturb`: a payload or a
     draught comes at half of it. With `foresee` the controller is told where the path goes."""
     start, rest = path(0.0), bench.robot.shape().tip
-    times = np.arange(-LEAD - SETTLE, until, DT)
+    times = np.arange(-SECONDS_TO_START - SETTLE, until, DT)
     rows = []
 
     def at(t: float) -> np.ndarray:
-        return path(min(t / LAP, 1.0)) if t >= 0.0 else rest + min(1.0, (t + LEAD + SETTLE) / LEAD) * (start - rest)
+        return (
+            path(min(t / LAP, 1.0))
+            if t >= 0.0
+            else rest + min(1.0, (t + SECONDS_TO_START + SETTLE) / SECONDS_TO_START) * (start - rest)
+        )
 
     for k, t in enumerate(times):
         wanted = at(t)
@@ -130,28 +134,28 @@ def track(
     return Run(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-KINDS = ("full", "PI only", "open loop", "no friction", "no tip feedback")
+CONTROLLERS = ("full", "PI only", "open loop", "no friction", "no tip feedback")
 
 
 def attempt(kind: str, name: str, payload: float, disturb: str = "", until: float = LAP) -> Run:
     """One run of the table. Open loop: the voltages that follow the path on the robot as it is known, unloaded, played back."""
-    path = tip_paths(LENGTH, RADIUS)[name]
+    path = tip_paths(ROBOT_LENGTH, RADIUS)[name]
     if kind == "open loop":
-        foreseen = track(Bench(KNOWN, 0.0, seed=1), controller("no tip feedback"), path, until=until).voltage
+        foreseen = track(Bench(KNOWN_TWIN, 0.0, seed=1), controller("no tip feedback"), path, until=until).voltage
         return track(Bench(unknown(), payload), foreseen, path, until=until, disturb=disturb)
     return track(Bench(unknown(), payload), controller(kind), path, until=until, disturb=disturb, foresee=kind != "PI only")
 
 
 def main(disturbed: bool = False) -> None:
     """Print RMS tip errors by path and load, or with a payload or a draught that comes in mid-path."""
-    cases = [(n, p, "") for n in tip_paths(LENGTH, RADIUS) for p in LOADS]
+    cases = [(n, p, "") for n in tip_paths(ROBOT_LENGTH, RADIUS) for p in PAYLOADS]
     if disturbed:
         cases = [(n, 0.01, d) for n in ("circle", "figure of eight") for d in ("payload", "draught")]
-    print(f"| RMS tip error, mm | {'comes in mid-path' if disturbed else 'payload'} | {' | '.join(KINDS)} |")
-    print("|---|---|" + "---|" * len(KINDS), flush=True)
+    print(f"| RMS tip error, mm | {'comes in mid-path' if disturbed else 'payload'} | {' | '.join(CONTROLLERS)} |")
+    print("|---|---|" + "---|" * len(CONTROLLERS), flush=True)
     hottest = 0.0
     for name, payload, disturb in cases:
-        runs = [attempt(kind, name, payload, disturb) for kind in KINDS]
+        runs = [attempt(kind, name, payload, disturb) for kind in CONTROLLERS]
         hottest = max(hottest, float(runs[0].temperature.max()))
         what = {"payload": "20 g more", "draught": "loss 1.2 -> 2.0"}.get(disturb, f"{1e3 * payload:g} g")
         print(f"| {name} | {what} | {' | '.join(f'{1e3 * r.rms:.2f}' for r in runs)} |", flush=True)

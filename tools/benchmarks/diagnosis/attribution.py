@@ -25,7 +25,7 @@ from joblib import delayed
 from tools.benchmarks import cluster
 from tools.benchmarks.diagnosis.answer import answer
 from tools.benchmarks.diagnosis.attribution_table import table
-from tools.benchmarks.diagnosis.compared import COMPARED, SAME, distance
+from tools.benchmarks.diagnosis.compared import COMPARED, SAME_LAW_ERROR, distance
 from tools.benchmarks.table import append_row, read_rows
 from tools.simulators.rod.day import MISMATCH, Recipe, make_set
 from tools.simulators.rod.effects import all_effects
@@ -36,8 +36,8 @@ from twin.foundation.errors import DataError
 from twin.foundation.parallel import run_parallel
 
 AMPLITUDES = (1.0, 3.0, 8.0)
-DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length", "by_current")
-BLOCK = ("none", "one", "one", "one", "pair", "unknown", "one", "none", "one", "one", "one", "one", "pair", "unknown",
+DRAWN_DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length", "by_current")
+SET_KINDS = ("none", "one", "one", "one", "pair", "unknown", "one", "none", "one", "one", "one", "one", "pair", "unknown",
          "one", "one", "one", "pair", "unknown", "none")  # fmt: skip
 # not simulated where springs pull
 NO_SPRINGS = {"actuator_saturation", "actuator_lag", "tendon_backlash", "backbone_creep", "tendon_elasticity"}
@@ -74,7 +74,7 @@ def plan(sets: int, seed: int, only: str | None = None) -> list[Case]:
 
     out = []
     for k in range(sets):
-        kind = BLOCK[k % len(BLOCK)]
+        kind = SET_KINDS[k % len(SET_KINDS)]
         effects: tuple[str, ...] = ()
         if kind == "one":
             effects = (next_of("one", named),)
@@ -82,7 +82,7 @@ def plan(sets: int, seed: int, only: str | None = None) -> list[Case]:
             effects = tuple(str(n) for n in rng.choice(named, 2, replace=False))
         elif kind == "unknown":
             effects = (next_of("unknown", others),)
-        amplitude, design = float(rng.choice(AMPLITUDES)), only or str(rng.choice(DESIGNS))
+        amplitude, design = float(rng.choice(AMPLITUDES)), only or str(rng.choice(DRAWN_DESIGNS))
         if NO_SPRINGS & set(effects) and design == "by_current":
             design = "default"
         if any(all_effects()[e].driven_by_length for e in effects):
@@ -120,7 +120,7 @@ def _apart(truth: list[dict], d: Diagnosis) -> dict[str, float]:
         if law is not None and t["id"] in {c.effect for c in d.claims}:
             given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in t["parameters"].items()}
             true, found, tolerance = COMPARED[t["id"]](all_effects()[t["id"]](**given), law.values)
-            if tolerance == SAME:
+            if tolerance == SAME_LAW_ERROR:
                 out[t["id"]] = distance(true, found)
     return out
 

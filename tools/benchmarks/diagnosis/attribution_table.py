@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from tools.benchmarks.diagnosis.answer import in_words
-from tools.benchmarks.diagnosis.compared import KNOWN
+from tools.benchmarks.diagnosis.compared import COMPARABLE
 from tools.benchmarks.table import share
 
 CLASSES = ({"base_tilt", "camera_misalignment"}, {"time_delay", "actuator_lag"})  # effects such data hardly tell apart
-SURE = 0.9  # a claim at this probability or more must be right nine times of ten
-CLOSE = 0.15  # relative error of an effect's parameters
+SURE_PROBABILITY = 0.9  # a claim at this probability or more must be right nine times of ten
+PARAMETER_ERROR = 0.15  # relative error of an effect's parameters
 FLAGS = ("unexplained", "partly_explained")
 
 
@@ -54,7 +54,7 @@ def held(r: dict) -> list[bool]:
     out = []
     for t in r.get("truth", []):
         found = r.get("parameters", {}).get(t["id"], {})
-        known = KNOWN[t["id"]](t["parameters"]) if t["id"] in KNOWN else {}
+        known = COMPARABLE[t["id"]](t["parameters"]) if t["id"] in COMPARABLE else {}
         told = {n: (value, *found[n]) for n, value in known.items() if n in found and found[n][1]}
         out += [abs(x - value) < 1.645 * std for value, x, std in told.values()]
     return out
@@ -77,7 +77,7 @@ def _by_kind(rows: list[dict]) -> dict[str, list[dict]]:
 def _totals(rows: list[dict]) -> dict[str, str]:
     of, answered = _by_kind(rows), [r for r in rows if "after" in r]
     known = [r for r in rows if r["kind"] in ("one", "pair")]
-    sure = [right(r, c) for r in rows for c, p in zip(r["claims"], r["probability"], strict=True) if p >= SURE]
+    sure = [right(r, c) for r in rows for c, p in zip(r["claims"], r["probability"], strict=True) if p >= SURE_PROBABILITY]
     ratio = [r["after"] / r["floor"] for r in answered if r["kind"] in ("one", "pair")]
     seconds = [r["seconds"] for r in answered]
     wrong_names = [bool(r["claims"]) and r["verdict"] == "explained" and not all(right(r, c) for c in r["claims"]) for r in rows]
@@ -92,9 +92,11 @@ def _totals(rows: list[dict]) -> dict[str, str]:
         "a wrong name without a flag, all sets": share(wrong_names),
         "false 'unexplained', one or two effects": share([r["verdict"] == "unexplained" for r in known]),
         "false 'partly explained'": share([r["verdict"] == "partly_explained" for r in known]),
-        f"claims at probability >= {SURE}, right": share(sure),
+        f"claims at probability >= {SURE_PROBABILITY}, right": share(sure),
         "worse than calibrated on held-out trials": share([r["after"] > 1.001 * r["calibrated"] for r in answered]),
-        f"parameters within {100 * CLOSE:.0f} %, same law": share([x <= CLOSE for r in rows for x in r.get("apart", {}).values()]),
+        f"parameters within {100 * PARAMETER_ERROR:.0f} %, same law": share(
+            [x <= PARAMETER_ERROR for r in rows for x in r.get("apart", {}).values()]
+        ),
         "90 % intervals that hold the truth": share([x for r in rows for x in held(r)]),
         "seconds a diagnosis, one core": f"median {np.median(seconds):.1f}, 90 % {np.quantile(seconds, 0.9):.1f}",
     }

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 HOUR = 3600.0
-SAME, OTHER = 0.15, 0.35  # relative error allowed for the same law and for another (diagnosis.md, section 8)
+SAME_LAW, OTHER_LAW = 0.15, 0.35  # relative error allowed for the same law and for another (diagnosis.md, section 8)
 
 
 def _each(values: dict[str, float], name: str) -> list[float]:
@@ -47,58 +47,58 @@ DOWN = np.array([0.0, 0.0, 9.81])
 Compare = Callable[[Any, dict[str, float]], tuple[object, object, float]]
 # effect -> (what was true, what was found, tolerance), as arrays to be compared by their distance
 COMPARED: dict[str, Compare] = {
-    "tendon_friction": lambda t, v: (0.1 * t.strength, v["mu"], SAME),
-    "backbone_creep": lambda t, v: (0.08 * t.strength, v["amplitude"] + v["amplitude_2"], OTHER),
+    "tendon_friction": lambda t, v: (0.1 * t.strength, v["mu"], SAME_LAW),
+    "backbone_creep": lambda t, v: (0.08 * t.strength, v["amplitude"] + v["amplitude_2"], OTHER_LAW),
     "backbone_precurvature": lambda t, v: (  # varies along the body there
-        0.5 * t.strength * np.array([-np.sin(t.angle), np.cos(t.angle)]), [v["about_x"], v["about_y"]], OTHER,
+        0.5 * t.strength * np.array([-np.sin(t.angle), np.cos(t.angle)]), [v["about_x"], v["about_y"]], OTHER_LAW,
     ),
-    "stiffness_asymmetry": lambda t, v: (np.tanh(0.05 * t.strength), np.hypot(v["along"], v["across"]), SAME),
-    "stiffness_gradient": lambda t, v: (0.2 * t.strength * t.sign, v["gradient"], SAME),
+    "stiffness_asymmetry": lambda t, v: (np.tanh(0.05 * t.strength), np.hypot(v["along"], v["across"]), SAME_LAW),
+    "stiffness_gradient": lambda t, v: (0.2 * t.strength * t.sign, v["gradient"], SAME_LAW),
     "base_tilt": lambda t, v: (
         _across(DOWN, np.radians(t.strength) * np.array(t.axis)),
-        _across(DOWN, np.array([v["about_x"], v["about_y"], v["about_z"]])), SAME,
+        _across(DOWN, np.array([v["about_x"], v["about_y"], v["about_z"]])), SAME_LAW,
     ),
     "camera_misalignment": lambda t, v: (
-        np.radians(0.7 * t.strength) * np.array(t.axis), [v["turn_x"], v["turn_y"], v["turn_z"]], SAME,
+        np.radians(0.7 * t.strength) * np.array(t.axis), [v["turn_x"], v["turn_y"], v["turn_z"]], SAME_LAW,
     ),
-    "tip_payload": lambda t, v: (1e-3 * t.strength, v["mass"], SAME),
+    "tip_payload": lambda t, v: (1e-3 * t.strength, v["mass"], SAME_LAW),
     # A common factor of all cells is the hole radius's, a nuisance: what differs between them is compared.
-    "load_cell_gain": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "gain"))), SAME),
-    "load_cell_bias": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "bias"))), SAME),
+    "load_cell_gain": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "gain"))), SAME_LAW),
+    "load_cell_bias": lambda t, v: (_differ(0.03 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "bias"))), SAME_LAW),
     "load_cell_drift": lambda t, v: (  # its bend there, its levelling here, take part of it
-        _differ(0.05 * t.strength * np.array(t.share) / HOUR), _differ(np.array(_each(v, "rate"))), OTHER,
+        _differ(0.05 * t.strength * np.array(t.share) / HOUR), _differ(np.array(_each(v, "rate"))), OTHER_LAW,
     ),
     "tendon_routing": lambda t, v: (
-        np.radians(3.0) * t.strength * t.around, v.get(f"angle_{t.tendon + 1}", 0.0), SAME,
+        np.radians(3.0) * t.strength * t.around, v.get(f"angle_{t.tendon + 1}", 0.0), SAME_LAW,
     ),
-    "time_delay": lambda t, v: (0.1 * t.strength, v["delay"], SAME),
-    "actuator_lag": lambda t, v: (2 * t.zeta * 0.1 * t.strength, v["time"], SAME),  # the steady lag behind a ramp
+    "time_delay": lambda t, v: (0.1 * t.strength, v["delay"], SAME_LAW),
+    "actuator_lag": lambda t, v: (2 * t.zeta * 0.1 * t.strength, v["time"], SAME_LAW),  # the steady lag behind a ramp
     "actuator_saturation": lambda t, v: (  # a softer corner there
-        (16e-3 - 1.6e-3 * t.strength, v["stroke"], SAME) if any(_each(v, "loss")) else (5.0 - 0.6 * t.strength, v["limit"], SAME)
+        *((16e-3 - 1.6e-3 * t.strength, v["stroke"]) if any(_each(v, "loss")) else (5.0 - 0.6 * t.strength, v["limit"])), SAME_LAW,
     ),
     "load_cell_crosstalk": lambda t, v: (
-        0.03 * t.strength * np.array(t.share), [v[f"share_{i}_{j}"] for i in (1, 2, 3) for j in (1, 2, 3) if i != j], OTHER,
+        0.03 * t.strength * np.array(t.share), [v[f"share_{i}_{j}"] for i in (1, 2, 3) for j in (1, 2, 3) if i != j], OTHER_LAW,
     ),
-    "temperature_softening": lambda t, v: (0.005 * t.strength, v["rate"], SAME),
-    "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER),  # its compliance grows there
+    "temperature_softening": lambda t, v: (0.005 * t.strength, v["rate"], SAME_LAW),
+    "backbone_ageing": lambda t, v: (0.05 * t.strength / HOUR, v["rate"], OTHER_LAW),  # its compliance grows there
     # It swaps sides by another law there.
-    "tendon_backlash": lambda t, v: (1e-4 * t.strength * np.array(t.worn), v["gap"] + np.array(_each(v, "gap")), OTHER),
+    "tendon_backlash": lambda t, v: (1e-4 * t.strength * np.array(t.worn), v["gap"] + np.array(_each(v, "gap")), OTHER_LAW),
     "tendon_elasticity": lambda t, v: (  # its toe is a hyperbola there
         t.strength * (5e-5 * PULLS + t.toe * PULLS / (PULLS + t.half)),
-        v["stretch"] * PULLS - v["toe"] * np.expm1(-PULLS / v["toe_tension"]), OTHER if t.toe else SAME,
+        v["stretch"] * PULLS - v["toe"] * np.expm1(-PULLS / v["toe_tension"]), OTHER_LAW if t.toe else SAME_LAW,
     ),
-    "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER),  # a whole drum there
-    "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME),
+    "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER_LAW),  # a whole drum there
+    "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME_LAW),
     # Starts and finishes of the phases move by different amounts there: their means are what this law knows.
     "sma_hysteresis": lambda t, v: (
-        2.1 * t.strength * np.array([1.0, -t.below]), [v["shift"] + 0.5 * v["width"], v["shift"] - 0.5 * v["width"]], SAME,
+        2.1 * t.strength * np.array([1.0, -t.below]), [v["shift"] + 0.5 * v["width"], v["shift"] - 0.5 * v["width"]], SAME_LAW,
     ),
-    "contact": lambda t, v: (1.0, 1.0 if v["stiffness"] > 0 else 0.0, SAME),  # another obstacle there: that it is found counts
+    "contact": lambda t, v: (1.0, 1.0 if v["stiffness"] > 0 else 0.0, SAME_LAW),  # another obstacle there: that it is found counts
 }  # fmt: skip
 
 
 # effect -> the twin's parameters that mean what one of the bench's does, and their true values (SI), of its fields as written down
-KNOWN: dict[str, Callable[[dict[str, Any]], dict[str, float]]] = {
+COMPARABLE: dict[str, Callable[[dict[str, Any]], dict[str, float]]] = {
     "tendon_friction": lambda t: {"mu": 0.1 * t["strength"]},
     "stiffness_gradient": lambda t: {"gradient": 0.2 * t["strength"] * t["sign"]},
     "tip_payload": lambda t: {"mass": 1e-3 * t["strength"]},

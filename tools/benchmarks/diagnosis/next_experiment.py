@@ -26,10 +26,10 @@ from twin.foundation.errors import TwinError
 from twin.measurements import read
 from twin.prediction.prepared import Inputs
 
-DESIGNS = ("one_payload", "one_rate", "one_tendon", "loading_only", "tip_only")
+POOR_DESIGNS = ("one_payload", "one_rate", "one_tendon", "loading_only", "tip_only")
 AMPLITUDE = 1.0  # sigma
 HARDEST = 6  # effects
-MOST = 5  # runs of the proposed trial
+MOST_TRIAL_RUNS = 5  # runs of the proposed trial
 
 
 def settle(out: Path, seed: int, design: str) -> tuple[bool, bool, bool, bool] | None:
@@ -47,7 +47,7 @@ def settle(out: Path, seed: int, design: str) -> tuple[bool, bool, bool, bool] |
         proposed = before.experiment
         if not before.ambiguous or proposed is None:
             return False, _first(before, effect), _first(before, effect), False
-        runs = min(MOST, max(2, proposed.repeats))
+        runs = min(MOST_TRIAL_RUNS, max(2, proposed.repeats))
         print(f"  {runs} times: {proposed.words}", flush=True)
         make_set(folder, replace(recipe, more=tuple(_trial(proposed.trial, n, before) for n in range(runs))))
         after = diagnosed(read(folder), seed)
@@ -75,7 +75,7 @@ def _words(d: Diagnosis) -> str:
 
 def main(out: Path, sets: int = 12, seed: int = 3000) -> None:
     """Make so many sets, run the proposed trial where a doubt is left, and print how often it settles it."""
-    rows = [row for k in range(sets) if (row := settle(out, seed + k, DESIGNS[k % len(DESIGNS)])) is not None]
+    rows = [row for k in range(sets) if (row := settle(out, seed + k, POOR_DESIGNS[k % len(POOR_DESIGNS)])) is not None]
     doubtful = [r for r in rows if r[0]]
     print(
         f"{len(rows)} sets, {len(doubtful)} left in doubt; of these right first before {sum(r[1] for r in doubtful)}, after "

@@ -28,7 +28,7 @@ from twin.foundation.errors import DataError
 from twin.robots.robot import models_folder
 
 _UNITS = pint.UnitRegistry()
-KNOWN = {"file", "start", "tip_payload", "ambient_temperature", "gravity"}  # of a trial; the last two stay
+KNOWN_CONDITIONS = {"file", "start", "tip_payload", "ambient_temperature", "gravity"}  # of a trial; the last two stay
 
 
 def factor(unit: str, lengths: float, masses: float) -> float:
@@ -61,7 +61,7 @@ def resized(folder: Path, out: Path, lengths: float, masses: float) -> Path:
         if "noise" in channel:
             channel["noise"] *= by(channel["unit"])
     for trial in told["trial"]:
-        if other := trial.keys() - KNOWN:
+        if other := trial.keys() - KNOWN_CONDITIONS:
             raise DataError(f"{trial['file']}: not known how to grow {', '.join(sorted(other))}; leave the trial out")
         if "start" in trial:
             trial["start"] *= by("s")

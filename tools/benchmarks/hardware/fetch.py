@@ -19,14 +19,14 @@ from pathlib import Path
 
 import tyro
 
-HERE = Path(__file__).parent
+HARDWARE_FOLDER = Path(__file__).parent
 SWEEPS = "three-cable/Dataset.txt.gz"
-ROWS = 20000  # of its 30,000 rows the importer was written for
+ROWS_TAKEN = 20000  # of its 30,000 rows the importer was written for
 
 
 def listed() -> list[dict[str, str]]:
     """Return file, url and sha256 (of the unpacked bytes) of every raw file."""
-    with (HERE / "measured.csv").open(encoding="utf-8") as file:
+    with (HARDWARE_FOLDER / "measured.csv").open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
@@ -53,7 +53,7 @@ def _unpacked(path: Path) -> bytes:
 def place(row: dict[str, str], data: bytes, folder: Path) -> None:
     """Write one file's bytes, as its origin has them, where the importers look. Raises ValueError where the hash is another."""
     if row["file"] == SWEEPS:
-        data = b"".join(data.splitlines(keepends=True)[:ROWS])
+        data = b"".join(data.splitlines(keepends=True)[:ROWS_TAKEN])
     if hashlib.sha256(data).hexdigest() != row["sha256"]:
         raise ValueError(f"{row['url']}: not the bytes that {row['file']} should have; nothing is written")
     path = folder / row["file"]
@@ -72,7 +72,7 @@ def main(folder: tyro.conf.Positional[Path], check: bool = False) -> None:
         for row in listed():
             with urllib.request.urlopen(row["url"], timeout=60) as answer:
                 place(row, answer.read(), folder)
-        shutil.copy(HERE / "importers/tentacle_points.csv", folder / "tentacle/static_points_derived.csv")
+        shutil.copy(HARDWARE_FOLDER / "importers/tentacle_points.csv", folder / "tentacle/static_points_derived.csv")
     if found := wrong(folder):
         sys.exit("\n".join(found))
     print(f"{folder}: {len(listed())} files, all as they should be")

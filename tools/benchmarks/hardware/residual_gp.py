@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LENGTHS = (0.3, 0.6, 1.2, 2.4)  # of the largest pull
-NOISE = (0.1, 0.3, 1.0, 3.0, 10.0)  # variance over that of the smooth part; ours: from clear structure to almost none
+NOISE_SHARES = (0.1, 0.3, 1.0, 3.0, 10.0)  # variance over that of the smooth part; ours: from clear structure to almost none
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Remainder:
         span = np.maximum(np.abs(pull).max(axis=0), 1e-12)
         u, best = pull / span, None
         for length in LENGTHS:
-            for share in NOISE:
+            for share in NOISE_SHARES:
                 inverse = np.linalg.inv(kernel(u, u, length) + share * np.eye(len(u)))
                 left = inverse @ (residual / noise) / np.diag(inverse)[:, None]
                 error = float(np.sqrt(np.mean(left**2)))

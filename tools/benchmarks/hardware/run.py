@@ -18,7 +18,7 @@ from pathlib import Path
 
 import tyro
 
-from tools.benchmarks.hardware.comparisons.cable_runs import LOADS, compare
+from tools.benchmarks.hardware.comparisons.cable_runs import FITTED_PERCENTS, compare
 from tools.benchmarks.hardware.comparisons.row import Row
 from tools.benchmarks.table import markdown
 from twin import report
@@ -32,7 +32,7 @@ def main(
     rigs: tyro.conf.Positional[tuple[str, ...]] = tuple(RIGS),
     out: Path | None = None,
     cable_runs: bool = False,
-    loads: tuple[int, int] = LOADS,
+    loads: tuple[int, int] = FITTED_PERCENTS,
 ) -> None:
     """Import and compare rigs, or judge any runs of the cable tool.
 

@@ -28,7 +28,7 @@ from twin.shape.alignment.band_widening import BandWidening
 from twin.shape.estimators.estimator import Z90, estimator_class, estimators
 from twin.shape.predict import predict_shapes
 
-NEAR = 0.06  # s, within which a frame is the truth's
+SAME_FRAME_TIME = 0.06  # s, within which a frame is the truth's
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def score(truth: Path, arrays: dict[str, np.ndarray], seconds: float) -> Score:
     for name in sorted(k[:-5] for k in true.files if k.startswith("test") and k.endswith("_time")):
         time_of, t = true[f"{name}_time"], arrays[f"{name}_time"]
         at = np.abs(t[None] - time_of[:, None]).argmin(axis=1)
-        near = np.abs(t[at] - time_of) < NEAR
+        near = np.abs(t[at] - time_of) < SAME_FRAME_TIME
         places = true[f"{name}_vertices"] * float(true["unit_mm"]) * 1e-3
         away = np.linalg.norm(arrays[f"{name}_vertices"][at] - places, axis=2)[near]
         inside[name] = away <= Z90 * arrays[f"{name}_std"][at][near]

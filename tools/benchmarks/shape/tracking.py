@@ -16,8 +16,8 @@ tendons: its 609 named points in the base frame, and its readings. Before, the t
     replay            the other finger's shortenings, no sensing
     ..., described    the same by the twin as described, not aligned; its R0 are those read at rest
 
-Rows are RATE a second; the controllers see the wanted shape of the next row. Mean distance of the points over all rows but those of
-the first second, mm.
+Rows are ROW_RATE a second; the controllers see the wanted shape of the next row. Mean distance of the points over all rows but
+those of the first second, mm.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 import tyro
 
 from tools.benchmarks.control.baselines import ConstantDirections, TipTracking
-from tools.simulators.finger.bench import SLACK, STRIDE, make_finger
+from tools.simulators.finger.bench import LARGEST_PULL_STEP, SLACK, make_finger
 from tools.simulators.finger.cables import interpolation
 from tools.simulators.finger.day import TABLES, make_set
 from tools.simulators.finger.effects import all_effects
@@ -47,9 +47,9 @@ from twin.robots import load
 from twin.shape.alignment.align import align
 
 EFFECT = "tendon_friction"
-OTHER = 1000  # added to the plant's seed: the finger that shows the shapes
-RATE, DURATION, MOST = 5.0, 9.0, 8.0  # 1/s, s, mm
-SETTLED = 1.0  # s
+SHOWING_SEED_OFFSET = 1000  # added to the plant's seed: the finger that shows the shapes
+ROW_RATE, DURATION, LARGEST_WANDER = 5.0, 9.0, 8.0  # 1/s, s, mm
+SETTLED_AFTER = 1.0  # s
 
 
 class Plant:
@@ -71,7 +71,7 @@ class Plant:
     def move(self, shortening: np.ndarray, dt: float) -> None:
         """To tendons shortened by (4,) m, in strides, `dt` s later."""
         start, goal = self.at, 1e3 * shortening
-        count = max(1, int(np.ceil(np.abs(np.maximum(goal, SLACK) - np.maximum(start, SLACK)).max() / STRIDE)))
+        count = max(1, int(np.ceil(np.abs(np.maximum(goal, SLACK) - np.maximum(start, SLACK)).max() / LARGEST_PULL_STEP)))
         for part in np.arange(1, count + 1) / count:
             now = self.time + part * dt
             force = None if self.hand is None else self.hand.at(now, self.finger.skin, len(self.state.u))
@@ -101,11 +101,11 @@ class Shown:
 
 
 def show(seed: int) -> Shown:
-    plant = Plant(seed + OTHER, clamped=Plant(seed).built.phi_deg)
-    command = 1e-3 * wander(np.random.default_rng([seed, 9]), "shown", DURATION, RATE, 0.2, MOST).command
+    plant = Plant(seed + SHOWING_SEED_OFFSET, clamped=Plant(seed).built.phi_deg)
+    command = 1e-3 * wander(np.random.default_rng([seed, 9]), "shown", DURATION, ROW_RATE, 0.2, LARGEST_WANDER).command
     rest, rows = plant.resistance(), []
     for row in command:
-        plant.move(row, 1.0 / RATE)
+        plant.move(row, 1.0 / ROW_RATE)
         rows.append((plant.vertices(), plant.strain(), np.sqrt(plant.resistance() / rest) - 1.0))
     return Shown(command, *(np.array(column) for column in zip(*rows, strict=True)))
 
@@ -128,9 +128,9 @@ def follow(seed: int, shown: Shown, ask: Ask, hand: bool) -> Followed:
         before = time.perf_counter()
         shortening = ask(k, plant)
         spent.append(time.perf_counter() - before)
-        plant.move(shortening, 1.0 / RATE)
+        plant.move(shortening, 1.0 / ROW_RATE)
         error.append(np.linalg.norm(plant.vertices() - vertices, axis=1).mean())
-    settled = int(SETTLED * RATE)
+    settled = int(SETTLED_AFTER * ROW_RATE)
     return Followed(1e3 * np.array(error[settled:]), 1e3 * np.array(spent[settled:]))
 
 
@@ -139,7 +139,7 @@ def asking(law: ShapeController, wanted: np.ndarray, told: bool = False) -> Ask:
 
     def ask(k: int, plant: Plant) -> np.ndarray:
         truth = plant.vertices() if told else None
-        return law.step(wanted[k], plant.resistance(), 1.0 / RATE, truth=truth).shortening
+        return law.step(wanted[k], plant.resistance(), 1.0 / ROW_RATE, truth=truth).shortening
 
     return ask
 

@@ -17,9 +17,16 @@ from twin.body import Loads, Problem
 from twin.mechanics.rod import Equilibrium
 from twin.robots import load
 
-G = 9.81
-AXES = {"hanging": [0, 0, G], "+x": [G, 0, 0], "-x": [-G, 0, 0], "+y": [0, G, 0], "-y": [0, -G, 0], "upright": [0, 0, -G]}
-LENGTH = 0.12
+GRAVITY_SIZE = 9.81
+AXES = {
+    "hanging": [0, 0, GRAVITY_SIZE],
+    "+x": [GRAVITY_SIZE, 0, 0],
+    "-x": [-GRAVITY_SIZE, 0, 0],
+    "+y": [0, GRAVITY_SIZE, 0],
+    "-y": [0, -GRAVITY_SIZE, 0],
+    "upright": [0, 0, -GRAVITY_SIZE],
+}
+BODY_LENGTH = 0.12
 
 
 def draw_poses(rng: np.random.Generator, count: int, heaviest: float, planar: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +63,7 @@ def main(poses: int = 200) -> None:
     """Print tip and marker errors by case."""
     print(f"{'case':>20} {'n':>5} {'median %':>9} {'p95 %':>7} {'max %':>7} {'RMS mm, markers':>16}")
     for name, e in compare(poses).items():
-        tip = 100 * np.linalg.norm(e[:, -1], axis=1) / LENGTH
+        tip = 100 * np.linalg.norm(e[:, -1], axis=1) / BODY_LENGTH
         rms = 1e3 * np.sqrt((e**2).sum(axis=2).mean())
         print(f"{name:>20} {len(e):>5} {np.median(tip):>9.3f} {np.quantile(tip, 0.95):>7.3f} {tip.max():>7.3f} {rms:>16.3f}")
 

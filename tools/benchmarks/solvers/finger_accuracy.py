@@ -18,8 +18,8 @@ from twin.body import Drive, Loads, Problem
 from twin.mechanics.silicone import SoftStatics
 from twin.robots import load
 
-FULL = 0.0741  # strain at 2 N
-STEPS = 8
+STRAIN_AT_2_N = 0.0741  # strain at 2 N
+LOAD_STEPS = 8
 
 
 def twin(E: float, kind: Drive, command: np.ndarray, side: np.ndarray, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -27,11 +27,11 @@ def twin(E: float, kind: Drive, command: np.ndarray, side: np.ndarray, gravity: 
     robot = load("finger")
     body = robot.silicone(robot.build({"silicone.youngs_modulus": E}))
     solver = SoftStatics(body)
-    way = np.outer(np.arange(1, STEPS + 1) / STEPS, command)
-    problem = Problem(np.arange(float(STEPS)), way, Loads(gravity, force=side), drives=(kind,) * 4)
+    way = np.outer(np.arange(1, LOAD_STEPS + 1) / LOAD_STEPS, command)
+    problem = Problem(np.arange(float(LOAD_STEPS)), way, Loads(gravity, force=side), drives=(kind,) * 4)
     began = time.perf_counter()
     path = solver.solve(problem)
-    spent = (time.perf_counter() - began) / STEPS
+    spent = (time.perf_counter() - began) / LOAD_STEPS
     assert path.status.all(), (E, kind, command)
     axis = np.column_stack([np.zeros((19, 2)), np.linspace(0.01, 0.1, 19)])
     line = axis + body.lattice.weights(axis) @ path.q[-1].reshape(-1, 3)
@@ -67,7 +67,9 @@ def main(cases: int = 12, seed: int = 0) -> None:
         off = np.linalg.norm(line - true.centreline, axis=1)
         way = float(np.linalg.norm(true.tip - [0.0, 0.0, 100.0]))
         wrong = strain - true.strain
-        rows.append((off[-1], off.mean(), 100 * np.abs(wrong).max() / FULL, 100 * off[-1] / way, ms, side.any(), (wrong**2).mean()))
+        rows.append(
+            (off[-1], off.mean(), 100 * np.abs(wrong).max() / STRAIN_AT_2_N, 100 * off[-1] / way, ms, side.any(), (wrong**2).mean())
+        )
         shown = np.round(1e3 * command if kind is Drive.DISPLACEMENT else command, 2)
         print(
             f"{k:3d} E {E / 1e3:.0f} kPa {kind} {shown} side {np.round(side, 3)} g {gravity[2]:.1f}: tip way {way:.1f} mm, off "
@@ -77,7 +79,7 @@ def main(cases: int = 12, seed: int = 0) -> None:
     table = np.array(rows, float)
     free, loaded = table[table[:, 5] == 0], table[table[:, 5] == 1]
     print(f"tendons: tip {free[:, 0].mean():.2f} / {free[:, 0].max():.2f} mm (mean / max), centreline {free[:, 1].mean():.2f} mm")
-    print(f"strain {free[:, 2].mean():.2f} / {free[:, 2].max():.2f} % of {FULL}; RMS {np.sqrt(free[:, 6].mean()):.1e}")
+    print(f"strain {free[:, 2].mean():.2f} / {free[:, 2].max():.2f} % of {STRAIN_AT_2_N}; RMS {np.sqrt(free[:, 6].mean()):.1e}")
     if len(loaded):
         print(f"side loads: tip {loaded[:, 3].mean():.1f} / {loaded[:, 3].max():.1f} % of its way")
     print(f"{np.median(table[:, 4]):.1f} ms a warm solve (median)")

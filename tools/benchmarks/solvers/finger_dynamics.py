@@ -27,9 +27,9 @@ from twin.mechanics.silicone.motion.scene import Scene, Thing
 from twin.robots import load
 
 FULL = 0.0741  # strain at 2 N
-HANGING = np.array([0.0, 0.0, 9.81])
+HANGING_GRAVITY = np.array([0.0, 0.0, 9.81])
 BALL = Thing("ball", "sphere", (0.025,), 0.03, (0.0, 0.0, 0.092))
-TABLE = Thing("table", "box", (0.1, 0.1, 0.005), 1.0, (0.0, 0.0, 0.122), fixed=True)
+TABLE_UNDER_BALL = Thing("table", "box", (0.1, 0.1, 0.005), 1.0, (0.0, 0.0, 0.122), fixed=True)
 
 
 def eased(t: np.ndarray) -> np.ndarray:
@@ -49,7 +49,7 @@ def exchanged(t: np.ndarray) -> np.ndarray:
 
 def problem(commands: Callable[[np.ndarray], np.ndarray], seconds: float = 1.0, hold: float = 0.0) -> Problem:
     t = np.arange(round(100 * (seconds + hold)) + 1) / 100
-    return Problem(t, commands(np.minimum(t, seconds)), Loads(HANGING), Route(mu=0.3), drives=(Drive.DISPLACEMENT,) * 4)
+    return Problem(t, commands(np.minimum(t, seconds)), Loads(HANGING_GRAVITY), Route(mu=0.3), drives=(Drive.DISPLACEMENT,) * 4)
 
 
 def moved(asked: Problem, step: float | None = None) -> tuple[Answer, float]:
@@ -96,7 +96,7 @@ def hand(repeats: int) -> Scene:
     ends = [solver.solve(asked).markers[-1] for solver in (HandDynamics(body), HandStatics(body))]
     apart = 1e3 * np.linalg.norm(ends[0] - ends[1], axis=1).max()
     print(f"hand, every finger eased to 9 mm: at rest within {apart:.3f} mm of statics")
-    scene = Scene(body, [BALL, TABLE], HANGING)
+    scene = Scene(body, [BALL, TABLE_UNDER_BALL], HANGING_GRAVITY)
     free, held = [], []
     for _ in range(repeats):
         scene.reset()

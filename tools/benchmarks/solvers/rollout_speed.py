@@ -28,15 +28,17 @@ from twin.prediction.rollout import draw_controls, rollout
 from twin.prediction.rollout.controls import Drawing
 from twin.prediction.twin import Twin
 
-FRICTION = ("tendon_friction", {"mu": 0.21})
+FRICTION_LAW = ("tendon_friction", {"mu": 0.21})
 CREEP = ("backbone_creep", {"amplitude": 0.1, "time": 5.0})
-RATE = 50.0  # Hz
-FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
+COMMAND_RATE = 50.0  # Hz
+FULL_PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 def twins() -> list[tuple[str, Twin, Drive]]:
     plain = Twin.of("continuum")
-    rubs, creeps = (replace(plain, effects=tuple(effect_class(n)(v) for n, v in laws)) for laws in ((FRICTION,), (FRICTION, CREEP)))
+    rubs, creeps = (
+        replace(plain, effects=tuple(effect_class(n)(v) for n, v in laws)) for laws in ((FRICTION_LAW,), (FRICTION_LAW, CREEP))
+    )
     return [
         ("tensions, no effect", plain, Drive.TENSION), ("tensions, friction", rubs, Drive.TENSION),
         ("tensions, friction and creep", creeps, Drive.TENSION), ("displacements, friction", rubs, Drive.DISPLACEMENT),
@@ -46,8 +48,8 @@ def twins() -> list[tuple[str, Twin, Drive]]:
 
 def controls(twin: Twin, drive: Drive, seconds: float) -> Recording:
     if drive is not Drive.CURRENT:
-        return draw_controls(twin, 1, 0, Drawing(seconds, RATE, drive))
-    most, time = warmest_current(twin)[0], np.arange(round(seconds * RATE) + 1) / RATE
+        return draw_controls(twin, 1, 0, Drawing(seconds, COMMAND_RATE, drive))
+    most, time = warmest_current(twin)[0], np.arange(round(seconds * COMMAND_RATE) + 1) / COMMAND_RATE
     channels = [Channel(f"sma_{i}_current", "input", "A") for i in (1, 2, 3)]
     channels += [Channel(f"tip_{a}", "output", "mm") for a in "xyz"]
     values = {c.name: np.full(len(time), np.nan if c.role == "output" else most * c.name.startswith("sma_1")) for c in channels}
@@ -56,9 +58,9 @@ def controls(twin: Twin, drive: Drive, seconds: float) -> Recording:
 
 def started(twin: Twin, drive: Drive, told: Recording) -> ChainMotion:
     """What the rollout steps, after its first second."""
-    plant, trial = RodPlant(twin, 1.0 / RATE, drive=drive), told.trials[0]
+    plant, trial = RodPlant(twin, 1.0 / COMMAND_RATE, drive=drive), told.trials[0]
     names = [c.name for c in told.inputs()]
-    for k in range(1, round(RATE) + 1):
+    for k in range(1, round(COMMAND_RATE) + 1):
         plant.step(np.array([trial.values[n][k] for n in names]))
     assert isinstance(plant.motion, ChainMotion)
     return plant.motion
@@ -82,8 +84,8 @@ def compared(twin: Twin, drive: Drive, seconds: float, repeats: int) -> np.ndarr
     told = controls(twin, drive, seconds)
     moving = started(twin, drive, told)
     model, steps = moving.model, round(seconds / moving.model.opt.timestep)
-    data, state = mujoco.MjData(model), np.zeros((1, mujoco.mj_stateSize(model, FULL)))
-    mujoco.mj_getState(model, moving.data, state[0], FULL)
+    data, state = mujoco.MjData(model), np.zeros((1, mujoco.mj_stateSize(model, FULL_PHYSICS)))
+    mujoco.mj_getState(model, moving.data, state[0], FULL_PHYSICS)
     pulls = pulled(model, steps)
 
     def ours() -> None:

@@ -1,19 +1,13 @@
-"""Speed, convergence and agreement of the static solve, and its ratio to SoRoMoX on the same machine in the same run.
+"""Speed of the static solve, how often it converges, and its agreement with MuJoCo's steps.
 
-    python -m tools.benchmarks.solvers.statics [--soromox /path/to/python] [--solves 10000]
-
-SoRoMoX (pip install soromox==0.5.0 optimistix, in its own environment) is run in turn with the twin: GVS of order 4,
-three tendons at 8 mm, gravity, 0-4 N, warm-started, without friction, which it does not have.
+python -m tools.benchmarks.solvers.statics [--solves 10000]
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
 import time
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import tyro
@@ -23,8 +17,8 @@ from twin.mechanics.rod import Equilibrium
 from twin.mechanics.rod.dynamics import Dynamics
 from twin.robots import load
 
-FRICTION = Route(0.2, 5e-4)
-CASES = {
+FRICTION_ROUTE = Route(0.2, 5e-4)
+LOAD_CASES = {
     "hanging": Loads(np.array([0, 0, 9.81])),
     "sideways, 30 g": Loads(np.array([9.81, 0, 0]), 0.03),
     "upright, 10 g": Loads(np.array([0, 0, -9.81]), 0.01),
@@ -54,8 +48,8 @@ def speed(solver: Equilibrium, rng: np.random.Generator) -> None:
     heads = f"{'warm us':>9} {'p95':>6} {'cold us':>8} {'p95':>6} {'1,500 samples ms':>17}"
     print(f"{'case':>16} {'friction':>8} {heads}")
     t, T = wandering_tensions(rng, 1500)
-    for name, loads in CASES.items():
-        for route in (Route(), FRICTION):
+    for name, loads in LOAD_CASES.items():
+        for route in (Route(), FRICTION_ROUTE):
             whole = [seconds(solver.solve, t, T, loads, route) for _ in range(7)]
             starts = range(0, 1500 - RUN, RUN)
             cold = [seconds(solver.solve, t[:1], T[k : k + 1], loads, route) for k in starts]
@@ -109,8 +103,8 @@ def agreement(solver: Equilibrium, rng: np.random.Generator) -> None:
     """Compare with MuJoCo steps that follow tensions slowly from pose to pose and rest there."""
     moving = Dynamics(load("continuum").build({"damping.time": 0.03}))
     print(f"{'case':>16} {'friction':>8} {'median mm':>10} {'p95':>8} {'max':>8}")
-    for name, loads in CASES.items():
-        for route in (Route(), FRICTION):
+    for name, loads in LOAD_CASES.items():
+        for route in (Route(), FRICTION_ROUTE):
             errors = []
             for _ in range(4):
                 t, T, rest = eased(rng)
@@ -122,46 +116,11 @@ def agreement(solver: Equilibrium, rng: np.random.Generator) -> None:
             print(f"{name:>16} {friction:>8} {np.median(e):10.4f} {np.quantile(e, 0.95):8.4f} {e.max():8.4f}")
 
 
-THEIRS = Path(__file__).with_name("statics_soromox.py")
-
-
-def against_soromox(python: str, solver: Equilibrium, rng: np.random.Generator) -> None:
-    """Time both in turn seven times; print the ratio of medians and of each pair."""
-    _, T = wandering_tensions(rng, 300)
-    theirs = subprocess.Popen([python, str(THEIRS)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    assert theirs.stdin is not None
-    assert theirs.stdout is not None
-    theirs.stdin.write(json.dumps(T.tolist()) + "\n")
-    theirs.stdin.flush()
-    theirs.stdout.readline()  # compiled
-    pairs = []
-    for _ in range(7):
-        whole = [seconds(solver.solve, 0.5 * np.arange(300), T, CASES["hanging"], FRICTION) for _ in range(3)]
-        ours = float(np.median(whole)) / 300  # theirs is the median of 300 solves
-        theirs.stdin.write("go\n")
-        theirs.stdin.flush()
-        pairs.append((ours, float(theirs.stdout.readline())))
-    theirs.stdin.close()
-    a, b = np.median(pairs, axis=0)
-    ratios = sorted(y / x for x, y in pairs)
-    print(
-        f"SoRoMoX GVS order 4, warm, frictionless: {1e3 * b:.2f} ms a solve; twin, warm, with friction: {1e6 * a:.0f} us; ", end=""
-    )
-    print(f"ratio {np.median(ratios):.0f}x (from {ratios[0]:.0f}x to {ratios[-1]:.0f}x)")
-
-
-def main(soromox: str | None = None, solves: int = 10_000) -> None:
-    """Time the solver, count how often it converges, and compare it with MuJoCo's steps.
-
-    Args:
-        soromox: a python that has soromox
-        solves: of the convergence test
-    """
+def main(solves: int = 10_000) -> None:
+    """Time the solver, count how often it converges in so many solves, and compare it with MuJoCo's steps."""
     rng = np.random.default_rng(0)
     solver = Equilibrium(load("continuum").build())
-    solver.solve(Problem(np.zeros(1), np.zeros((1, 3)), CASES["hanging"]))
-    if soromox:
-        against_soromox(soromox, solver, rng)
+    solver.solve(Problem(np.zeros(1), np.zeros((1, 3)), LOAD_CASES["hanging"]))
     speed(solver, rng)
     convergence(solver, rng, solves)
     agreement(solver, rng)

@@ -21,7 +21,7 @@ from twin.body import Loads
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parameters import Values, parameter_array
 from twin.robots import Robot
-from twin.robots.families.continuum_schema import ROUND, Continuum, disk_masses, hole_places
+from twin.robots.families.continuum_schema import ROUND_SECTION, Continuum, disk_masses, hole_places
 
 TOLERANCE = 1e-8  # of the integration, m and rad
 
@@ -35,7 +35,7 @@ def tip_wrench(robot: Robot, tension: np.ndarray, loads: Loads, values: Values |
     v = {p.name: p.value for p in robot.parameters} | dict(values or {})
     shape = Continuum.model_validate(dict(robot.structure))
     places = hole_places(shape, v)
-    if not shape.kinds() >= ROUND or min(shape.ends()) < shape.disks or any(np.ptp(x, axis=1).any() for x in places):
+    if not shape.kinds() >= ROUND_SECTION or min(shape.ends()) < shape.disks or any(np.ptp(x, axis=1).any() for x in places):
         raise DataError(f"the tip-wrench rod is a round wire with straight tendons to its tip; robot {robot.name!r} is another")
     s = np.cumsum(parameter_array(v, "disks.pitch", shape.disks))
     length = float(s[-1])

@@ -20,9 +20,9 @@ from joblib import Parallel, delayed
 
 from tools.benchmarks.table import markdown
 from tools.benchmarks.tasks.policy.cells import Cell, plan, run
-from tools.benchmarks.tasks.policy.days import DAYS, TWINS, prepare
+from tools.benchmarks.tasks.policy.days import EFFECT_DAYS, TWIN_KINDS, prepare
 
-NEAR, OWN_NEAR = 5e-3, 3e-3  # m
+REACHED_WITHIN, REACHED_WITHIN_OWN = 5e-3, 3e-3  # m
 Results = dict[Cell, dict[str, Any]]
 
 
@@ -31,7 +31,7 @@ def kept(out: Path, seeds: int) -> Results:
     return {c: json.loads((out / c.file).read_text()) for c in plan(seeds) if (out / c.file).is_file()}
 
 
-def reached(distance: list[float], near: float = NEAR) -> float:
+def reached(distance: list[float], near: float = REACHED_WITHIN) -> float:
     return 100.0 * float(np.mean(np.array(distance) < near))
 
 
@@ -54,18 +54,18 @@ def shown(values: list[float]) -> str:
 
 def table(results: Results, blind: bool) -> str:
     """Return a Markdown table: a row an effect."""
-    columns = [(twin, False) for twin in TWINS] + [(twin, True) for twin in TWINS[:3]]
-    heads = ["load cells only" if blind else "load cells and tip camera", *TWINS, *(f"IK, {t}" for t in TWINS[:3])]
+    columns = [(twin, False) for twin in TWIN_KINDS] + [(twin, True) for twin in TWIN_KINDS[:3]]
+    heads = ["load cells only" if blind else "load cells and tip camera", *TWIN_KINDS, *(f"IK, {t}" for t in TWIN_KINDS[:3])]
     heads[0] += ", % within 5 mm"
-    cells = [[shares(results, twin, effect, blind, inverse) for twin, inverse in columns] for effect in DAYS]
-    rows = [[effect.replace("_", " "), *map(shown, row)] for effect, row in zip(DAYS, cells, strict=True)]
+    cells = [[shares(results, twin, effect, blind, inverse) for twin, inverse in columns] for effect in EFFECT_DAYS]
+    rows = [[effect.replace("_", " "), *map(shown, row)] for effect, row in zip(EFFECT_DAYS, cells, strict=True)]
     means = [f"{np.mean([np.mean(of) for of in column]):.0f}" if all(column) else "" for column in zip(*cells, strict=True)]
     return markdown(heads, [*rows, ["mean of the four", *means]])
 
 
 def at_home(results: Results, blind: bool) -> str:
     """How the policies do on the twins they were trained on."""
-    found = [reached(r["own"], OWN_NEAR) for c, r in results.items() if c.seed is not None and c.blind == blind]
+    found = [reached(r["own"], REACHED_WITHIN_OWN) for c, r in results.items() if c.seed is not None and c.blind == blind]
     what = "load cells only" if blind else "with the camera"
     return f"{what}: within 3 mm on its own twin {np.mean(found):.1f} %, least {min(found):.0f} % of {len(found)} policies"
 
@@ -75,7 +75,7 @@ def main(out: Path, seeds: int = 5, jobs: int = 1, table_only: bool = False) -> 
     if not table_only:
         (out / "days").mkdir(parents=True, exist_ok=True)
         work = Parallel(jobs)
-        work(delayed(prepare)(effect, out / "days") for effect in DAYS)
+        work(delayed(prepare)(effect, out / "days") for effect in EFFECT_DAYS)
         work(delayed(run)(cell, out) for cell in plan(seeds))
     results = kept(out, seeds)
     for blind in (False, True):

@@ -30,12 +30,14 @@ from twin.tasks.imitation.policy_training import PolicyTrainingSpec, hash_demons
 from twin.tasks.imitation.representations import representation_class
 
 FORMAT = "twin-task-cell/1"
-TRIALS_OF, OTHER = 2000, 2  # seeds
-CASES = {"shown": "the hand shown", "other": "another built hand", "drifting": "drifting", "undone": "drifting, undone"}
-WAYS = ("shape", "strain")
+TRIALS_OF, OTHER_HAND_SEED = 2000, 2  # seeds
+HAND_CASES = {"shown": "the hand shown", "other": "another built hand", "drifting": "drifting", "undone": "drifting, undone"}
+POLICY_INPUTS = ("shape", "strain")
 COLUMNS = [
     ("nearest", "shape", "shown"),
-    *(("diffusion", way, case) for case in CASES for way in WAYS if (way, case) != ("strain", "undone")),  # strains are tared
+    *(
+        ("diffusion", way, case) for case in HAND_CASES for way in POLICY_INPUTS if (way, case) != ("strain", "undone")
+    ),  # strains are tared
 ]
 
 
@@ -66,7 +68,7 @@ def plan(data: Path, seeds: int) -> list[Cell]:
 
 def score(cell: Cell, data: Path, trials: int, jobs: int) -> dict[str, Any]:
     folder = data / cell.task
-    hand = OTHER if cell.case == "other" else read_order(folder)["seed"]
+    hand = OTHER_HAND_SEED if cell.case == "other" else read_order(folder)["seed"]
     policy = make_policy(PolicyTrainingSpec(cell.policy, cell.way, cell.train_seed), folder, print)
     drift = LARGEST_DRIFT if cell.case in ("drifting", "undone") else 0.0
     actor = PolicyRunner(make_task(cell.task), load("hand"), hand, cell.way, policy, drift, cell.case == "undone")
@@ -87,7 +89,7 @@ def table(results: dict[Cell, Counter[str]]) -> str:
         sums = [sum(each, Counter()) for each in found]
         shares[name] = [100.0 * s[Outcome.SUCCESS] / s.total() if s else np.nan for s in sums]
     shares["mean"] = np.mean(list(shares.values()), axis=0) if shares else []
-    heads = [f"{policy}, {way}, {CASES[case]}" for policy, way, case in COLUMNS]
+    heads = [f"{policy}, {way}, {HAND_CASES[case]}" for policy, way, case in COLUMNS]
     return markdown(
         ["success, %", *heads], [[name, *("" if np.isnan(x) else f"{x:.0f}" for x in row)] for name, row in shares.items()]
     )

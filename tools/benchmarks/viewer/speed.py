@@ -22,7 +22,7 @@ from twin.viewer import TwinPanel
 
 SETS = {"continuum": "friday", "finger": "drift"}  # samples bundled with the robots
 PICTURES = 120
-STARTS = 3
+VIEWER_STARTS = 3
 
 
 def pictures(robot: str) -> float:
@@ -58,8 +58,8 @@ def start(robot: str) -> float:
 def main(robots: tyro.conf.Positional[tuple[str, ...]] = tuple(SETS)) -> None:
     """Print the figures of each robot."""
     for robot in robots:
-        first, rate = np.median([start(robot) for _ in range(STARTS)]), pictures(robot)
-        print(f"{robot}: first picture after {first:.2f} s (median of {STARTS}), {rate:.0f} pictures a second")
+        first, rate = np.median([start(robot) for _ in range(VIEWER_STARTS)]), pictures(robot)
+        print(f"{robot}: first picture after {first:.2f} s (median of {VIEWER_STARTS}), {rate:.0f} pictures a second")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from tools.simulators.finger.motions import PAUSE, Trial
 from tools.simulators.finger.sensors import Built
 from tools.simulators.finger.statics import Finger, Load, NotConverged, State
 
-STRIDE = 0.8  # mm, the largest step of a pulling drive between two equilibria
+LARGEST_PULL_STEP = 0.8  # mm, the largest step of a pulling drive between two equilibria
 SLACK = -1.0  # mm, a tendon paid out further plays no part
 RETURN = 1.0  # s in which the finger goes back to rest after a trial
 
@@ -72,7 +72,7 @@ def _run_trial(
     u, strain, tension, failures = [], [], [], 0
     before, last, at = state, 0.0, delivered[0]
     for time, goal in zip(trial.time, delivered, strict=True):
-        count = max(1, int(np.ceil(np.abs(np.maximum(goal, SLACK) - np.maximum(at, SLACK)).max() / STRIDE)))
+        count = max(1, int(np.ceil(np.abs(np.maximum(goal, SLACK) - np.maximum(at, SLACK)).max() / LARGEST_PULL_STEP)))
         for part in np.arange(1, count + 1) / count:
             now = last + part * (time - last)
             force = None if hand is None else hand.at(now, finger.skin, len(state.u))

@@ -12,11 +12,11 @@ import numpy as np
 
 from tools.simulators.finger.body import Body
 from tools.simulators.finger.cables import interpolation
-from tools.simulators.finger.mesh import LENGTH, radius
+from tools.simulators.finger.mesh import FINGER_LENGTH, radius
 
 LOOKS = np.array([-np.sqrt(0.5), -np.sqrt(0.5), 0.0])
 GRAZING = 0.01  # cosine below which a surface is not seen: the tip's face of the hanging finger
-STEP = 0.05  # mm, the difference by which normals are taken
+NORMAL_STEP = 0.05  # mm, the difference by which normals are taken
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Points:
     def on_mantle(cls, body: Body, azimuth: np.ndarray, height: np.ndarray) -> Points:
         out = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)])
         start = radius(height)[:, None] * out + np.column_stack([np.zeros((len(height), 2)), height])
-        around = STEP * np.column_stack([-out[:, 1], out[:, 0], np.zeros_like(azimuth)])
-        along = -STEP * (np.array([0, 0, 1.0]) - 0.0625 * out)  # towards the base, inside the finger at its tip
+        around = NORMAL_STEP * np.column_stack([-out[:, 1], out[:, 0], np.zeros_like(azimuth)])
+        along = -NORMAL_STEP * (np.array([0, 0, 1.0]) - 0.0625 * out)  # towards the base, inside the finger at its tip
         return cls._of(body, start, np.stack([along, around]))
 
     @classmethod
     def on_tip(cls, body: Body, azimuth: np.ndarray, distance: np.ndarray) -> Points:
-        start = np.column_stack([distance * np.cos(azimuth), distance * np.sin(azimuth), np.full(len(azimuth), LENGTH)])
-        steps = np.broadcast_to(STEP * np.eye(3)[:2, None], (2, len(start), 3))
+        start = np.column_stack([distance * np.cos(azimuth), distance * np.sin(azimuth), np.full(len(azimuth), FINGER_LENGTH)])
+        steps = np.broadcast_to(NORMAL_STEP * np.eye(3)[:2, None], (2, len(start), 3))
         return cls._of(body, start, steps)
 
     @classmethod
@@ -49,7 +49,7 @@ class Points:
         """Positions (k, 3) mm in the base frame and whether the camera sees them (k,)."""
         moved = (self.weights @ u).reshape(3, -1, 3)
         first, second = self.step + moved[1:] - moved[0]
-        facing = -np.cross(first, second) / STEP**2 @ turn.T @ LOOKS
+        facing = -np.cross(first, second) / NORMAL_STEP**2 @ turn.T @ LOOKS
         return (self.start + moved[0]) @ turn.T, facing > GRAZING
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from tools.simulators.finger.cables import interpolation
 from tools.simulators.finger.statics import Finger, Load
 
-HANGING = (0.0, 0.0, 9.81)
+HANGING_FINGER = (0.0, 0.0, 9.81)
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ def equilibrium(
     tension: Sequence[float] | None = None,
     shortening: Sequence[float] | None = None,
     side: Sequence[float] = (0.0, 0.0, 0.0),
-    gravity: tuple[float, float, float] = HANGING,
+    gravity: tuple[float, float, float] = HANGING_FINGER,
     steps: int = 4,
 ) -> Equilibrium:
     """The finger under tensions (4,) N or shortenings (4,) mm and a force `side` (3,) N spread evenly over the tip's face."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.simulators.finger.mesh import radius
-from tools.simulators.finger.motions import REST_SHORT, bump, ease
+from tools.simulators.finger.motions import REST_BEFORE_HAND, bump, ease
 from tools.simulators.finger.skin import Skin
 
-EDGE = (2.0, 6.0)  # mm along and around: an edge across the finger, as sharp as the mesh tells
+EDGE_WIDTHS = (2.0, 6.0)  # mm along and around: an edge across the finger, as sharp as the mesh tells
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Hand:
     @classmethod
     def draw(cls, rng: np.random.Generator, skin: Skin, duration: float, strength: float = 1.0) -> Hand:
         """Pushes of 2.5 to 6 s one after another and overlapping, over in the last half second."""
-        begin = np.arange(REST_SHORT + 1.0, duration - 3.0, 2.2)
+        begin = np.arange(REST_BEFORE_HAND + 1.0, duration - 3.0, 2.2)
         count = len(begin)
         begin = begin + rng.uniform(-0.4, 0.4, count)
         end = np.minimum(begin + rng.uniform(2.5, 6.0, count), duration - 0.5)
@@ -44,15 +44,15 @@ class Hand:
     def hold(cls, rng: np.random.Generator, skin: Skin, duration: float) -> Hand:
         """Three times, one after another: two edges that face each other, up to 25 mm apart along the finger, pressed together by
         0.5 to 2 N, one by up to 15 % harder than the other."""
-        span = (duration - REST_SHORT - 1.0) / 3.0
-        begin = np.repeat(REST_SHORT + 0.8 + span * np.arange(3), 2)
+        span = (duration - REST_BEFORE_HAND - 1.0) / 3.0
+        begin = np.repeat(REST_BEFORE_HAND + 0.8 + span * np.arange(3), 2)
         middle, apart, side = rng.uniform(50.0, 85.0, 3), rng.uniform(-25.0, 25.0, 3), rng.uniform(0, 2 * np.pi, 3)
         height = (middle[:, None] + apart[:, None] * np.array([-0.5, 0.5])).ravel()
         azimuth = (side[:, None] + np.array([0.0, np.pi])).ravel()
         force = (rng.uniform(0.5, 2.0, 3)[:, None] * (1.0 + rng.uniform(-0.15, 0.15, (3, 1)) * np.array([-0.5, 0.5]))).ravel()
         out = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(6)])
         around = skin.points @ np.column_stack([-out[:, 1], out[:, 0], out[:, 2]]).T
-        sharp = ((skin.points[:, 2, None] - height) / EDGE[0]) ** 2 + (around / EDGE[1]) ** 2
+        sharp = ((skin.points[:, 2, None] - height) / EDGE_WIDTHS[0]) ** 2 + (around / EDGE_WIDTHS[1]) ** 2
         patch = (np.exp(-0.5 * sharp) * (skin.points @ out.T > 0.0)).T
         patch /= (patch * skin.area).sum(1, keepdims=True)
         return cls(begin, begin + span, -force[:, None] * out, patch)

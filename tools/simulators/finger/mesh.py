@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-LENGTH, CLAMP, ANCHOR = 100.0, 10.0, 90.0  # mm: the tip, the end of the held part, the start of the tendons' anchor
+FINGER_LENGTH, CLAMP, ANCHOR = 100.0, 10.0, 90.0  # mm: the tip, the end of the held part, the start of the tendons' anchor
 # Finer at the clamp, whose edge the strain is singular at; one border where the anchor begins.
 BORDERS = (10.0, 14.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 CORE = 0.5  # half the core square's diagonal, of the radius
@@ -90,8 +90,8 @@ def _bulge(half: float) -> float:
 def cone(core: int = 1, finer: int = 1) -> Mesh:
     """Mesh of z = 10..100 mm, every layer of BORDERS cut into `finer`."""
     flat, quads = section(core)
-    borders = np.append(np.concatenate([np.linspace(a, b, finer + 1)[:-1] for a, b in pairwise(BORDERS)]), LENGTH)
-    heights = np.append(np.column_stack([borders[:-1], (borders[:-1] + borders[1:]) / 2]).ravel(), LENGTH)
+    borders = np.append(np.concatenate([np.linspace(a, b, finer + 1)[:-1] for a, b in pairwise(BORDERS)]), FINGER_LENGTH)
+    heights = np.append(np.column_stack([borders[:-1], (borders[:-1] + borders[1:]) / 2]).ravel(), FINGER_LENGTH)
     plane = len(flat)
     nodes = np.concatenate([np.column_stack([radius(z) * flat, np.full(plane, z)]) for z in heights])
     cells = [[q + (2 * k + c) * plane for q in quad for c in range(3)] for k in range(len(borders) - 1) for quad in quads]

@@ -1,6 +1,6 @@
 """What the drives are told on a bench day: sweeps of one tendon, antagonistic pairs, a circle, holds, wanders; mm, s.
 
-Every trial begins at rest with all tendons just taut. A tendon that shall not pull is paid out by PAID.
+Every trial begins at rest with all tendons just taut. A tendon that shall not pull is paid out by PAID_OUT.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PAID, FAR = -6.0, -15.0  # mm, slack in tendon trials and where only the hand moves the finger
-REST, REST_SHORT = 0.5, 0.2  # s
+PAID_OUT, PAID_OUT_FAR = -6.0, -15.0  # mm, slack in tendon trials and where only the hand moves the finger
+REST_BEFORE, REST_BEFORE_HAND = 0.5, 0.2  # s
 PAUSE = 60.0  # s between two trials
 AZIMUTH = np.deg2rad([0.0, 90.0, 180.0, 270.0])
 
@@ -48,7 +48,7 @@ def rows(duration: float, rate: float) -> np.ndarray:
 
 
 def _alone(t: np.ndarray, tendon: int, pull: np.ndarray) -> np.ndarray:
-    command = np.tile(PAID * ease(t, REST, REST + 1.0)[:, None], (1, 4))
+    command = np.tile(PAID_OUT * ease(t, REST_BEFORE, REST_BEFORE + 1.0)[:, None], (1, 4))
     command[:, tendon] = pull
     return command
 
@@ -63,7 +63,7 @@ def sweep(rng: np.random.Generator, tendon: int) -> Trial:
 def pair(rng: np.random.Generator, tendon: int) -> Trial:
     t = rows(19.0, 2.5)
     tight, swing = rng.uniform(1.2, 2.2), rng.uniform(6.0, 7.0)
-    command = np.tile(tight * (ease(t, REST, 2.0) - ease(t, 16.4, 18.0))[:, None], (1, 4))
+    command = np.tile(tight * (ease(t, REST_BEFORE, 2.0) - ease(t, 16.4, 18.0))[:, None], (1, 4))
     wave = swing * np.sin(2 * np.pi * np.clip(t - 2.0, 0, 14.0) / 14.0) * ease(t, 2.0, 4.0)
     command[:, tendon] += wave
     command[:, tendon + 2] -= wave
@@ -72,8 +72,8 @@ def pair(rng: np.random.Generator, tendon: int) -> Trial:
 
 def circle(rng: np.random.Generator) -> Trial:
     t = rows(22.0, 2.5)
-    phase = 2 * np.pi * (t[:, None] - REST) / 10.0 - AZIMUTH
-    window = ease(t, REST, 2.5) - ease(t, 18.5, 21.0)
+    phase = 2 * np.pi * (t[:, None] - REST_BEFORE) / 10.0 - AZIMUTH
+    window = ease(t, REST_BEFORE, 2.5) - ease(t, 18.5, 21.0)
     return Trial("circle", t, (1.0 + rng.uniform(6.2, 6.8) * np.cos(phase)) * window[:, None])
 
 
@@ -100,7 +100,7 @@ def wander(rng: np.random.Generator, name: str, duration: float, rate: float, re
 def paid_out(name: str, duration: float) -> Trial:
     """All tendons slack, the hand alone moves the finger."""
     t = rows(duration, 10)
-    return Trial(name, t, np.tile(FAR * ease(t, REST_SHORT, REST_SHORT + 1.0)[:, None], (1, 4)), hand=True)
+    return Trial(name, t, np.tile(PAID_OUT_FAR * ease(t, REST_BEFORE_HAND, REST_BEFORE_HAND + 1.0)[:, None], (1, 4)), hand=True)
 
 
 def clocked(trials: list[Trial], change: Callable[[Trial], dict]) -> list[Trial]:
@@ -117,7 +117,7 @@ def bench_day(rng: np.random.Generator) -> list[Trial]:
     trials = [sweep(rng, i) for i in range(4)] + [pair(rng, 0), pair(rng, 1), circle(rng)]
     first, second = rng.permutation(4)[:2]
     trials.append(hold(rng, 1, int(first), 14.0, 24.0))
-    trials += [wander(rng, f"wander_{n}", 20.0, 2.5, REST, rng.uniform(6.0, 8.3)) for n in (1, 2)]
+    trials += [wander(rng, f"wander_{n}", 20.0, 2.5, REST_BEFORE, rng.uniform(6.0, 8.3)) for n in (1, 2)]
     trials.append(hold(rng, 2, int(second), 10.0, 18.0))
     return clocked(trials, lambda trial: {"heldout": trial.heldout or trial.name.startswith("wander")})
 
@@ -125,10 +125,10 @@ def bench_day(rng: np.random.Generator) -> list[Trial]:
 def shape_day(rng: np.random.Generator) -> list[Trial]:
     """Two trials with clouds to align by, three without; by tendons, by hand, and by both."""
     trials = [
-        wander(rng, "align_1", 16.0, 10, REST_SHORT, rng.uniform(8.5, 9.4)),
+        wander(rng, "align_1", 16.0, 10, REST_BEFORE_HAND, rng.uniform(8.5, 9.4)),
         paid_out("align_2", 16.0),
-        wander(rng, "test_1", 14.0, 10, REST_SHORT, rng.uniform(8.0, 9.4)),
+        wander(rng, "test_1", 14.0, 10, REST_BEFORE_HAND, rng.uniform(8.0, 9.4)),
         paid_out("test_2", 18.0),
-        wander(rng, "test_3", 16.0, 10, REST_SHORT, rng.uniform(5.0, 7.0)),
+        wander(rng, "test_3", 16.0, 10, REST_BEFORE_HAND, rng.uniform(5.0, 7.0)),
     ]
     return clocked(trials, lambda t: {"frames": 0.5, "cloud": t.name.startswith("align"), "hand": t.hand or t.name == "test_3"})

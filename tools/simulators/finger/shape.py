@@ -10,7 +10,7 @@ import numpy as np
 
 from tools.simulators.finger.bench import Log
 from tools.simulators.finger.cables import interpolation
-from tools.simulators.finger.mesh import LENGTH, radius
+from tools.simulators.finger.mesh import FINGER_LENGTH, radius
 from tools.simulators.finger.sensors import Built
 from tools.simulators.finger.statics import Finger
 
@@ -25,8 +25,8 @@ def surface() -> np.ndarray:
         a = 2 * np.pi * np.arange(count) / count
         return np.column_stack([r * np.cos(a), r * np.sin(a), np.full(count, z)])
 
-    rings = [ring(float(radius(z)), z, 36) for z in np.linspace(0.0, LENGTH, 41)]
-    return np.concatenate([*rings, ring(0.0, LENGTH, 1), ring(3.0, LENGTH, 8), ring(6.0, LENGTH, 16)])
+    rings = [ring(float(radius(z)), z, 36) for z in np.linspace(0.0, FINGER_LENGTH, 41)]
+    return np.concatenate([*rings, ring(0.0, FINGER_LENGTH, 1), ring(3.0, FINGER_LENGTH, 8), ring(6.0, FINGER_LENGTH, 16)])
 
 
 def write_shape_truth(path: Path, table: Path, finger: Finger, built: Built, logs: Sequence[Log]) -> None:

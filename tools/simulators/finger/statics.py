@@ -17,8 +17,8 @@ from tools.simulators.finger.mesh import cone
 from tools.simulators.finger.skin import Pad, Skin
 
 ITERATIONS = 25
-HALVINGS = 8
-FORCE, LENGTH = 2e-5, 1e-4  # N and mm: what is left of forces, and of steps and lengths; noise is 0.2 mm
+LOAD_HALVINGS = 8
+FORCE_LEFT, LENGTH_LEFT = 2e-5, 1e-4  # N and mm: what is left of forces, and of steps and lengths; noise is 0.2 mm
 
 
 class NotConverged(RuntimeError):
@@ -119,12 +119,12 @@ class Finger:
         if found is not None:
             return found
         now, done, part = state, 0.0, 0.5
-        for _ in range(2**HALVINGS):
+        for _ in range(2**LOAD_HALVINGS):
             goal = min(done + part, 1.0)
             found = self._newton(now, state.load.between(load, goal), dt * (goal - done), None)
             if found is None:
                 part /= 2
-                if part < 2.0**-HALVINGS:
+                if part < 2.0**-LOAD_HALVINGS:
                     break
                 continue
             now, done = found, goal
@@ -163,7 +163,7 @@ class Finger:
             shares = self.cables.shares(direction, psi)
             gap, plain, K = self._gather(element, u, outside, tension[:, None] * shares, length, direction)
             off = max(over.max(initial=0.0), np.abs(over[driven & pulls]).max(initial=0.0))
-            if step < 50 * LENGTH and np.abs(plain).max() < FORCE and off < LENGTH and _quiet(element, self.body):
+            if step < 50 * LENGTH_LEFT and np.abs(plain).max() < FORCE_LEFT and off < LENGTH_LEFT and _quiet(element, self.body):
                 return self._kept(State(u, pressure, tension, load, length, psi), share, left)
             grip = None
             if self.cables.mu and pulls.any():

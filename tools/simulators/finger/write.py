@@ -13,7 +13,7 @@ from tools.simulators.finger.bench import Log
 from tools.simulators.finger.motions import Trial
 
 DRIVE, GRAIN, SENSOR, MARKER, CLOUD = 0.01, 0.005, 0.3, 0.2, 0.4  # mm, mm, ohm, mm, mm
-GRAVITY = (0.0, 0.0, 9.81)  # m/s^2
+FINGER_GRAVITY = (0.0, 0.0, 9.81)  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def write_set(folder: Path, title: str, sheets: Sequence[Sheet]) -> None:
         'robot   = "finger"',
         f"title   = {json.dumps(title)}",
         'source  = "simulation: independent finite element bench"',
-        f"gravity = {list(GRAVITY)}",
+        f"gravity = {list(FINGER_GRAVITY)}",
     ]
     channels = [(f"tendon_{i}_displacement", "input", "mm", DRIVE) for i in range(1, 5)]
     channels += [(f"sensor_{i}_resistance", "output", "ohm", SENSOR) for i in range(1, 5)]

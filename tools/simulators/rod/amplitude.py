@@ -19,7 +19,7 @@ from tools.simulators.rod.effects import Effect
 from tools.simulators.rod.rod import NoEquilibrium, Rod
 from tools.simulators.rod.sensors import Noise
 
-CLOSE = 0.03  # relative error of the amplitude that is good enough
+AMPLITUDE_ERROR = 0.03  # relative error of the amplitude that is good enough
 PLAUSIBLE = 2.0  # prior standard deviations that a refit may use
 
 
@@ -102,7 +102,7 @@ def scaled(effect: Effect, wanted: float, scale: Scale) -> tuple[Effect, float]:
     strength = min(1.0, effect.most)
     for _ in range(12):
         found = leaves(strength)
-        if abs(found - wanted) < CLOSE * wanted:
+        if abs(found - wanted) < AMPLITUDE_ERROR * wanted:
             return replace(effect, strength=strength), found
         if found < wanted:
             low, low_at = strength, found

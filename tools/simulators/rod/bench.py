@@ -1,7 +1,7 @@
 """Runs a bench day on a built robot with its effects: true motion and noise-free logs of every trial.
 
 Order of loads in a trial: straight and unloaded; gravity and payload in 4 steps; the first command in 12 or more; then
-the log. The whole ramp takes RAMP seconds before the log's time zero. Slow states live on the day's clock.
+the log. The whole ramp takes RAMP_SECONDS seconds before the log's time zero. Slow states live on the day's clock.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from tools.simulators.rod.design import Day, Trial
 from tools.simulators.rod.effects import Effect, Situation
 from tools.simulators.rod.rod import Creep, Rod, follow
 
-RAMP = 2.0  # s
-NODES = 3  # Gauss nodes per interval: the tip is within 2e-3 mm of the converged one at the fullest loads
+RAMP_SECONDS = 2.0  # s
+GAUSS_NODES = 3  # Gauss nodes per interval: the tip is within 2e-3 mm of the converged one at the fullest loads
 COLD = 16  # steps in which gravity and payload come on where springs pull
-STRIDE = (0.25, 1e-3)  # N or m, largest step of the drive between two equilibria
+LARGEST_DRIVE_STEP = (0.25, 1e-3)  # N or m, largest step of the drive between two equilibria
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ def run(rod: Rod, effects: Sequence[Effect], day: Day, progress: Callable[[int],
         if situation.creep is not None:
             share, time = situation.creep
             if delayed is None:
-                delayed = np.zeros((len(time), len(rod.pitch), NODES, 3))
+                delayed = np.zeros((len(time), len(rod.pitch), GAUSS_NODES, 3))
             else:
-                delayed *= np.exp(-max(0.0, trial.start - RAMP - rested) / time)[:, None, None, None]
+                delayed *= np.exp(-max(0.0, trial.start - RAMP_SECONDS - rested) / time)[:, None, None, None]
             creep = Creep(share, time, delayed)
         logs.append(_run_trial(situation, effects, day, trial, creep))
         rested = trial.start + trial.time[-1]
@@ -67,12 +67,12 @@ def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial:
         return np.stack([np.interp(time, trial.fine, column) for column in delivered.T], axis=1)
 
     seen = np.maximum(trial.time - situation.latency, 0.0)  # the moment a row's outputs show
-    grid = np.union1d(np.union1d(trial.time, seen), _milestones(trial.fine, delivered, STRIDE[day.driven_by_length]))
+    grid = np.union1d(np.union1d(trial.time, seen), _milestones(trial.fine, delivered, LARGEST_DRIVE_STEP[day.driven_by_length]))
     drive = at(grid)
     if day.driven_by_length:
         for effect in effects:
             drive = effect.pull(drive)
-    path, lead = _ramped(drive, STRIDE[day.driven_by_length])
+    path, lead = _ramped(drive, LARGEST_DRIVE_STEP[day.driven_by_length])
     shape = follow(
         situation.rod,
         -path if day.driven_by_length else path,
@@ -80,7 +80,7 @@ def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial:
         payload=situation.payload,
         weight=np.minimum(np.arange(1, len(path) + 1) / 4, 1.0),
         softness=_softness(effects, trial.start + np.concatenate([np.zeros(lead), grid]), day),
-        dt=np.concatenate([np.full(lead + 1, RAMP / (lead + 1)), np.diff(grid)]),
+        dt=np.concatenate([np.full(lead + 1, RAMP_SECONDS / (lead + 1)), np.diff(grid)]),
         mu=situation.mu,
         stroke=situation.stroke,
         creep=creep,
@@ -89,7 +89,7 @@ def _run_trial(situation: Situation, effects: Sequence[Effect], day: Day, trial:
         stretch=situation.stretch if day.driven_by_length else 0.0,
         bedding=situation.bedding if day.driven_by_length else (0.0, 1.0),
         keep=np.arange(len(path)) >= lead,
-        nodes=NODES,
+        nodes=GAUSS_NODES,
     )
     inputs, outputs = np.searchsorted(grid, trial.time), np.searchsorted(grid, seen)
     clock = trial.start + trial.time
@@ -148,7 +148,7 @@ def _run_heated(situation: Situation, effects: Sequence[Effect], day: Day, trial
         ambient=np.append(np.full(lead, ambient[0]), ambient),
         stretch=situation.stretch,
         keep=np.arange(len(clock) + lead) >= lead,
-        nodes=NODES,
+        nodes=GAUSS_NODES,
     )
     markers, tension, displacement = shape.markers, shape.tension[:, 0], shape.displacement
     for effect in effects:

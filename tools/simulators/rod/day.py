@@ -12,7 +12,7 @@ from tyro.conf import Suppress, UseAppendAction, arg
 
 from tools.simulators.rod.amplitude import Scale, scaled
 from tools.simulators.rod.bench import run
-from tools.simulators.rod.design import DESIGNS, Trial, bench_day
+from tools.simulators.rod.design import BENCH_DESIGNS, Trial, bench_day
 from tools.simulators.rod.effects import Effect, all_effects
 from tools.simulators.rod.nuisance import built
 from tools.simulators.rod.sensors import Noise
@@ -29,7 +29,7 @@ class Recipe:
     effects: Annotated[UseAppendAction[tuple[str, ...]], arg(name="effect")] = ()  # may be repeated
     amplitude: float = 3.0  # sigmas left by each effect, after refitting
     seed: int = 0
-    design: str = "default"  # of DESIGNS
+    design: str = "default"  # of BENCH_DESIGNS
     displacement: bool = False  # also log tendon displacements
     ambient: bool = False  # also log the ambient temperature
     coloured: bool = False  # marker noise AR(1) 0.4 with Student-t tails, 5 degrees
@@ -38,7 +38,7 @@ class Recipe:
 
     def __post_init__(self) -> None:
         """Raise ValueError for a name that is not known."""
-        for names, known in ((self.effects, all_effects()), ((self.design,), DESIGNS), ((self.mismatch,), MISMATCH)):
+        for names, known in ((self.effects, all_effects()), ((self.design,), BENCH_DESIGNS), ((self.mismatch,), MISMATCH)):
             if other := set(names) - set(known):
                 raise ValueError(f"{', '.join(sorted(other))}: not one of {', '.join(known)}")
 

@@ -15,10 +15,10 @@ import numpy as np
 from tools.simulators.rod.rod import Rod, follow
 
 POOR = ("no_repeats", "time_ordered", "loading_only", "one_payload", "one_rate", "one_tendon", "tip_only")
-DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR, "by_length", "by_current")
-TENDONS = 3
-RATE = 50.0  # Hz of the fine command
-STEP = 0.45  # s, the fastest step
+BENCH_DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR, "by_length", "by_current")
+BENCH_TENDONS = 3
+FINE_RATE = 50.0  # Hz of the fine command
+FASTEST_STEP = 0.45  # s, the fastest step
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def _pull(rng: np.random.Generator, tendons: list[int], top: float, duration: fl
     """Up, an inner loop, up again, down with an inner loop, to rest: the same in all `tendons`, a little out of step."""
     shape = np.array([0.0, 0.75, 0.35, 1.0, 0.55, 0.8, 0.2, 0.45, 0.0])
     when = np.linspace(0.0, duration, len(shape))
-    level = np.tile(rng.uniform(0.0, 0.2, TENDONS), (len(shape), 1))
+    level = np.tile(rng.uniform(0.0, 0.2, BENCH_TENDONS), (len(shape), 1))
     for i in tendons:
         wobble = shape + (shape > 0) * (shape < 1) * rng.uniform(-0.1, 0.1, len(shape))
         level[:, i] = top * wobble * rng.uniform(0.8, 1.0)
@@ -58,46 +58,46 @@ def _pull(rng: np.random.Generator, tendons: list[int], top: float, duration: fl
 
 def _wander(rng: np.random.Generator, top: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
     when = np.linspace(0.0, duration, 11)
-    level = top * rng.uniform(0.0, 1.0, (11, TENDONS)) * rng.choice([0.15, 0.6, 0.9], (11, TENDONS))
+    level = top * rng.uniform(0.0, 1.0, (11, BENCH_TENDONS)) * rng.choice([0.15, 0.6, 0.9], (11, BENCH_TENDONS))
     return when, level
 
 
 def _steps(rng: np.random.Generator, top: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
     count = 9
-    pulled = rng.integers(0, TENDONS, count)
-    level = np.full((count, TENDONS), 0.1)
+    pulled = rng.integers(0, BENCH_TENDONS, count)
+    level = np.full((count, BENCH_TENDONS), 0.1)
     level[np.arange(count), pulled] = top * rng.uniform(0.2, 1.0, count)
     return _plateaus(np.linspace(0.0, duration, count + 1)[:-1], level, duration)
 
 
 def _hold(rng: np.random.Generator, tendon: int, top: float) -> tuple[np.ndarray, np.ndarray]:
-    level = np.full((3, TENDONS), 0.1)
+    level = np.full((3, BENCH_TENDONS), 0.1)
     level[1, tendon] = top * rng.uniform(0.75, 1.0)
     level[2, tendon] = 0.3
-    level[1:, (tendon + 1) % TENDONS] = rng.uniform(0.0, 0.5)
+    level[1:, (tendon + 1) % BENCH_TENDONS] = rng.uniform(0.0, 0.5)
     return _plateaus(np.array([0.0, 3.0, 73.0]), level, 103.0)
 
 
 def _plateaus(begin: np.ndarray, level: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    when = np.append(np.stack([begin[1:], begin[1:] + STEP], axis=1).ravel(), duration)
+    when = np.append(np.stack([begin[1:], begin[1:] + FASTEST_STEP], axis=1).ravel(), duration)
     return np.append(0.0, when), np.repeat(level, 2, axis=0)
 
 
 def _circle(top: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
     when = np.linspace(0.0, duration, 61)
-    around = 3 * np.pi * when[:, None] / duration - 2 * np.pi * np.arange(TENDONS) / TENDONS
+    around = 3 * np.pi * when[:, None] / duration - 2 * np.pi * np.arange(BENCH_TENDONS) / BENCH_TENDONS
     return when, top * (0.5 + 0.5 * np.cos(around))
 
 
 def _trial(rng: np.random.Generator, name: str, payload: float, when: np.ndarray, level: np.ndarray, smooth: bool) -> Trial:
     duration = when[-1]
-    fine = np.linspace(0.0, duration, int(np.ceil(duration * RATE)) + 1)
+    fine = np.linspace(0.0, duration, int(np.ceil(duration * FINE_RATE)) + 1)
     if smooth:  # half a cosine from one level to the next: every level is a reversal at rest
         k = np.clip(np.searchsorted(when, fine, side="right") - 1, 0, len(when) - 2)
         x = 0.5 - 0.5 * np.cos(np.pi * (fine - when[k]) / (when[k + 1] - when[k]))
         command = level[k] + x[:, None] * (level[k + 1] - level[k])
     else:
-        command = np.stack([np.interp(fine, when, level[:, i]) for i in range(TENDONS)], axis=1)
+        command = np.stack([np.interp(fine, when, level[:, i]) for i in range(BENCH_TENDONS)], axis=1)
     rows = int(rng.integers(70, 86))
     time = np.linspace(0.0, duration, rows)
     time[1:-1] += rng.uniform(-0.15, 0.15, rows - 2) * duration / (rows - 1)
@@ -105,9 +105,9 @@ def _trial(rng: np.random.Generator, name: str, payload: float, when: np.ndarray
 
 
 def bench_day(design: str, rng: np.random.Generator) -> Day:
-    """Draw a day after one of DESIGNS."""
-    if design not in DESIGNS:
-        raise ValueError(f"design {design!r} is not one of {', '.join(DESIGNS)}")
+    """Draw a day after one of BENCH_DESIGNS."""
+    if design not in BENCH_DESIGNS:
+        raise ValueError(f"design {design!r} is not one of {', '.join(BENCH_DESIGNS)}")
     hanging = design in ("hanging", "mixed") or (design != "sideways" and rng.random() < 0.5)
     sign, axis = rng.choice([-1.0, 1.0]), rng.integers(2)
     sideways = tuple(float(g) for g in 9.81 * sign * np.eye(3)[axis])
@@ -116,7 +116,7 @@ def bench_day(design: str, rng: np.random.Generator) -> Day:
     if design == "by_current":
         return _schedule(design, rng, *_heatings(rng), 3, (0.0, 0.0, 9.81) if hanging else sideways, sideways)
     trials = []
-    for i in range(TENDONS):
+    for i in range(BENCH_TENDONS):
         trials += [
             _trial(rng, f"slow_{i + 1}", 0.0, *_pull(rng, [i], top, slow), True),
             _trial(rng, f"fast_{i + 1}", 0.0, *_pull(rng, [i], top, fast), True),
@@ -145,16 +145,16 @@ def _heatings(rng: np.random.Generator) -> tuple[list[Trial], Trial]:
         return _trial(rng, name, payload, *_plateaus(np.linspace(0.0, duration, len(level) + 1)[:-1], level, duration), False)
 
     trials = []
-    for i in range(TENDONS):
-        alone, pair = np.zeros((6, TENDONS)), np.zeros((6, TENDONS))
+    for i in range(BENCH_TENDONS):
+        alone, pair = np.zeros((6, BENCH_TENDONS)), np.zeros((6, BENCH_TENDONS))
         alone[:, i] = rng.uniform(1.1, 1.3) * np.array([1.0, 0.6, 1.0, 0.0, 1.05, 0.0])
         pair[[0, 1, 3], i] = rng.uniform(0.9, 1.3, 3)
-        pair[[1, 2, 4], (i + 1) % TENDONS] = rng.uniform(0.9, 1.3, 3)
+        pair[[1, 2, 4], (i + 1) % BENCH_TENDONS] = rng.uniform(0.9, 1.3, 3)
         trials += [trial(f"heat_{i + 1}", 0.0, alone, 120.0), trial(f"pair_{i + 1}", 0.01 * (i % 3), pair, 120.0)]
     for n, payload in enumerate((0.0, 0.01, 0.02, 0.0, 0.01)):
-        level = rng.uniform(0.7, 1.4, (7, TENDONS)) * (rng.random((7, TENDONS)) < 0.5)
+        level = rng.uniform(0.7, 1.4, (7, BENCH_TENDONS)) * (rng.random((7, BENCH_TENDONS)) < 0.5)
         trials.append(trial(f"wander_{n + 1}", payload, level, 140.0))
-    turns = 1.25 * np.eye(TENDONS)[np.arange(6) % TENDONS]
+    turns = 1.25 * np.eye(BENCH_TENDONS)[np.arange(6) % BENCH_TENDONS]
     return trials, trial("turns", 0.01, turns, 120.0)
 
 

@@ -1,10 +1,10 @@
 """Forces on disk centres that depend on where the disk is: a wall, a post, an attracting magnet.
 
 A row of the table `fields` (M, 10) is [kind, first disk, point x y z, direction x y z, strength, size]:
-  WALL    frictionless plane through `point`, outward normal `direction`, a disk counts as a ball of radius `size`
-  POST    frictionless round post, axis through `point` along `direction`; `size` = post radius + disk radius
-  MAGNET  attraction to `point`, F = strength d / (|d|^2 + size^2)^2
-Wall and post push with stiffness `strength` (N/m); the force grows quadratically over the first ROUND of penetration.
+  WALL_FIELD    frictionless plane through `point`, outward normal `direction`, a disk counts as a ball of radius `size`
+  POST_FIELD    frictionless round post, axis through `point` along `direction`; `size` = post radius + disk radius
+  MAGNET_FIELD  attraction to `point`, F = strength d / (|d|^2 + size^2)^2
+Wall and post push with stiffness `strength` (N/m); the force grows quadratically over the first ROUNDED_PENETRATION of penetration.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-WALL, POST, MAGNET = 1, 2, 3
-ROUND = 5e-5  # m
+WALL_FIELD, POST_FIELD, MAGNET_FIELD = 1, 2, 3
+ROUNDED_PENETRATION = 5e-5  # m
 
 
 @njit(cache=True, error_model="numpy")
@@ -22,9 +22,9 @@ def _push(gap, stiffness):
     d = -gap
     if d <= 0.0:
         return 0.0, 0.0
-    if d < ROUND:
-        return stiffness * d * d / (2 * ROUND), -stiffness * d / ROUND
-    return stiffness * (d - ROUND / 2), -stiffness
+    if d < ROUNDED_PENETRATION:
+        return stiffness * d * d / (2 * ROUNDED_PENETRATION), -stiffness * d / ROUNDED_PENETRATION
+    return stiffness * (d - ROUNDED_PENETRATION / 2), -stiffness
 
 
 @njit(cache=True, error_model="numpy")
@@ -39,13 +39,13 @@ def act(fields, disk_r, force, gradient):
             for c in range(3):
                 d[c] = disk_r[j + 1, c] - point[c]
             along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
-            if row[0] == WALL:
+            if row[0] == WALL_FIELD:
                 f, slope = _push(along - size, strength)
                 for c in range(3):
                     force[j, c] += f * axis[c]
                     for e in range(3):
                         gradient[j, c, e] += slope * axis[c] * axis[e]
-            elif row[0] == POST:
+            elif row[0] == POST_FIELD:
                 for c in range(3):
                     d[c] -= along * axis[c]
                 rho = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)

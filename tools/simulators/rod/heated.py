@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tools.simulators.rod.march import SMALLEST, NoEquilibrium, Record, commit, start_pose
+from tools.simulators.rod.march import SMALLEST_LOAD_PART, NoEquilibrium, Record, commit, start_pose
 from tools.simulators.rod.newton import equilibrium
 from tools.simulators.rod.springs import FIRST_ELONGATION, GF, Springs
 from tools.simulators.rod.statics import Problem
 
 AGREED = 1e-4  # gf between spring and tendon
-TRIES = 12
+HEATED_TRIES = 12
 
 
 class Heat(NamedTuple):
@@ -55,7 +55,7 @@ class SpringRod:
             if found is None:
                 self.u[:], self.tension[:] = u_old, T_old
                 part *= 0.5
-                if part < SMALLEST:
+                if part < SMALLEST_LOAD_PART:
                     raise NoEquilibrium(f"springs at {now.temperature} degC do not settle")
                 continue
             commit(problem.friction, self.pose)
@@ -67,7 +67,7 @@ class SpringRod:
     def _agreed(self, problem: Problem, springs: Springs, weight: float) -> np.ndarray | None:
         """Return the elongation (T,) mm at which springs and tendons pull alike; None where none is found."""
         e, load = self._elongation, problem.load
-        for _ in range(TRIES):
+        for _ in range(HEATED_TRIES):
             s, k = springs.tangent(e)
             # e = 9 mm + length - straight - stretch T = e_now + (T - s) / k, all in m and N
             step = load._replace(

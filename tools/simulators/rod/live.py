@@ -1,7 +1,8 @@
 """The bench robot under commands that are decided when its last answer is seen: base tensions at equal intervals.
 
 It starts each time as a trial does (bench.py): straight and unloaded; gravity and payload in 4 steps, slack tendons in 12 more,
-RAMP seconds in all; nothing has crept before. Effects of mechanics, load cells and camera act; those of drives and weather do not.
+RAMP_SECONDS seconds in all; nothing has crept before. Effects of mechanics, load cells and camera act; those of drives and weather
+do not.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tools.simulators.rod.bench import NODES, RAMP, STRIDE
+from tools.simulators.rod.bench import GAUSS_NODES, LARGEST_DRIVE_STEP, RAMP_SECONDS
 from tools.simulators.rod.effects import Effect, Situation
 from tools.simulators.rod.march import Creep, Standing
 from tools.simulators.rod.rod import Conditions, Rod, solve, straight_lengths
 
-LEAD = 16  # steps before the first row
+STEPS_BEFORE_FIRST_ROW = 16  # steps before the first row
 ELSEWHERE = ("deliver", "soften", "pull", "encode")  # where an effect may act that does not act here
 
 
@@ -36,17 +37,17 @@ class LiveRobot:
         s = self.situation = Situation(self.rod, self._declared, 0.0, 0.0)
         for effect in self.effects:
             effect.mount(s)
-        given = Conditions(gravity=s.gravity, payload=s.payload, fields=s.fields, mu=s.mu, stroke=s.stroke, nodes=NODES)
+        given = Conditions(gravity=s.gravity, payload=s.payload, fields=s.fields, mu=s.mu, stroke=s.stroke, nodes=GAUSS_NODES)
         problem, T = given.problem(s.rod), s.rod.hole_radius.shape[1]
         creep = None if s.creep is None else Creep(*s.creep, np.zeros((len(s.creep[1]), *problem.body.rest.shape)))
         self._standing = Standing(problem, creep)
         self.time, self.tension = 0.0, np.zeros(T)
-        for k in range(1, LEAD + 1):
-            self._standing.to(self.tension, min(k / 4, 1.0), 1.0, RAMP / LEAD)
+        for k in range(1, STEPS_BEFORE_FIRST_ROW + 1):
+            self._standing.to(self.tension, min(k / 4, 1.0), 1.0, RAMP_SECONDS / STEPS_BEFORE_FIRST_ROW)
 
     def pull(self, tension: np.ndarray, seconds: float) -> None:
-        """Straight to base tensions (T,) N, `seconds` long, in steps of at most STRIDE. Raises NoEquilibrium."""
-        parts = max(1, int(np.ceil(np.abs(tension - self.tension).max() / STRIDE[False])))
+        """Straight to base tensions (T,) N, `seconds` long, in steps of at most LARGEST_DRIVE_STEP. Raises NoEquilibrium."""
+        parts = max(1, int(np.ceil(np.abs(tension - self.tension).max() / LARGEST_DRIVE_STEP[False])))
         for k in range(1, parts + 1):
             self._standing.to(self.tension + k / parts * (tension - self.tension), 1.0, 1.0, seconds / parts)
         self.time, self.tension = self.time + seconds, np.array(tension, float)
@@ -78,4 +79,4 @@ class LiveRobot:
     def rest_tip(self, tension: np.ndarray) -> np.ndarray:
         """(3,) m: where the tip would rest under base tensions (T,) N without friction and creep."""
         s = self.situation
-        return solve(s.rod, tension, gravity=s.gravity, payload=s.payload, fields=s.fields, nodes=NODES).disks[-1]
+        return solve(s.rod, tension, gravity=s.gravity, payload=s.payload, fields=s.fields, nodes=GAUSS_NODES).disks[-1]

@@ -20,7 +20,7 @@ from tools.simulators.rod.newton import equilibrium
 from tools.simulators.rod.statics import Pose, Problem, new_pose
 from tools.simulators.rod.tendons import Friction, lay
 
-SMALLEST = 1.0 / 1024  # of a load step; below, the march gives up
+SMALLEST_LOAD_PART = 1.0 / 1024  # of a load step; below, the march gives up
 
 
 class NoEquilibrium(RuntimeError):
@@ -117,7 +117,7 @@ class Standing:
             if not equilibrium(self.u, self.tension, Problem(mesh, now, step, friction), self.pose):
                 self.u[:], self.tension[:] = u_old, T_old
                 part *= 0.5
-                if part < SMALLEST:
+                if part < SMALLEST_LOAD_PART:
                     raise NoEquilibrium(f"no balance at drive {drive}, weight {weight}")
                 continue
             commit(friction, self.pose)

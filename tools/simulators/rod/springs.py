@@ -19,7 +19,7 @@ import numpy as np
 GF = 9.80665e-3  # N
 HEAT_LOSS = (1.484, 0.04956, 0.4973, -0.000294, 0.01563, 0.2379)  # mW/K: 1, x, y, x^2, x y, y^2
 FIRST_ELONGATION, FIRST_FORCE = 9.0, 0.7 / GF  # mm, gf
-NUDGE = 1e-7  # mm, for a slope
+SLOPE_STEP = 1e-7  # mm, for a slope
 
 
 @dataclass(frozen=True)
@@ -73,4 +73,4 @@ class Springs:
     def tangent(self, e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (gf) and its slope (gf/mm)."""
         s = self.pull(e)
-        return s, np.maximum((self.pull(e + NUDGE) - s) / NUDGE, 0.1)
+        return s, np.maximum((self.pull(e + SLOPE_STEP) - s) / SLOPE_STEP, 0.1)

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tools.simulators.second_rod.rod import NODES, STEPS
+from tools.simulators.second_rod.rod import PIECES_PER_INTERVAL, ROD_NODES
 
-WALL, POST = 1, 2
+WALL_OBSTACLE, POST_OBSTACLE = 1, 2
 ENVELOPE = 9e-3  # m: holes at 8 mm (nominal.md) and a rim of a millimetre
 HARDNESS = 3e3  # N/m per touching node: 0.1 N, much for this robot, dents by 0.03 mm
-ROUNDING = 1.5e-4  # m
+CONTACT_ROUNDING = 1.5e-4  # m
 
 
 class Obstacle(NamedTuple):
@@ -31,12 +31,12 @@ class Obstacle(NamedTuple):
     rounding: float  # m
 
 
-NONE = Obstacle(0, np.zeros(3), np.zeros(3), 0.0, HARDNESS, ROUNDING)
+NO_OBSTACLE = Obstacle(0, np.zeros(3), np.zeros(3), 0.0, HARDNESS, CONTACT_ROUNDING)
 
 
 def obstacle(kind: int, point: np.ndarray, direction: np.ndarray, radius: float = 0.0) -> Obstacle:
     """A wall, or a post of a radius in m, that the disks' rims meet."""
-    return Obstacle(kind, point, direction, radius + ENVELOPE, HARDNESS, ROUNDING)
+    return Obstacle(kind, point, direction, radius + ENVELOPE, HARDNESS, CONTACT_ROUNDING)
 
 
 @njit(cache=True)
@@ -46,14 +46,14 @@ def softplus(x):
 
 @njit(cache=True)
 def push(positions, obstacle, forces):
-    """Adds the obstacle's forces (NODES, 3) N, from the first disk on."""
+    """Adds the obstacle's forces (ROD_NODES, 3) N, from the first disk on."""
     normal = np.empty(3)
-    for node in range(STEPS, NODES, STEPS // 2):
+    for node in range(PIECES_PER_INTERVAL, ROD_NODES, PIECES_PER_INTERVAL // 2):
         ahead = 0.0
         for axis in range(3):
             normal[axis] = positions[node, axis] - obstacle.point[axis]
             ahead += normal[axis] * obstacle.direction[axis]
-        if obstacle.kind == WALL:
+        if obstacle.kind == WALL_OBSTACLE:
             distance = ahead
             normal[:] = obstacle.direction
         else:

@@ -12,15 +12,15 @@ from typing import Literal
 
 import numpy as np
 
-from tools.simulators.second_rod.motions import AGAIN, ALWAYS, KINDS, TOWARDS, Motion
+from tools.simulators.second_rod.motions import ALWAYS, MOTIONS, MOTIONS_REPEATED, TOWARDS, Motion
 from tools.simulators.second_rod.robot import Robot, built
 from tools.simulators.second_rod.rod import INTERVALS
 
 Array = np.ndarray
 Drive = Literal["tension", "displacement"]
 Want = Literal["pretension", "weights", "repeats over hours", "ambient temperature", "every marker"]
-GRAVITY = 9.81  # m/s^2
-HEAVIEST = {"upright": 5e-3, "sideways": 10e-3, "hanging": 20e-3}  # kg; more buckles or overloads the robot
+STANDARD_GRAVITY = 9.81  # m/s^2
+HEAVIEST_BY_MOUNT = {"upright": 5e-3, "sideways": 10e-3, "hanging": 20e-3}  # kg; more buckles or overloads the robot
 GENTLER = {"upright": 0.8, "sideways": 0.9, "hanging": 1.0}  # share of the tensions
 CORNER = 0.012  # share of the largest tension over which a command's corner at zero is rounded off
 SLACKENING = 0.08  # bend over which a tendon that is paid out gets its full slack
@@ -94,8 +94,12 @@ def displacements(motion: Motion, stroke: float, paid_out: float, slack: float) 
 def mountings(random: np.random.Generator, wants: frozenset[Want]) -> tuple[dict[str, Array], str, str]:
     """Gravity of each mounting, the set's mounting, and another for some trials (or the same)."""
     azimuth = np.deg2rad(random.choice([0.0, 30.0, 90.0, 180.0, 270.0]))
-    sideways = np.round(GRAVITY * np.array([np.cos(azimuth), np.sin(azimuth), 0]), 4) + 0.0  # no -0.0 in the files
-    gravities = {"hanging": np.array([0, 0, GRAVITY]), "upright": np.array([0, 0, -GRAVITY]), "sideways": sideways}
+    sideways = np.round(STANDARD_GRAVITY * np.array([np.cos(azimuth), np.sin(azimuth), 0]), 4) + 0.0  # no -0.0 in the files
+    gravities = {
+        "hanging": np.array([0, 0, STANDARD_GRAVITY]),
+        "upright": np.array([0, 0, -STANDARD_GRAVITY]),
+        "sideways": sideways,
+    }
     weighs = "weights" in wants
     mount = str(random.choice(["sideways", "hanging"], p=[0.6, 0.4]) if weighs else random.choice(list(gravities)))
     other = str(random.choice([name for name in gravities if name != mount]))
@@ -107,7 +111,7 @@ def sequence(random: np.random.Generator, wants: frozenset[Want]) -> tuple[list[
     number = int(random.integers(12, 18))
     repeats = random.random() < 0.69 or "repeats over hours" in wants
     again = 0 if not repeats else 2 if number > 13 else 1
-    kinds = [*ALWAYS, *(str(kind) for kind in random.choice(AGAIN, number - again - len(ALWAYS)))]
+    kinds = [*ALWAYS, *(str(kind) for kind in random.choice(MOTIONS_REPEATED, number - again - len(ALWAYS)))]
     random.shuffle(kinds)
     early = [int(random.integers(0, 3)), int(random.integers(3, 6))]
     return kinds, early[:again]
@@ -123,9 +127,9 @@ def draw_day(random: np.random.Generator, drive: Drive, wants: frozenset[Want] =
     kinds, again = sequence(random, wants)
     run: list[Trial] = []
     for number, kind in enumerate(kinds):
-        motion = KINDS[kind](random)
+        motion = MOTIONS[kind](random)
         place = other if random.random() < 0.4 else mount
-        payload = min(float(random.choice(payloads)), HEAVIEST[place])
+        payload = min(float(random.choice(payloads)), HEAVIEST_BY_MOUNT[place])
         gentler = GENTLER[place] - (0.1 if place == "upright" and payload > 0 else 0.0)
         name = f"{kind}_{1 + kinds[:number].count(kind)}"
         times = np.round(np.linspace(0, motion.duration, motion.rows + 1), 4)

@@ -10,16 +10,16 @@ from numba import njit
 from tools.simulators.second_rod.contact import Obstacle, push
 from tools.simulators.second_rod.fields import Jet, Magnet, blow, repel
 from tools.simulators.second_rod.loom import SLIDERS, Loom, drag
-from tools.simulators.second_rod.rod import INTERVALS, NODES, STEPS, Rod, cross, imbalance, shape
-from tools.simulators.second_rod.tendons import TENDONS, Tendons, pull, segments, tensions
+from tools.simulators.second_rod.rod import INTERVALS, PIECES_PER_INTERVAL, ROD_NODES, Rod, cross, imbalance, shape
+from tools.simulators.second_rod.tendons import ROD_TENDONS, Tendons, pull, segments, tensions
 
 BALANCED = 2e-9  # N m, norm over q; EI / L is 1.3e-2 N m, so the shape is exact to 1e-6 rad
 NEARLY_BALANCED = 1e-7  # N m: accepted where a corner (slack, a reversal) stops Newton short
-NEWTON_STEPS = 60
+ROD_NEWTON_STEPS = 60
 STALLS = 6  # steps taken without descent, across a corner, before giving up
 LARGEST_STEP = 0.5  # rad, of any coefficient in one step
 DIFFERENCE = 3e-8  # rad, for the Jacobian by differences: a tendon just going slack changes stiffness within 1e-5 rad
-HALVINGS = 6  # of a step of the loads that does not converge
+STEP_HALVINGS = 6  # of a step of the loads that does not converge
 
 
 class Model(NamedTuple):
@@ -38,7 +38,7 @@ class Model(NamedTuple):
 class Loads(NamedTuple):
     """What acts from outside."""
 
-    drive: np.ndarray  # (TENDONS,) N, or m pulled in
+    drive: np.ndarray  # (ROD_TENDONS,) N, or m pulled in
     gravity: np.ndarray  # (3,) m/s^2
     payload: float  # kg at the tip disk
 
@@ -46,8 +46,8 @@ class Loads(NamedTuple):
 class Memory(NamedTuple):
     """What the robot remembers from one equilibrium to the next."""
 
-    mobilised: np.ndarray  # (TENDONS, INTERVALS) friction's z
-    beyond: np.ndarray  # (TENDONS, INTERVALS) tendon length beyond each hole, m
+    mobilised: np.ndarray  # (ROD_TENDONS, INTERVALS) friction's z
+    beyond: np.ndarray  # (ROD_TENDONS, INTERVALS) tendon length beyond each hole, m
     anchors: np.ndarray  # (SLIDERS, 3) m
 
 
@@ -63,26 +63,26 @@ class Problem(NamedTuple):
 
 def empty_memory() -> Memory:
     """Return a memory of nothing, to be filled."""
-    return Memory(np.zeros((TENDONS, INTERVALS)), np.zeros((TENDONS, INTERVALS)), np.zeros((SLIDERS, 3)))
+    return Memory(np.zeros((ROD_TENDONS, INTERVALS)), np.zeros((ROD_TENDONS, INTERVALS)), np.zeros((SLIDERS, 3)))
 
 
 @njit(cache=True)
 def residual(coefficients, problem, after):
-    """Return the imbalance (3 n) N m, and tensions (TENDONS,) N at the load cells; what is remembered goes into `after`."""
+    """Return the imbalance (3 n) N m, and tensions (ROD_TENDONS,) N at the load cells; what is remembered goes into `after`."""
     model, rest, stiffness, loads, memory = problem
     pose = shape(coefficients, model.rod)
     rotations, positions = pose.rotations, pose.positions
     directions, lengths = segments(rotations, positions, model.tendons.holes)
     along, base = tensions(directions, lengths, loads.drive, model.tendons, memory, after)
-    forces, moments = np.zeros((NODES, 3)), np.zeros((NODES, 3))
+    forces, moments = np.zeros((ROD_NODES, 3)), np.zeros((ROD_NODES, 3))
     pull(rotations, directions, along, model.tendons.holes, forces, moments)
-    tip = NODES - 1
+    tip = ROD_NODES - 1
     at_tip = loads.payload + model.outboard[0] + model.loom.mass
     for axis in range(3):
-        for node in range(0, NODES, 2):
+        for node in range(0, ROD_NODES, 2):
             forces[node, axis] += model.rod.masses[node] * loads.gravity[axis]
         for disk in range(INTERVALS):
-            forces[(disk + 1) * STEPS, axis] += model.disk_masses[disk] * loads.gravity[axis]
+            forces[(disk + 1) * PIECES_PER_INTERVAL, axis] += model.disk_masses[disk] * loads.gravity[axis]
         forces[tip, axis] += at_tip * loads.gravity[axis]
     lever = cross(rotations[tip, :, 2], loads.gravity)
     for axis in range(3):
@@ -129,7 +129,7 @@ def solve(coefficients, problem, after, inverse, known):
     """
     value, _ = residual(coefficients, problem, after)
     error, fresh, stalls = norm(value), False, 0
-    for _ in range(NEWTON_STEPS):
+    for _ in range(ROD_NEWTON_STEPS):
         if error < BALANCED:
             break
         if not known:
@@ -171,7 +171,7 @@ class Equilibrium:
         self.model = model
         self.rest = np.zeros(size)
         self.coefficients = np.zeros(size)
-        self.tensions = np.zeros(TENDONS)
+        self.tensions = np.zeros(ROD_TENDONS)
         self.failures = 0
         self.memory = empty_memory()
         self.memory.anchors[:, 2] = model.rod.length
@@ -179,17 +179,17 @@ class Equilibrium:
         _, lengths = segments(rotations, positions, model.tendons.holes)
         self.memory.beyond[:] = np.cumsum(lengths[:, ::-1], axis=1)[:, ::-1]
         self._inverse, self._known = np.eye(size), False
-        self._last = Loads(np.zeros(TENDONS), np.zeros(3), 0.0)
+        self._last = Loads(np.zeros(ROD_TENDONS), np.zeros(3), 0.0)
 
     def start(self, loads: Loads, stiffness: float, steps: int) -> None:
         """Gravity and payload first, then the drive, in so many steps (nominal.md: applied slowly)."""
-        idle = np.zeros(TENDONS)
+        idle = np.zeros(ROD_TENDONS)
         for share in np.linspace(0, 1, 5)[1:]:
             self.step(Loads(idle, share * loads.gravity, share * loads.payload), stiffness)
         for share in np.linspace(0, 1, steps + 1)[1:]:
             self.step(loads._replace(drive=share * loads.drive), stiffness)
 
-    def step(self, loads: Loads, stiffness: float, halvings: int = HALVINGS) -> None:
+    def step(self, loads: Loads, stiffness: float, halvings: int = STEP_HALVINGS) -> None:
         """To the equilibrium under new loads; by halves where Newton does not get there at once."""
         after = empty_memory()
         problem = Problem(self.model, self.rest, stiffness, loads, self.memory)
@@ -209,10 +209,10 @@ class Equilibrium:
     def disks(self) -> tuple[np.ndarray, np.ndarray]:
         """Centres (INTERVALS, 3) m of the disks and their axes (INTERVALS, 3)."""
         rotations, positions, _, _ = shape(self.coefficients, self.model.rod)
-        return positions[STEPS::STEPS], rotations[STEPS::STEPS, :, 2]
+        return positions[PIECES_PER_INTERVAL::PIECES_PER_INTERVAL], rotations[PIECES_PER_INTERVAL::PIECES_PER_INTERVAL, :, 2]
 
     def pulled_in(self) -> np.ndarray:
-        """(TENDONS,) rest path length - path length, m."""
+        """(ROD_TENDONS,) rest path length - path length, m."""
         rotations, positions, _, _ = shape(self.coefficients, self.model.rod)
         _, lengths = segments(rotations, positions, self.model.tendons.holes)
         return self.model.tendons.rest_lengths - lengths.sum(1)

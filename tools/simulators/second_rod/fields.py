@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tools.simulators.second_rod.rod import INTERVALS, STEPS
+from tools.simulators.second_rod.rod import INTERVALS, PIECES_PER_INTERVAL
 
 
 class Magnet(NamedTuple):
@@ -50,7 +50,7 @@ def blow(rotations, positions, jet, forces):
     With c the cosine between jet and disk axis: F = q / 2 ((e + (1 - e) c^2) d + c |c| n), q = drag exp(-rho^2 / 2 w^2).
     """
     for disk in range(1, INTERVALS + 1):
-        node = disk * STEPS
+        node = disk * PIECES_PER_INTERVAL
         ahead, square, cosine = 0.0, 0.0, 0.0
         for axis in range(3):
             ahead += (positions[node, axis] - jet.origin[axis]) * jet.direction[axis]

@@ -22,7 +22,7 @@ class Loom(NamedTuple):
     mass: float  # carried by the tip, kg
 
 
-NONE = Loom(np.zeros(SLIDERS), np.ones(SLIDERS), 0.0)
+NO_LOOM = Loom(np.zeros(SLIDERS), np.ones(SLIDERS), 0.0)
 
 
 @njit(cache=True)

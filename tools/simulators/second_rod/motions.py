@@ -171,9 +171,9 @@ def hold(random: np.random.Generator) -> Motion:
     return Motion(held + straight + 40, int(random.integers(95, 150)), bend)
 
 
-KINDS: dict[str, Callable[[np.random.Generator], Motion]] = {
+MOTIONS: dict[str, Callable[[np.random.Generator], Motion]] = {
     "single": single, "loops": loops, "circle": circle, "sines": sines, "quick": quick, "steps": steps, "poses": poses,
     "hold": hold, "between": between, "line": line, "spiral": spiral,
 }  # fmt: skip
 ALWAYS = ("single", "loops", "circle", "sines", "quick", "steps", "poses", "hold", "between")
-AGAIN = tuple(kind for kind in KINDS if kind != "hold")  # a second hold would make a day of holds
+MOTIONS_REPEATED = tuple(kind for kind in MOTIONS if kind != "hold")  # a second hold would make a day of holds

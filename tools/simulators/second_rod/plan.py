@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.simulators.second_rod.day import Drive
-from tools.simulators.second_rod.effects import KINDS, KNOWN, ODD
+from tools.simulators.second_rod.effects import CATALOGUE_KINDS, EFFECT_KINDS, ODD_KINDS
 
-BLOCK, NONE, ONE, PAIRS, STRANGE = 30, 4, 16, 5, 5
+DAYS_PER_PLAN, DAYS_WITHOUT, DAYS_WITH_ONE, DAYS_WITH_PAIR, DAYS_WITH_ODD = 30, 4, 16, 5, 5
 BY_DISPLACEMENT = 10
 OTHERS_LOGGED = 1 / 3  # share of days whose other tendon quantity is logged too
-SMALLEST, LARGEST = 1.0, 8.0  # marker noises; half the effects are spread over this in equal ratios
+SMALLEST_SIZE, LARGEST_SIZE = 1.0, 8.0  # marker noises; half the effects are spread over this in equal ratios
 USUAL = (2.5, 3.5)  # the other half
 # two of one group in one day would be much the same thing twice, or hide each other
-ALIKE = (
+SIMILAR_KINDS = (
     {"delay", "lag", "saturation"}, {"gain", "bias", "drift", "crosstalk"}, {"asymmetry", "gradient"}, {"tilt", "payload"},
     {"wall", "post"}, {"backlash", "elasticity", "drum"}, {"temperature", "ageing", "creep"}, {"tilt", "camera", "precurvature"},
     {"routing", "asymmetry"},
@@ -57,15 +57,15 @@ class Pack:
 
 
 def may_pair(one: str, other: str) -> bool:
-    together = one != other and not any({one, other} <= group for group in ALIKE)
-    return together and bool(KINDS[one].drives & KINDS[other].drives)
+    together = one != other and not any({one, other} <= group for group in SIMILAR_KINDS)
+    return together and bool(EFFECT_KINDS[one].drives & EFFECT_KINDS[other].drives)
 
 
 def drives(kinds: tuple[str, ...]) -> frozenset[Drive]:
     """The drives on which all of these show."""
     both: frozenset[Drive] = frozenset({"tension", "displacement"})
     for kind in kinds:
-        both &= KINDS[kind].drives
+        both &= EFFECT_KINDS[kind].drives
     return both
 
 
@@ -73,28 +73,28 @@ def spread(random: np.random.Generator, number: int) -> list[float]:
     """Sizes of so many effects, shuffled: half of them usual, the others in equal ratios from the smallest to the largest."""
     usual = number - number // 2
     steps = (np.arange(number - usual) + random.uniform(size=number - usual)) / max(number - usual, 1)
-    sizes = np.concatenate([random.uniform(*USUAL, usual), SMALLEST * (LARGEST / SMALLEST) ** steps])
+    sizes = np.concatenate([random.uniform(*USUAL, usual), SMALLEST_SIZE * (LARGEST_SIZE / SMALLEST_SIZE) ** steps])
     random.shuffle(sizes)
     return [float(size) for size in sizes]
 
 
 def block(random: np.random.Generator, first: int) -> list[Planned]:
     """Thirty days, numbered from `first`."""
-    known, odd = Pack(list(KNOWN), random), Pack(list(ODD), random)
-    days: list[tuple[str, ...]] = [()] * NONE
-    for _ in range(PAIRS):
+    known, odd = Pack(list(CATALOGUE_KINDS), random), Pack(list(ODD_KINDS), random)
+    days: list[tuple[str, ...]] = [()] * DAYS_WITHOUT
+    for _ in range(DAYS_WITH_PAIR):
         one = known.deal()
         days.append((one, known.deal(beside=one)))
-    days += [(known.deal(),) for _ in range(ONE)]
-    days += [(odd.deal(),) for _ in range(STRANGE)]
-    days = [days[n] for n in random.permutation(BLOCK)]
+    days += [(known.deal(),) for _ in range(DAYS_WITH_ONE)]
+    days += [(odd.deal(),) for _ in range(DAYS_WITH_ODD)]
+    days = [days[n] for n in random.permutation(DAYS_PER_PLAN)]
     able = [drives(kinds) for kinds in days]
-    chosen = [n for n in range(BLOCK) if able[n] == {"displacement"}]
-    either = [n for n in range(BLOCK) if len(able[n]) == 2]
+    chosen = [n for n in range(DAYS_PER_PLAN) if able[n] == {"displacement"}]
+    either = [n for n in range(DAYS_PER_PLAN) if len(able[n]) == 2]
     more = min(len(either), max(BY_DISPLACEMENT - len(chosen), 0))
     chosen += [int(n) for n in random.choice(either, more, replace=False)]
     # a delay between inputs and markers leaves open which of them a second tendon quantity goes with
-    others = [n for n in range(BLOCK) if "delay" not in days[n] and random.random() < OTHERS_LOGGED]
+    others = [n for n in range(DAYS_PER_PLAN) if "delay" not in days[n] and random.random() < OTHERS_LOGGED]
     sizes = spread(random, sum(len(kinds) for kinds in days))
     return [
         Planned(

@@ -16,7 +16,7 @@ YOUNGS_MODULUS = 77.59e9  # Pa
 POISSON_RATIO = 0.33
 BACKBONE_RADIUS = 0.4e-3  # m
 BACKBONE_MASS = 0.6e-3  # kg
-LENGTH = 0.12  # m
+ROD_LENGTH = 0.12  # m
 DISK_MASS = 0.63e-3  # kg
 HOLE_RADIUS = 8e-3  # m
 TENDON_ANGLES = np.deg2rad([0.0, 120.0, 240.0])
@@ -37,7 +37,7 @@ class Robot:
 
     youngs_modulus: float = YOUNGS_MODULUS
     poisson_ratio: float = POISSON_RATIO
-    disk_positions: Array = field(default_factory=lambda: LENGTH / INTERVALS * np.arange(1, INTERVALS + 1))  # (INTERVALS,)
+    disk_positions: Array = field(default_factory=lambda: ROD_LENGTH / INTERVALS * np.arange(1, INTERVALS + 1))  # (INTERVALS,)
     backbone_mass: float = BACKBONE_MASS
     backbone_taper: float = 0.0  # radius at the tip over that at the base, less one
     disk_mass: float = DISK_MASS
@@ -53,10 +53,10 @@ class Robot:
     asymmetry: tuple[float, float] = (0.0, 0.0)
     stiffness_profile: Callable[[Array], Array] = np.ones_like
     outboard: tuple[float, float] = (0.0, 0.0)
-    obstacle: contact.Obstacle = contact.NONE
+    obstacle: contact.Obstacle = contact.NO_OBSTACLE
     magnet: fields.Magnet = fields.NO_MAGNET
     jet: fields.Jet = fields.NO_JET
-    loom: loom.Loom = loom.NONE
+    loom: loom.Loom = loom.NO_LOOM
 
     def holes(self) -> Array:
         """(TENDONS, INTERVALS + 1, 2) in each plate's plane, base plate first, m."""
@@ -95,7 +95,7 @@ def within(random: np.random.Generator, deviation: float, limit: float) -> float
 def built(random: np.random.Generator) -> Robot:
     """A robot within nominal.md's tolerances: E, holes, disks' mass and places, markers along their disks' axes, radius taper."""
     spacing = 1 + np.clip(random.normal(0, 0.01, INTERVALS), -0.02, 0.02)
-    length = LENGTH * (1 + within(random, 0.0006, 0.001))
+    length = ROD_LENGTH * (1 + within(random, 0.0006, 0.001))
     return Robot(
         youngs_modulus=YOUNGS_MODULUS * (1 + within(random, 0.05, 0.1)),
         poisson_ratio=POISSON_RATIO + within(random, 0.01, 0.03),

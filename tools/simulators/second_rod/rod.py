@@ -2,10 +2,10 @@
 
     u(s) = (1 / L) sum_k P_k(2 s / L - 1) q_k,   R' = R hat(u),   r' = R e_3
 
-q (3 n): coefficients of the curvature about x, y and z of the material frame, rad. Rotations are exact over each of STEPS pieces of
-a disk interval with the curvature at its middle; positions follow by Simpson's rule over pairs of pieces. The residual of virtual
-work is the exact derivative of this discrete rod, so that Newton ends where the discrete energy is stationary.
-Bending and twist: physics.md 1.2, stretch and shear left out as there.
+q (3 n): coefficients of the curvature about x, y and z of the material frame, rad. Rotations are exact over each of
+PIECES_PER_INTERVAL pieces of a disk interval with the curvature at its middle; positions follow by Simpson's rule over pairs of
+pieces. The residual of virtual work is the exact derivative of this discrete rod, so that Newton ends where the discrete energy is
+stationary. Bending and twist: physics.md 1.2, stretch and shear left out as there.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit
 
 INTERVALS = 8  # between disks, the first from the base (nominal.md)
-STEPS = 4  # pieces of constant curvature per interval; even, for Simpson's rule
-PIECES = INTERVALS * STEPS
-NODES = PIECES + 1
+PIECES_PER_INTERVAL = 4  # pieces of constant curvature per interval; even, for Simpson's rule
+ROD_PIECES = INTERVALS * PIECES_PER_INTERVAL
+ROD_NODES = ROD_PIECES + 1
 SMALL_TURN = 1e-4  # rad; below, series of sin and cos to second order are exact to 1e-17
 
 
@@ -26,28 +26,28 @@ class Rod(NamedTuple):
     """What the compiled functions need of a backbone; SI units."""
 
     length: float  # m
-    steps: np.ndarray  # (PIECES,) m
-    basis: np.ndarray  # (PIECES, n) P_k at the middle of each piece
-    bending: np.ndarray  # (PIECES, 3) stiffness xx, xy, yy, N m^2
-    twisting: np.ndarray  # (PIECES,) N m^2
-    masses: np.ndarray  # (NODES,) of the backbone alone, kg, on even nodes
+    steps: np.ndarray  # (ROD_PIECES,) m
+    basis: np.ndarray  # (ROD_PIECES, n) P_k at the middle of each piece
+    bending: np.ndarray  # (ROD_PIECES, 3) stiffness xx, xy, yy, N m^2
+    twisting: np.ndarray  # (ROD_PIECES,) N m^2
+    masses: np.ndarray  # (ROD_NODES,) of the backbone alone, kg, on even nodes
 
 
 class Pose(NamedTuple):
     """Where curvatures put the rod."""
 
-    rotations: np.ndarray  # (NODES, 3, 3)
-    positions: np.ndarray  # (NODES, 3) m
-    curvatures: np.ndarray  # (PIECES, 3) 1/m
-    tangents: np.ndarray  # (PIECES, 3, 3), see `turned`
+    rotations: np.ndarray  # (ROD_NODES, 3, 3)
+    positions: np.ndarray  # (ROD_NODES, 3) m
+    curvatures: np.ndarray  # (ROD_PIECES, 3) 1/m
+    tangents: np.ndarray  # (ROD_PIECES, 3, 3), see `turned`
 
 
 def make_rod(disk_positions: np.ndarray, functions: int, bending: np.ndarray, twisting: np.ndarray, mass: float) -> Rod:
     """Disk positions (INTERVALS,) m along the backbone, the last at the tip; stiffnesses at `middles`; mass in kg."""
     length = float(disk_positions[-1])
-    steps = np.repeat(np.diff(disk_positions, prepend=0.0) / STEPS, STEPS)
+    steps = np.repeat(np.diff(disk_positions, prepend=0.0) / PIECES_PER_INTERVAL, PIECES_PER_INTERVAL)
     basis = np.polynomial.legendre.legvander(2 * middles(disk_positions) / length - 1, functions - 1)
-    masses = np.zeros(NODES)
+    masses = np.zeros(ROD_NODES)
     pair = mass * steps.reshape(-1, 2).sum(1) / length
     masses[0:-1:2] += pair / 2
     masses[2::2] += pair / 2
@@ -55,8 +55,8 @@ def make_rod(disk_positions: np.ndarray, functions: int, bending: np.ndarray, tw
 
 
 def middles(disk_positions: np.ndarray) -> np.ndarray:
-    """(PIECES,) arc length at the middle of each piece, m."""
-    steps = np.repeat(np.diff(disk_positions, prepend=0.0) / STEPS, STEPS)
+    """(ROD_PIECES,) arc length at the middle of each piece, m."""
+    steps = np.repeat(np.diff(disk_positions, prepend=0.0) / PIECES_PER_INTERVAL, PIECES_PER_INTERVAL)
     return np.cumsum(steps) - steps / 2
 
 
@@ -94,12 +94,12 @@ def turned(turn, rotation, after, tangent):
 def shape(coefficients, rod):
     """Return the pose of coefficients q (3 n)."""
     n = rod.basis.shape[1]
-    rotations, positions = np.zeros((NODES, 3, 3)), np.zeros((NODES, 3))
-    curvatures, tangents = np.empty((PIECES, 3)), np.empty((PIECES, 3, 3))
+    rotations, positions = np.zeros((ROD_NODES, 3, 3)), np.zeros((ROD_NODES, 3))
+    curvatures, tangents = np.empty((ROD_PIECES, 3)), np.empty((ROD_PIECES, 3, 3))
     turn = np.empty(3)
     for axis in range(3):
         rotations[0, axis, axis] = 1.0
-    for piece in range(PIECES):
+    for piece in range(ROD_PIECES):
         for axis in range(3):
             bend = 0.0
             for k in range(n):
@@ -107,7 +107,7 @@ def shape(coefficients, rod):
             curvatures[piece, axis] = bend / rod.length
             turn[axis] = curvatures[piece, axis] * rod.steps[piece]
         turned(turn, rotations[piece], rotations[piece + 1], tangents[piece])
-    for node in range(0, NODES - 1, 2):
+    for node in range(0, ROD_NODES - 1, 2):
         step = rod.steps[node]
         for axis in range(3):
             first, second, third = rotations[node, axis, 2], rotations[node + 1, axis, 2], rotations[node + 2, axis, 2]
@@ -120,13 +120,13 @@ def shape(coefficients, rod):
 def imbalance(rest, stiffness, rod, pose, forces, moments):
     """Derivative of bending energy minus work of the loads with respect to q (3 n), N m.
 
-    rest (3 n): q without stress. stiffness: factor on the rod's stiffnesses. forces (NODES, 3) N on even nodes and moments
-    (NODES, 3) N m, base frame; the moments are used up.
+    rest (3 n): q without stress. stiffness: factor on the rod's stiffnesses. forces (ROD_NODES, 3) N on even nodes and moments
+    (ROD_NODES, 3) N m, base frame; the moments are used up.
     """
     rotations, curvatures, tangents = pose.rotations, pose.curvatures, pose.tangents
     n = rod.basis.shape[1]
     beyond = np.zeros(3)  # force on all that lies beyond a node
-    for node in range(NODES - 3, -1, -2):
+    for node in range(ROD_NODES - 3, -1, -2):
         step = rod.steps[node]
         for axis in range(3):
             beyond[axis] += forces[node + 2, axis]
@@ -136,7 +136,7 @@ def imbalance(rest, stiffness, rod, pose, forces, moments):
                 moments[place, axis] += weight * step / 3 * lever[axis]
     out = np.zeros(3 * n)
     total, local, strain, inner = np.zeros(3), np.empty(3), np.empty(3), np.empty(3)
-    for piece in range(PIECES - 1, -1, -1):
+    for piece in range(ROD_PIECES - 1, -1, -1):
         for axis in range(3):
             total[axis] += moments[piece + 1, axis]
         rotation, tangent = rotations[piece], tangents[piece]

@@ -13,12 +13,12 @@ from tools.simulators.second_rod.effects import Effect
 from tools.simulators.second_rod.effects.effect import Backbone, Markers
 from tools.simulators.second_rod.equilibrium import Equilibrium, Loads, Model
 from tools.simulators.second_rod.rod import INTERVALS
-from tools.simulators.second_rod.tendons import TENDONS
+from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 Array = np.ndarray
 SETTLING = 1.5  # s from the slow start of a trial to its first row
 DRIVE_STEP = 0.01  # s, for what happens between command and delivery; a tenth of a row where rows are closer
-RAMP = 6  # steps in which a trial's first drive is applied; twice as many where the path counts
+FIRST_DRIVE_STEPS = 6  # steps in which a trial's first drive is applied; twice as many where the path counts
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class Run:
 
     positions: Array  # (rows, INTERVALS, 3) m, as the camera sees them
     axes: Array  # (rows, INTERVALS, 3)
-    inputs: Array  # (rows, TENDONS) as logged, N or m
-    others: Array  # (rows, TENDONS) the quantity that does not drive, as logged
+    inputs: Array  # (rows, ROD_TENDONS) as logged, N or m
+    others: Array  # (rows, ROD_TENDONS) the quantity that does not drive, as logged
     failures: int  # equilibria not found
 
 
@@ -37,7 +37,7 @@ def staged(effects: Sequence[Effect]) -> list[Effect]:
 
 
 def delivered(trial: Trial, times: Array, day: Day, effects: Sequence[Effect]) -> Array:
-    """(n, TENDONS) what the drive brings to the tendons at times of a trial, N or m."""
+    """(n, ROD_TENDONS) what the drive brings to the tendons at times of a trial, N or m."""
     changing = [effect for effect in staged(effects) if type(effect).delivered is not Effect.delivered]
     if not changing:
         return trial.command(times)
@@ -46,11 +46,11 @@ def delivered(trial: Trial, times: Array, day: Day, effects: Sequence[Effect]) -
     command = trial.command(fine)
     for effect in changing:
         command = effect.delivered(command, step, day)
-    return np.column_stack([np.interp(times, fine, command[:, tendon]) for tendon in range(TENDONS)])
+    return np.column_stack([np.interp(times, fine, command[:, tendon]) for tendon in range(ROD_TENDONS)])
 
 
 def read(tension: Array, clock: Array, day: Day, effects: Sequence[Effect]) -> Array:
-    """(n, TENDONS) N the load cells show."""
+    """(n, ROD_TENDONS) N the load cells show."""
     for effect in staged(effects):
         tension = effect.read(tension, clock / day.duration)
     return tension
@@ -60,7 +60,7 @@ class Path(NamedTuple):
     """What the drive brings to the tendons during a trial, and at how many steps to the row."""
 
     times: Array  # (n,) s
-    drive: Array  # (n, TENDONS) N, or m
+    drive: Array  # (n, ROD_TENDONS) N, or m
     every: int
 
 
@@ -81,7 +81,7 @@ def follow(
         for state in backbone:
             state.spend(seconds, at.coefficients - at.rest, at.coefficients - before)
 
-    at.start(Loads(drive[0], gravity, trial.payload), adapt(0.0), 2 * RAMP if history else RAMP)
+    at.start(Loads(drive[0], gravity, trial.payload), adapt(0.0), 2 * FIRST_DRIVE_STEPS if history else FIRST_DRIVE_STEPS)
     spend(SETTLING, at.coefficients)
     shapes, axes, tensions, pulled = [], [], [], []
     for row, time in enumerate(times):
@@ -100,7 +100,7 @@ def follow(
 def simulate(
     day: Day, effects: Sequence[Effect] = (), rows: Sequence[Array] | None = None, inputs: Sequence[Array] | None = None
 ) -> list[Run]:
-    """The day's trials. rows: of each trial, where not all are needed; inputs: (rows, TENDONS) each, that drive in place of the
+    """The day's trials. rows: of each trial, where not all are needed; inputs: (rows, ROD_TENDONS) each, that drive in place of the
     commands. A robot that remembers nothing needs no rows but those asked for.
     """
     every = max([1, *(effect.between_rows for effect in effects)])

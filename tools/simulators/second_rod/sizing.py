@@ -18,10 +18,10 @@ from tools.simulators.second_rod.rod import INTERVALS
 from tools.simulators.second_rod.simulate import Run, simulate, without_effects
 
 Array = np.ndarray
-ROWS = 25  # of each trial, where a robot that remembers nothing is sized
-CLOSE = 0.12  # of the size asked for
+ROWS_SIZED = 25  # of each trial, where a robot that remembers nothing is sized
+SIZE_ERROR = 0.12  # of the size asked for
 FAIR = 0.35  # |log| of the ratio beyond which numbers are drawn anew: a direction that shows nothing
-TRIES, DRAWS = 9, 4
+SIZING_TRIES, SIZING_DRAWS = 9, 4
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Sizer:
 
     def __init__(self, day: Day) -> None:
         self.day = day
-        self.rows = [np.unique(np.linspace(0, trial.times.size - 1, ROWS).astype(int)) for trial in day.trials]
+        self.rows = [np.unique(np.linspace(0, trial.times.size - 1, ROWS_SIZED).astype(int)) for trial in day.trials]
         self.seen = np.array(day.markers) - 1
         robot = day.robot
         plain = simulate(day, rows=self.rows)
@@ -84,13 +84,13 @@ class Sizer:
         factor, best = min(1.0, 0.9 * limit), None
         below: tuple[float, float] | None = None  # factor and size
         above: tuple[float, float] | None = None
-        for _ in range(TRIES):
+        for _ in range(SIZING_TRIES):
             tried = effect.scaled(factor)
             size = self.of(tried)
             reached = max(size.after_refit, 1e-6)
             if best is None or abs(np.log(reached / target)) < abs(np.log(best[1].after_refit / target)):
                 best = tried, replace(size, after_refit=reached)
-            if abs(reached / target - 1) < CLOSE or (reached < target and factor > 0.999 * limit):
+            if abs(reached / target - 1) < SIZE_ERROR or (reached < target and factor > 0.999 * limit):
                 break
             if reached < target:
                 below = factor, reached
@@ -117,7 +117,7 @@ class Sizer:
             return abs(float(np.log(found[1].after_refit / target)))
 
         found = []
-        for _ in range(DRAWS):
+        for _ in range(SIZING_DRAWS):
             found.append(self.scaled(kind.draw(random, self.day), target))
             if miss(found[-1]) < FAIR and found[-1][1].failures == 0:
                 break

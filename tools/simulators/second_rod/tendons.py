@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tools.simulators.second_rod.rod import INTERVALS, STEPS, cross
+from tools.simulators.second_rod.rod import INTERVALS, PIECES_PER_INTERVAL, cross
 
-TENDONS = 3
+ROD_TENDONS = 3
 SLACK_ROUNDING = 0.02  # N: a tendon that just goes slack keeps half of this; below the noise of a load cell
 REVERSAL = 1e-7  # m: travel over which a reversal at a hole is rounded off, far below any delta
 
@@ -26,8 +26,8 @@ REVERSAL = 1e-7  # m: travel over which a reversal at a hole is rounded off, far
 class Tendons(NamedTuple):
     """What the compiled functions need of the tendons; SI units."""
 
-    holes: np.ndarray  # (TENDONS, INTERVALS + 1, 2) in each plate's plane, base plate first, m
-    rest_lengths: np.ndarray  # (TENDONS,) from base hole to tip hole on the straight robot, m
+    holes: np.ndarray  # (ROD_TENDONS, INTERVALS + 1, 2) in each plate's plane, base plate first, m
+    rest_lengths: np.ndarray  # (ROD_TENDONS,) from base hole to tip hole on the straight robot, m
     by_displacement: bool  # the drive is a length, else a tension
     compliance: float  # of the drive and tendon, m/N; only with a drive by displacement
     stiffening: float  # 1/m, T = stretch (1 + stiffening stretch) / compliance
@@ -37,19 +37,19 @@ class Tendons(NamedTuple):
 
 
 def rest_lengths(holes: np.ndarray, disk_positions: np.ndarray) -> np.ndarray:
-    """(TENDONS, INTERVALS) length of each segment on the straight robot, m."""
+    """(ROD_TENDONS, INTERVALS) length of each segment on the straight robot, m."""
     along = np.diff(disk_positions, prepend=0.0)
     return np.sqrt(along**2 + np.sum(np.diff(holes, axis=1) ** 2, axis=2))
 
 
 @njit(cache=True)
 def segments(rotations, positions, holes):
-    """Unit vectors (TENDONS, INTERVALS, 3), base to tip, and lengths (TENDONS, INTERVALS) m."""
-    directions, lengths = np.empty((TENDONS, INTERVALS, 3)), np.empty((TENDONS, INTERVALS))
+    """Unit vectors (ROD_TENDONS, INTERVALS, 3), base to tip, and lengths (ROD_TENDONS, INTERVALS) m."""
+    directions, lengths = np.empty((ROD_TENDONS, INTERVALS, 3)), np.empty((ROD_TENDONS, INTERVALS))
     before, after = np.empty(3), np.empty(3)
-    for tendon in range(TENDONS):
+    for tendon in range(ROD_TENDONS):
         for plate in range(INTERVALS + 1):
-            node, x, y = plate * STEPS, holes[tendon, plate, 0], holes[tendon, plate, 1]
+            node, x, y = plate * PIECES_PER_INTERVAL, holes[tendon, plate, 0], holes[tendon, plate, 1]
             for axis in range(3):
                 after[axis] = positions[node, axis] + rotations[node, axis, 0] * x + rotations[node, axis, 1] * y
             if plate > 0:
@@ -100,14 +100,14 @@ def wrap(before, after):
 
 @njit(cache=True)
 def tensions(directions, lengths, drive, tendons, memory, after):
-    """Return the tension (TENDONS, INTERVALS) N of each segment, and that at the load cells (TENDONS,).
+    """Return the tension (ROD_TENDONS, INTERVALS) N of each segment, and that at the load cells (ROD_TENDONS,).
 
-    The memory's mobilised and beyond (TENDONS, INTERVALS) are z at each hole and the tendon length beyond it, m, at the last
+    The memory's mobilised and beyond (ROD_TENDONS, INTERVALS) are z at each hole and the tendon length beyond it, m, at the last
     equilibrium; what they become is written into `after`.
     """
-    along, base = np.empty((TENDONS, INTERVALS)), np.empty(TENDONS)
+    along, base = np.empty((ROD_TENDONS, INTERVALS)), np.empty(ROD_TENDONS)
     axis_of_base = np.array([0.0, 0.0, 1.0])
-    for tendon in range(TENDONS):
+    for tendon in range(ROD_TENDONS):
         left = np.sum(lengths[tendon])
         tension = base_tension(drive[tendon], left, tendons.rest_lengths[tendon], tendons)
         base[tendon] = tension
@@ -129,9 +129,9 @@ def tensions(directions, lengths, drive, tendons, memory, after):
 def pull(rotations, directions, along, holes, forces, moments):
     """Adds what the tendons do to each disk: forces (NODES, 3) N, moments (NODES, 3) N m about the backbone."""
     force, lever = np.empty(3), np.empty(3)
-    for tendon in range(TENDONS):
+    for tendon in range(ROD_TENDONS):
         for plate in range(1, INTERVALS + 1):
-            node, x, y = plate * STEPS, holes[tendon, plate, 0], holes[tendon, plate, 1]
+            node, x, y = plate * PIECES_PER_INTERVAL, holes[tendon, plate, 0], holes[tendon, plate, 1]
             for axis in range(3):
                 force[axis] = -along[tendon, plate - 1] * directions[tendon, plate - 1, axis]
                 if plate < INTERVALS:

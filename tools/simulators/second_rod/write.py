@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 
 from tools.simulators.second_rod.day import Day, Trial, draw_day
-from tools.simulators.second_rod.effects import KINDS, Effect
+from tools.simulators.second_rod.effects import EFFECT_KINDS, Effect
 from tools.simulators.second_rod.plan import Planned
 from tools.simulators.second_rod.robot import numbers
 from tools.simulators.second_rod.simulate import Run, simulate, without_effects
 from tools.simulators.second_rod.sizing import Size, Sizer
-from tools.simulators.second_rod.tendons import TENDONS
+from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 Array = np.ndarray
 TEMPERATURE_NOISE = 0.1  # K
-UNITS = {"tension": ("N", 1.0), "displacement": ("mm", 1e3)}  # of the file, and how many of them to the SI unit
+FILE_UNITS = {"tension": ("N", 1.0), "displacement": ("mm", 1e3)}  # of the file, and how many of them to the SI unit
 
 
 def make_day(out: Path, planned: Planned, seed: int, trials: int | None = None) -> str | None:
@@ -31,7 +31,7 @@ def make_day(out: Path, planned: Planned, seed: int, trials: int | None = None) 
     if final.exists():
         return None
     random = np.random.default_rng([seed, planned.number])
-    kinds = [KINDS[kind] for kind in planned.kinds]
+    kinds = [EFFECT_KINDS[kind] for kind in planned.kinds]
     day = draw_day(random, planned.drive, frozenset().union(*(kind.wants for kind in kinds)), trials)
     sizer = Sizer(day)
     found = [sizer.drawn(kind, target, random) for kind, target in zip(kinds, planned.targets, strict=True)]
@@ -73,8 +73,8 @@ def write_set(folder: Path, title: str, day: Day, runs: Sequence[Run], logs_othe
         text.append("")
 
     for quantity, role in [(day.drive, "input")] + [(other, "output")] * logs_others:
-        unit, scale = UNITS[quantity]
-        for tendon in range(1, TENDONS + 1):
+        unit, scale = FILE_UNITS[quantity]
+        for tendon in range(1, ROD_TENDONS + 1):
             channel(f"tendon_{tendon}_{quantity}", role, unit, noises[quantity] * scale)
     if day.logs_temperature:
         channel("ambient_temperature", "context", "degC", TEMPERATURE_NOISE)
@@ -100,8 +100,8 @@ def write_trial(path: Path, day: Day, trial: Trial, run: Run, other: str | None,
 
     def tendons(quantity: str, values: Array, noise: float) -> None:
         measured = values + random.normal(0, noise, values.shape)
-        for tendon in range(TENDONS):
-            columns[f"tendon_{tendon + 1}_{quantity}"] = measured[:, tendon] * UNITS[quantity][1]
+        for tendon in range(ROD_TENDONS):
+            columns[f"tendon_{tendon + 1}_{quantity}"] = measured[:, tendon] * FILE_UNITS[quantity][1]
 
     tendons(day.drive, run.inputs, day.input_noise)
     if other is not None:

@@ -17,7 +17,7 @@ from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.evidence.scored_model import ScoredModel, score_model
 from twin.diagnosis.fit_context import FitContext, Progress
 from twin.diagnosis.split import blind
-from twin.diagnosis.thresholds import JUMPS
+from twin.diagnosis.thresholds import MOST_JUMPS
 from twin.foundation.errors import SolveError
 from twin.prediction.prepared import PreparedRecording
 from twin.prediction.twin import Twin
@@ -46,12 +46,12 @@ def calibrate(
 
 
 def _with_jumps(context: FitContext, base: Fit) -> Fit:
-    """The calibrated robot, fitted again beside the zeros that jump, one after the other; where there are more than `JUMPS`, they
-    are no zeros and none is taken."""
+    """The calibrated robot, fitted again beside the zeros that jump, one after the other; where there are more than `MOST_JUMPS`,
+    they are no zeros and none is taken."""
     jumps: list[Jump] = []
     found = base
     while (jump := next_jump(context, found, jumps)) is not None:
-        if len(jumps) == JUMPS:
+        if len(jumps) == MOST_JUMPS:
             return base
         context.progress(f"zeros that jump, {len(jumps) + 1}")
         more = sorted([*jumps, jump], key=lambda j: j.since)

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-SINGULAR = 1e-13  # a direction's share of information, of unit diagonals: below it there is rounding alone
-ALONE = 1.0 - 1e-6  # a part's share of the information along a direction: beyond it no other part tells anything there
-PART = 1e-3  # a parameter's squared share of a direction that data cannot tell: smaller ones are rounding
+SINGULAR_SHARE = 1e-13  # a direction's share of information, of unit diagonals: below it there is rounding alone
+SINGLE_PART_SHARE = 1.0 - 1e-6  # a part's share of the information along a direction: beyond it no other part tells anything there
+UNTOLD_PARAMETER_SHARE = 1e-3  # a parameter's squared share of a direction that data cannot tell: smaller ones are rounding
 
 
 def solve(H: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -24,7 +24,7 @@ def solve(H: np.ndarray, b: np.ndarray) -> np.ndarray:
 def unidentifiable(H: np.ndarray) -> np.ndarray:
     """(p,) which parameters have a part in a direction in which H (p, p) tells nothing."""
     _, values, V = _directions(H)
-    return (V[:, values <= SINGULAR] ** 2).sum(axis=1) > PART
+    return (V[:, values <= SINGULAR_SHARE] ** 2).sum(axis=1) > UNTOLD_PARAMETER_SHARE
 
 
 def _directions(H: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -47,8 +47,8 @@ def scatter(parts: Sequence[tuple[np.ndarray, np.ndarray]], H: np.ndarray) -> np
     V = np.zeros((len(H), len(H)))
     for information, slope in parts:
         share, U = np.linalg.eigh(R.T @ information @ R)
-        left = np.maximum(1.0 - share, SINGULAR)
-        d = R @ (U @ (np.where(share < ALONE, left**-0.5, 0.0) * (U.T @ (R.T @ slope))))
+        left = np.maximum(1.0 - share, SINGULAR_SHARE)
+        d = R @ (U @ (np.where(share < SINGLE_PART_SHARE, left**-0.5, 0.0) * (U.T @ (R.T @ slope))))
         V += np.outer(d, d)
     return np.diag(V)
 
@@ -56,5 +56,5 @@ def scatter(parts: Sequence[tuple[np.ndarray, np.ndarray]], H: np.ndarray) -> np
 def _half(H: np.ndarray) -> np.ndarray:
     """R (p, told) with R R' the inverse of H along the directions in which it tells something."""
     size, values, V = _directions(H)
-    told = values > SINGULAR
+    told = values > SINGULAR_SHARE
     return V[:, told] / np.sqrt(values[told]) / size[:, None]

@@ -28,15 +28,15 @@ from twin.prediction.simulate import SolveOptions, Trace, iterate_traces
 from twin.prediction.twin import Twin
 from twin.robots import Robot
 
-ROUGH = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
-NUDGE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
-BOUND = 1e-3  # of a parameter's range: closer to an end of it, it stands there
-STEPS = 12  # at most, of a fit
-TRUSTED = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
+DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
+PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
+AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end of it, it stands there
+MOST_FIT_STEPS = 12  # at most, of a fit
+TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: what two codes of one law make of it. On 69 days of `tools.benchmarks.diagnosis.attribution` they were
 # off by 0.5 to 2 % where noise and the trials' disagreement gave errors of 0.2 to 0.7 %.
-LAW = 0.02
-UNFIXED = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
+LAW_ACCURACY = 0.02
+UNFIXED_SPREAD_SHARE = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
 
 Unsolved = Literal["raise", "zeros"]
 
@@ -123,7 +123,7 @@ class Objective:
     def predict(
         self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
     ) -> tuple[dict[int, Trace], list[np.ndarray]]:
-        way = SolveOptions(near or {}, keep, once, SOLVE_TOLERANCE if keep else ROUGH)
+        way = SolveOptions(near or {}, keep, once, SOLVE_TOLERANCE if keep else DERIVATIVE_TOLERANCE)
         traces = dict(iterate_traces(twin, self.prepared, self.trials, way))
         return traces, [traces[k].outputs(twin, self.prepared) for k in self.trials]
 
@@ -195,7 +195,7 @@ class Objective:
         neighbours = []
         for i in which:
             p = at.model.free[i].parameter
-            size = NUDGE if (x[i] + NUDGE) * p.step <= p.high else -NUDGE
+            size = PARAMETER_DIFFERENCE if (x[i] + PARAMETER_DIFFERENCE) * p.step <= p.high else -PARAMETER_DIFFERENCE
             moved = x.copy()
             moved[i] += size
             neighbours.append((at.model.at(moved), size))
@@ -265,7 +265,7 @@ class Fit:
 
     def fitted(self, effect: str | None) -> dict[str, FittedValue]:
         """Values and standard errors of the robot's (None) or an effect's free parameters; no error where nothing tells. Amplitudes
-        of effects are no better known than the form of a law, `LAW`, which no data of one robot tell."""
+        of effects are no better known than the form of a law, `LAW_ACCURACY`, which no data of one robot tell."""
         blind = unidentifiable(self.information())
         spread = self.std() if self.systematic is None else np.hypot(self.std(), self.systematic)
         return {
@@ -281,19 +281,19 @@ class Fit:
         if law is None or free.parameter.name in law.inactive_when_off:
             return 0.0
         value = self.model.value(free)
-        return LAW * min(abs(value - free.parameter.value), abs(value))
+        return LAW_ACCURACY * min(abs(value - free.parameter.value), abs(value))
 
     def at_bound(self) -> np.ndarray:
         """Which free parameters (n_free,) stand at an end of their range."""
         at = [(self.model.value(f), f.parameter) for f in self.model.free]
-        return np.array([min(x - p.low, p.high - x) < BOUND * (p.high - p.low) for x, p in at], bool)
+        return np.array([min(x - p.low, p.high - x) < AT_BOUND_SHARE * (p.high - p.low) for x, p in at], bool)
 
     def unfixed(self) -> list[str]:
         """Labels of the parameters the data do not fix: their standard error stays near their prior's, or nothing tells them, or
         not from each other."""
         out = []
         for f, s, b in zip(self.model.free, self._by_noise(), unidentifiable(self.information()), strict=True):
-            if b or (f.parameter.std is not None and s > UNFIXED * f.parameter.std):
+            if b or (f.parameter.std is not None and s > UNFIXED_SPREAD_SHARE * f.parameter.std):
                 out.append(f.label)
         return out
 
@@ -353,13 +353,13 @@ def fit(
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping = cost(at), 1e-4
-    for left in range(STEPS - 1, -1, -1):
+    for left in range(MOST_FIT_STEPS - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
         cut = cut_off(x)
         D = np.zeros((cut.size, x.size))
         for i in silencing:
-            D[:, i] = (cut_off(x + NUDGE * (np.arange(x.size) == i)) - cut) / NUDGE
+            D[:, i] = (cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
         H = columns.T @ columns + D.T @ D + np.diag(weight)
         g = columns.T @ at.z + D.T @ cut + weight * (x - prior)
         better, whole, enough = None, damping, max(tolerance * now, worth)
@@ -373,7 +373,7 @@ def fit(
         if better is None:
             break
         fall, at, now = now - cost(better), better, cost(better)
-        if fall > TRUSTED * foretold:
+        if fall > TRUSTED_FALL_SHARE * foretold:
             damping = max(0.1 * damping, 1e-6)
         if fall < enough or now - left * fall > beat:
             break

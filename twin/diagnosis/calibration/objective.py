@@ -13,7 +13,7 @@ from twin.diagnosis.diagnosis import Settings
 from twin.diagnosis.noise.estimate import estimate_noise
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
-from twin.diagnosis.thresholds import PUSHED
+from twin.diagnosis.thresholds import READING_STEP
 from twin.mechanics.springs.heat import thermal_time_constant
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
@@ -49,7 +49,7 @@ def _unslackened(prepared: PreparedRecording) -> PreparedRecording:
 
 def _felt(prepared: PreparedRecording, k: int) -> np.ndarray:
     """(n_k, n_tendon) of a step in a reading, that of `sensitivity`, the share that makes a tendon pull: none far below zero."""
-    below = np.clip(1.0 + prepared.inputs[k].command / (PUSHED * prepared.reading), 0.0, 1.0)
+    below = np.clip(1.0 + prepared.inputs[k].command / (READING_STEP * prepared.reading), 0.0, 1.0)
     return np.where(prepared.driven_by(Drive.TENSION), below, 1.0)
 
 
@@ -87,7 +87,7 @@ def sensitivity(
         averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * thermal_time_constant(prepared.robot.springs(prepared.n_tendon)))))
         felt = np.where(prepared.driven_by(Drive.CURRENT), averaged, felt)
     for t in range(prepared.n_tendon):
-        step = PUSHED * prepared.reading[t]
+        step = READING_STEP * prepared.reading[t]
         push = step * np.eye(prepared.n_tendon)[t]
         moved = replace(prepared, inputs=tuple(replace(i, command=i.command + push) for i in prepared.inputs))
         traces = simulate(twin, moved, trials=trials, options=SolveOptions(near or {}))

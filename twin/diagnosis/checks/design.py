@@ -8,7 +8,15 @@ from itertools import pairwise
 import numpy as np
 
 from twin.body import Drive
-from twin.diagnosis.thresholds import FAST, ONE_WAY, PULLED, RESOLVED, STEADY, STILL, WARM
+from twin.diagnosis.thresholds import (
+    LEAST_TEMPERATURE_SPREAD,
+    LEAST_UNLOADING_SHARE,
+    PULLED_TENDON_SHARE,
+    SAMPLES_TO_SHOW_RATE,
+    SHORTEST_HOLD,
+    STILL_COMMAND_SHARE,
+    TWO_RATES_RATIO,
+)
 from twin.effects.base.effect import DataNeed
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import Inputs, PreparedRecording
@@ -22,24 +30,24 @@ def shortcomings(prepared: PreparedRecording) -> list[DataNeed]:
     rising, falling = (float(np.maximum(c, 0.0).sum()) for c in (changes, -changes))
     every = np.array([r for i in inputs for r in rates(i, top)])
     lacking = {
-        DataNeed.REVERSALS: min(rising, falling) < ONE_WAY * max(rising, falling),
+        DataNeed.REVERSALS: min(rising, falling) < LEAST_UNLOADING_SHARE * max(rising, falling),
         # Quantiles, not extremes: one pull alone may be held out.
-        DataNeed.TWO_RATES: every.size == 0 or np.quantile(every, 0.9) < FAST**0.5 * np.quantile(every, 0.1),
-        DataNeed.LONG_HOLDS: max(longest_rest(i, top) for i in inputs) < STEADY,
+        DataNeed.TWO_RATES: every.size == 0 or np.quantile(every, 0.9) < TWO_RATES_RATIO**0.5 * np.quantile(every, 0.1),
+        DataNeed.LONG_HOLDS: max(longest_rest(i, top) for i in inputs) < SHORTEST_HOLD,
         DataNeed.TWO_LOADS: len({(round(i.loads.payload, 6), *np.round(i.loads.gravity, 3)) for i in inputs}) < 2,
         DataNeed.EVERY_TENDON: len(set().union(*(pulled(i, top) for i in inputs))) < prepared.n_tendon,
         DataNeed.THREE_MARKERS: len({o.index for o in prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) < 3,
         DataNeed.DISPLACEMENTS: Drive.DISPLACEMENT not in prepared.drives
         and not any(o.group == "displacement" for o in prepared.outputs),
-        DataNeed.TEMPERATURES: np.ptp(np.concatenate([i.temperature for i in inputs])) < WARM,
+        DataNeed.TEMPERATURES: np.ptp(np.concatenate([i.temperature for i in inputs])) < LEAST_TEMPERATURE_SPREAD,
         DataNeed.RANDOM_ORDER: len(inputs) > 2 and _ordered(prepared),
     }
     return [need for need, is_lacking in lacking.items() if is_lacking]
 
 
 def pulled(inputs: Inputs, top: float) -> list[int]:
-    """The tendons that move in a trial, by more than `PULLED` of the largest command `top`."""
-    return [int(t) for t in np.flatnonzero(np.ptp(inputs.command, axis=0) > PULLED * top)]
+    """The tendons that move in a trial, by more than `PULLED_TENDON_SHARE` of the largest command `top`."""
+    return [int(t) for t in np.flatnonzero(np.ptp(inputs.command, axis=0) > PULLED_TENDON_SHARE * top)]
 
 
 def rates(inputs: Inputs, top: float) -> list[float]:
@@ -48,14 +56,14 @@ def rates(inputs: Inputs, top: float) -> list[float]:
     found = []
     for t in pulled(inputs, top):
         moving = slope[:, t] > 0.1 * slope[:, t].max()
-        if moving.sum() >= RESOLVED:
+        if moving.sum() >= SAMPLES_TO_SHOW_RATE:
             found.append(float(np.median(slope[moving, t])))
     return found
 
 
 def longest_rest(inputs: Inputs, top: float) -> float:
     """The longest stretch (s) of a trial in which nothing moves."""
-    still = np.abs(np.diff(inputs.command, axis=0)).max(axis=1) < STILL * top
+    still = np.abs(np.diff(inputs.command, axis=0)).max(axis=1) < STILL_COMMAND_SHARE * top
     best, since = 0.0, None
     for k, s in enumerate(still):
         if s:

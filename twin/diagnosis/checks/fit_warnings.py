@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.diagnosis.calibration.fit import Fit
-from twin.diagnosis.thresholds import DOUBTFUL
+from twin.diagnosis.thresholds import UNLIKELY_PARAMETER_DISTANCE
 
 
 def unlikely(found: Fit) -> list[str]:
@@ -12,7 +12,7 @@ def unlikely(found: Fit) -> list[str]:
     for free in found.model.free:
         p = free.parameter
         value = found.model.twin.values.get(p.name, p.value)
-        if free.effect is None and p.std and abs(value - p.value) > DOUBTFUL * p.std:
+        if free.effect is None and p.std and abs(value - p.value) > UNLIKELY_PARAMETER_DISTANCE * p.std:
             how = abs(value - p.value) / p.std
             said.append(
                 f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "

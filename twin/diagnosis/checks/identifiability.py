@@ -19,7 +19,7 @@ from twin.diagnosis.calibration.fit import Fit, Objective
 from twin.diagnosis.checks.design import shortcomings
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern
 from twin.diagnosis.evidence.ranking import projected
-from twin.diagnosis.thresholds import CLEAR, INVISIBLE
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, INVISIBLE_PATTERN_SHARE
 from twin.effects import effect_class
 
 
@@ -58,7 +58,7 @@ def identifiability(objective: Objective, base: Fit, known: Dictionary, material
         i = np.array(p.where)
         own = float(np.trace(A[np.ix_(i, i)]))
         lacking = tuple(str(need) for need in lacks if need in effect_class(effect).hidden_without)
-        if own < INVISIBLE * float(raw[i].sum()) or own <= 0.0:
+        if own < INVISIBLE_PATTERN_SHARE * float(raw[i].sum()) or own <= 0.0:
             nowhere = (p.amplitudes[0], np.inf, _unit(effect, p.amplitudes[0], objective))
             rows.append(Visibility(effect, np.inf, np.inf, 0.0, "", nowhere, lacking, form))
             continue
@@ -67,8 +67,8 @@ def identifiability(objective: Objective, base: Fit, known: Dictionary, material
             shares[q.effect] = min(shares.get(q.effect, np.inf), _left(A, i, np.array(q.where)) / own)
         rival = min(shares, key=lambda r: shares[r], default="")
         share = max(0.0, shares.get(rival, 1.0))
-        seen = max(material, float(np.sqrt(CLEAR / objective.n)))
-        apart = max(material, float(np.sqrt(CLEAR / (objective.n * share)))) if share > 0 else np.inf
+        seen = max(material, float(np.sqrt(CLEAR_CHI_SQUARE / objective.n)))
+        apart = max(material, float(np.sqrt(CLEAR_CHI_SQUARE / (objective.n * share)))) if share > 0 else np.inf
         plainest = int(np.argmax(np.diag(A)[i]))  # the parameter the data feel most
         value = apart * float(np.sqrt(objective.n / A[i[plainest], i[plainest]]))
         smallest = (p.amplitudes[plainest], value, _unit(effect, p.amplitudes[plainest], objective))

@@ -4,13 +4,14 @@ Residuals are taken in the metric of what they do within trials, C^(-1/2) r, C t
 bends, and hardly moves the markers near its base; a camera moves those too. Of trial k the mean in the pattern of a group's zero,
 one number an angle, six a camera, is S_k. Between trials k - 1 and k the a means before and the b means after differ by D, and
 
-    T = a b / (a + b) |D|^2 / median_j |S_j+1 - S_j|^2,     a, b <= `NEARBY`
+    T = a b / (a + b) |D|^2 / median_j |S_j+1 - S_j|^2,     a, b <= `TRIALS_AROUND_JUMP`
 
 is large where a zero jumped; friction, backlash or a wrong load scatter from trial to trial alike on both sides, creep, drift and
 warmth go on and on. A step counts where |D|^2 is more of the median square by which trials change along D than T is in any of
-`SHUFFLES` white series, where it leaves less than `STEP` of the scatter around it and takes more than a line in time, and where all
-outputs together step as that zero would make them: a robot that changed bends, and moves more outputs than one. A turn about the
-base alone may be the robot's clamp and is left for the verdict; so is a step at which what was done in the trials changed too.
+`SHUFFLED_ORDERS` white series, where it leaves less than `STEP_LEFTOVER_SHARE` of the scatter around it and takes more than a line
+in time, and where all outputs together step as that zero would make them: a robot that changed bends, and moves more outputs than
+one. A turn about the base alone may be the robot's clamp and is left for the verdict; so is a step at which what was done in the
+trials changed too.
 """
 
 from __future__ import annotations
@@ -24,7 +25,15 @@ import numpy as np
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.checks.zero_jumps import ANGLE, Jump, Zeros, jumps_of, without
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import CLEAR, HALF, JUMPED, NEARBY, RIGID, SHUFFLES, STEP
+from twin.diagnosis.thresholds import (
+    CLEAR_CHI_SQUARE,
+    LEAST_JUMP,
+    LEFT_BY_EFFECTS,
+    RIGID_MOTION_SHARE,
+    SHUFFLED_ORDERS,
+    STEP_LEFTOVER_SHARE,
+    TRIALS_AROUND_JUMP,
+)
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import Inputs
 
@@ -32,7 +41,7 @@ from twin.prediction.prepared import Inputs
 def next_jump(context: FitContext, fit: Fit, taken: Sequence[Jump]) -> Jump | None:
     """The clearest jump that a calibrated robot may leave in the fitted trials, beside those already `taken`; None where there is
     none. A robot fitted without it is bent by it: whether it is one tells the fit with it (`stands`)."""
-    return _clearest(context, fit, fit.evaluation.raw, taken, CLEAR)
+    return _clearest(context, fit, fit.evaluation.raw, taken, CLEAR_CHI_SQUARE)
 
 
 def stands(context: FitContext, fit: Fit, jump: Jump) -> bool:
@@ -45,15 +54,16 @@ def stands(context: FitContext, fit: Fit, jump: Jump) -> bool:
 
 
 def may_be_clamp(context: FitContext, before: Fit, after: Fit, jump: Jump) -> bool:
-    """Whether a turn about the base alone explains `RIGID` of what a fitted jump does: leaving out its shift would cost, to second
-    order in it, so little. A turn about the robot's axis hardly moves the means that jumps are looked for in; a fit sees it."""
+    """Whether a turn about the base alone explains `RIGID_MOTION_SHARE` of what a fitted jump does: leaving out its shift would
+    cost, to second order in it, so little. A turn about the robot's axis hardly moves the means that jumps are looked for in; a fit
+    sees it."""
     if len({o.index for o in context.prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) < 2 or jump.joints:
         return False
     n = jumps_of(after.model.twin).index(jump) + 1
     names = {f"{x}_{n}" for x in jump.numbers[3:]}
     own = [i for i, f in enumerate(after.model.free) if f.effect == Zeros.id and f.parameter.name in names]
     shift, covariance = after.model.vector()[own], np.linalg.pinv(after.information())[np.ix_(own, own)]
-    return float(shift @ np.linalg.solve(covariance, shift)) < (1.0 - RIGID) * (before.cost - after.cost)
+    return float(shift @ np.linalg.solve(covariance, shift)) < (1.0 - RIGID_MOTION_SHARE) * (before.cost - after.cost)
 
 
 def _clearest(context: FitContext, fit: Fit, raw: Sequence[np.ndarray], taken: Sequence[Jump], bar: float) -> Jump | None:
@@ -73,9 +83,15 @@ def _clearest(context: FitContext, fit: Fit, raw: Sequence[np.ndarray], taken: S
             D = M[k : k + b].mean(axis=0) - before
             moved = metric @ D
             whole, own, turned = (float(((X.T @ moved) ** 2).sum()) for X in (np.eye(len(D)), B, clamp))
-            large = np.sqrt(np.mean(D[zero.any(axis=1)] ** 2)) > JUMPED
+            large = np.sqrt(np.mean(D[zero.any(axis=1)] ** 2)) > LEAST_JUMP
             known = any(t.group == group and inputs[k - 1].clock[0] <= t.since <= inputs[k].clock[-1] for t in taken)
-            if large and own > RIGID * whole and turned < RIGID * whole and not known and not _parted(done, k):
+            if (
+                large
+                and own > RIGID_MOTION_SHARE * whole
+                and turned < RIGID_MOTION_SHARE * whole
+                and not known
+                and not _parted(done, k)
+            ):
                 found.append((own, _located(context, off, group, k, level + before, D)))
                 break
     return max(found, key=lambda f: f[0])[1] if found else None
@@ -149,17 +165,18 @@ def _steps(S: np.ndarray, start: np.ndarray, bar: float) -> Iterator[tuple[int, 
         part, t = part - part.mean(axis=0), t - t.mean()
         scatter, line = float((part**2).sum()), float(((t @ part) ** 2).sum() / max(float(t @ t), 1e-30))
         clear = float(D @ D) ** 2 > bar * float(np.median((np.diff(S, axis=0) @ D) ** 2))
-        if clear and taken[k, a, b] > max((1.0 - STEP) * scatter, line):
+        if clear and taken[k, a, b] > max((1.0 - STEP_LEFTOVER_SHARE) * scatter, line):
             yield k, a, b
 
 
 def _explained(S: np.ndarray) -> np.ndarray:
-    """a b / (a + b) |D|^2 (r, K, NEARBY + 1, NEARBY + 1) of series S (r, K, p); zero where there are no such trials."""
+    """a b / (a + b) |D|^2 (r, K, TRIALS_AROUND_JUMP + 1, TRIALS_AROUND_JUMP + 1) of series S (r, K, p); zero where there are no
+    such trials."""
     r, K, _ = S.shape
     total = np.concatenate([np.zeros_like(S[:, :1]), np.cumsum(S, axis=1)], axis=1)
-    out = np.zeros((r, K, NEARBY + 1, NEARBY + 1))
-    for a in range(2, NEARBY + 1):
-        for b in range(2, NEARBY + 1):
+    out = np.zeros((r, K, TRIALS_AROUND_JUMP + 1, TRIALS_AROUND_JUMP + 1))
+    for a in range(2, TRIALS_AROUND_JUMP + 1):
+        for b in range(2, TRIALS_AROUND_JUMP + 1):
             k = np.arange(a, K - b + 1)
             D = (total[:, k + b] - total[:, k]) / b - (total[:, k] - total[:, k - a]) / a
             out[:, k, a, b] = a * b / (a + b) * (D**2).sum(axis=2)
@@ -168,10 +185,10 @@ def _explained(S: np.ndarray) -> np.ndarray:
 
 @cache
 def _by_chance(K: int) -> float:
-    """The largest T of `SHUFFLES` white series of K numbers."""
-    S = np.random.default_rng(0).normal(size=(SHUFFLES, K, 1))
+    """The largest T of `SHUFFLED_ORDERS` white series of K numbers."""
+    S = np.random.default_rng(0).normal(size=(SHUFFLED_ORDERS, K, 1))
     scale = np.median((np.diff(S, axis=1) ** 2).sum(axis=2), axis=1)
-    return float((_explained(S).reshape(SHUFFLES, -1).max(axis=1) / scale).max())
+    return float((_explained(S).reshape(SHUFFLED_ORDERS, -1).max(axis=1) / scale).max())
 
 
 def _located(context: FitContext, off: Sequence[np.ndarray], group: str, k: int, before: np.ndarray, D: np.ndarray) -> Jump:
@@ -182,7 +199,7 @@ def _located(context: FitContext, off: Sequence[np.ndarray], group: str, k: int,
     s, border = np.concatenate(near), len(near[0])
     cost = np.concatenate([[0.0], np.cumsum(s**2)]) + np.concatenate([np.cumsum(((s - 1.0) ** 2)[::-1])[::-1], [0.0]])
     row = int(np.argmin(cost[1:-1])) + 1
-    row = row if cost[row] < HALF * cost[border] else border
+    row = row if cost[row] < LEFT_BY_EFFECTS * cost[border] else border
     clock = np.concatenate([prepared.inputs[trials[j]].clock for j in (k - 1, k)])
     joints = tuple(dict.fromkeys(o.index for o in prepared.outputs if o.group == ANGLE)) if group == ANGLE else ()
     return Jump(group, float(clock[row - 1]), float(clock[row]), joints)

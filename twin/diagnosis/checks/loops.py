@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnosis.evidence.discrepancy import slope
-from twin.diagnosis.thresholds import CROSSINGS, LAG, MEETS, MOVING
+from twin.diagnosis.thresholds import FEWEST_LOOP_CROSSINGS, LOOP_SIGNIFICANCE, MOVING_RATE_SHARE, SAME_COMMAND_DISTANCE
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group
 from twin.prediction.prepared import Inputs, PreparedRecording
 
@@ -31,7 +31,7 @@ class Loop:
 
     @property
     def seen(self) -> bool:
-        return abs(self.lag) > LAG * self.noise
+        return abs(self.lag) > LOOP_SIGNIFICANCE * self.noise
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Loops:
 
     @property
     def seen(self) -> bool:
-        return bool(self.by_trial) and abs(self.lag) > LAG * self.noise
+        return bool(self.by_trial) and abs(self.lag) > LOOP_SIGNIFICANCE * self.noise
 
     @property
     def confounded(self) -> bool:
@@ -101,7 +101,7 @@ def _loop(trial: int, inputs: Inputs, u: np.ndarray, y: np.ndarray) -> Loop | No
     d = ((later - y[first]) * np.where(pulling, 1.0, -1.0)[:, None]) @ _along(u, y)
     known = np.isfinite(d)
     kinds = [d[known & pulling], d[known & ~pulling]]
-    enough = [k for k in kinds if len(k) >= CROSSINGS]
+    enough = [k for k in kinds if len(k) >= FEWEST_LOOP_CROSSINGS]
     if not enough:
         return None
     means = [float(k.mean()) for k in enough]
@@ -116,7 +116,7 @@ def crossings(inputs: Inputs, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     of the way from row j to the next, the s, and whether row i pulls (|u| grows)."""
     v = slope(inputs, u)
     speed = np.linalg.norm(v, axis=1)
-    moving = speed > MOVING * max(float(speed.max()), 1e-12)
+    moving = speed > MOVING_RATE_SHARE * max(float(speed.max()), 1e-12)
     step = np.diff(u, axis=0)
     length = (step**2).sum(axis=1)
     found: list[tuple[int, int, float]] = []
@@ -126,7 +126,7 @@ def crossings(inputs: Inputs, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
         share = ((u[i] - u[j]) * step[j]).sum(axis=1) / length[j]
         off = np.linalg.norm(u[j] + share[:, None] * step[j] - u[i], axis=1)
         against = v[j] @ v[i] < -0.5 * speed[j] * speed[i]
-        hit = np.flatnonzero((share >= 0.0) & (share < 1.0) & (off < MEETS) & against)
+        hit = np.flatnonzero((share >= 0.0) & (share < 1.0) & (off < SAME_COMMAND_DISTANCE) & against)
         if hit.size:
             found.append((int(i), int(j[hit[0]]), float(share[hit[0]])))
     first, then, shares = (np.array([f[c] for f in found], t) for c, t in ((0, int), (1, int), (2, float)))

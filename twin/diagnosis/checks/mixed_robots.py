@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.diagnosis.calibration.fisher_information import solve
 from twin.diagnosis.calibration.fit import Fit, prior_weight
-from twin.diagnosis.thresholds import GROUP, TURNS, WORTH
+from twin.diagnosis.thresholds import FEWEST_TRIALS_IN_GROUP, GROUPING_ROUNDS, SECOND_ROBOT_GAIN
 from twin.prediction.prepared import PreparedRecording
 
 
@@ -51,19 +51,22 @@ def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit
         # From each trial in turn: with the half of the others that its own robot suits best.
         start = costs(solve(H[seed] + P, g[seed]))
         side = start <= np.median(start)
-        for _ in range(TURNS):
-            if not GROUP <= side.sum() <= len(trials) - GROUP:
+        for _ in range(GROUPING_ROUNDS):
+            if not FEWEST_TRIALS_IN_GROUP <= side.sum() <= len(trials) - FEWEST_TRIALS_IN_GROUP:
                 break
             again = costs(shift(side)) < costs(shift(~side))
             if (again == side).all():
                 break
             side = again
-        if GROUP <= side.sum() <= len(trials) - GROUP and (gain := fall(side) + fall(~side)) > best:
+        if (
+            FEWEST_TRIALS_IN_GROUP <= side.sum() <= len(trials) - FEWEST_TRIALS_IN_GROUP
+            and (gain := fall(side) + fall(~side)) > best
+        ):
             best, sides = gain, side
     n = int(np.count_nonzero(z))
     # As many parameters more, and a choice of sides for every trial.
     worth = best - fall(np.ones(len(trials), bool)) - len(own) * np.log(n) - 2.0 * len(trials) * np.log(2.0)
-    if sides is None or worth < WORTH**2 * n:
+    if sides is None or worth < SECOND_ROBOT_GAIN**2 * n:
         return None
     one, other = (tuple(trials[int(k)] for k in np.flatnonzero(s)) for s in (sides, ~sides))
     return MixedRobots(one, other, worth) if len(one) >= len(other) else MixedRobots(other, one, worth)

@@ -12,7 +12,7 @@ from twin.diagnosis.checks.suspicions.case import beginnings
 from twin.diagnosis.diagnosis import Settings
 from twin.diagnosis.fit_context import Progress, silent
 from twin.diagnosis.split import blind, split
-from twin.diagnosis.thresholds import FEW
+from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT
 from twin.foundation.errors import SolveError
 from twin.prediction.prepared import PreparedRecording
 from twin.prediction.simulate import simulate, unstable_starts
@@ -21,8 +21,9 @@ from twin.prediction.twin import Twin
 
 @dataclass(frozen=True)
 class DataPreview:
-    """The bench with notices of unstable starts, the sealed trials (none of fewer than `FEW`), the prediction (n_k, n_output) of
-    the twin as described, the suspicions, and the loops of pulling and releasing in the trials that are not sealed."""
+    """The bench with notices of unstable starts, the sealed trials (none of fewer than `FEWEST_TRIALS_FOR_HELD_OUT`), the
+    prediction (n_k, n_output) of the twin as described, the suspicions, and the loops of pulling and releasing in the trials that
+    are not sealed."""
 
     prepared: PreparedRecording
     held_out: tuple[int, ...]
@@ -34,7 +35,7 @@ class DataPreview:
 def preview_data(prepared: PreparedRecording, twin: Twin, settings: Settings, progress: Progress = silent) -> DataPreview:
     """What is known before the first fit. Raises SolveError, with what may be wrong, where the twin as described has no
     equilibrium."""
-    held_out = split(prepared, settings.seed)[1] if len(prepared.inputs) >= FEW else []
+    held_out = split(prepared, settings.seed)[1] if len(prepared.inputs) >= FEWEST_TRIALS_FOR_HELD_OUT else []
     progress("nominal prediction")
     try:
         simulate(twin, beginnings(prepared))

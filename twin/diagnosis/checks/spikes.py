@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnosis.thresholds import RARE, SHARED, SPIKE, WINDOW
+from twin.diagnosis.thresholds import MOST_SPIKES_SHARE, SHARED_MOTION_SHARE, SPIKE_SIZE, SPIKE_WINDOW
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
 
@@ -16,7 +16,7 @@ def without_spikes(prepared: PreparedRecording, predicted: Sequence[np.ndarray])
     """The bench with lone marker samples missing, and what was left out, in words.
 
     `predicted` (n_k, n_output), of any twin of the robot, takes the commanded motion off the measured one. What is left departs
-    from its median over `WINDOW` rows by d (m), one a marker (Hampel filter: Pearson et al., EURASIP J. Adv. Signal Process.
+    from its median over `SPIKE_WINDOW` rows by d (m), one a marker (Hampel filter: Pearson et al., EURASIP J. Adv. Signal Process.
     2016:87). A body that moves takes all markers along, each by some part of its travel, the RMS of `predicted`: a sample stands
     alone if others would have shown that and none did.
     """
@@ -36,7 +36,7 @@ def without_spikes(prepared: PreparedRecording, predicted: Sequence[np.ndarray])
     )
     alone = _alone(np.concatenate(departed), travel, declared)
     counts = dict(zip(markers, alone.sum(axis=0).tolist(), strict=True))
-    faulty = {name for name, count in counts.items() if count > RARE * len(alone)}
+    faulty = {name for name, count in counts.items() if count > MOST_SPIKES_SHARE * len(alone)}
     words = [
         f"{name}: {counts[name]} of {len(alone)} samples are off their neighbours in time and no motion of the body, too many"
         " for accidents: left in, look at this marker"
@@ -57,18 +57,18 @@ def without_spikes(prepared: PreparedRecording, predicted: Sequence[np.ndarray])
 
 
 def _departure(off: np.ndarray, columns: Sequence[np.ndarray]) -> np.ndarray:
-    """(n, n_marker, 3) m from the median of `WINDOW` rows, at the ends of the nearest whole window; NaN where missing.
+    """(n, n_marker, 3) m from the median of `SPIKE_WINDOW` rows, at the ends of the nearest whole window; NaN where missing.
 
     In a median a missing row stands on the line between its neighbours: without it a fast motion would shift the middle.
     """
-    if len(off) < WINDOW:
+    if len(off) < SPIKE_WINDOW:
         return np.full((len(off), len(columns), 3), np.nan)
     whole, row = off.copy(), np.arange(len(off))
     for column in whole.T:
         known = np.isfinite(column)
         column[~known] = np.interp(row[~known], row[known], column[known]) if known.any() else 0.0
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(whole, WINDOW, axis=0), axis=2)
-    departed = off - np.pad(middle, ((WINDOW // 2, WINDOW // 2), (0, 0)), mode="edge")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(whole, SPIKE_WINDOW, axis=0), axis=2)
+    departed = off - np.pad(middle, ((SPIKE_WINDOW // 2, SPIKE_WINDOW // 2), (0, 0)), mode="edge")
     out = np.zeros((len(off), len(columns), 3))
     for j, column in enumerate(columns):
         out[:, j, : len(column)] = departed[:, column]
@@ -84,12 +84,12 @@ def _alone(departed: np.ndarray, travel: np.ndarray, noise: np.ndarray) -> np.nd
     size = _size(departed)
     seen = np.array([np.nanmedian(d) if np.isfinite(d).any() else np.inf for d in size.T])
     typical = np.maximum(seen, noise)  # markers that mostly stand still, or of a coarse camera, depart by nothing
-    rows, own = np.nonzero(size > SPIKE * typical)
+    rows, own = np.nonzero(size > SPIKE_SIZE * typical)
     theirs = (size[rows, own] / travel[own])[:, None] * travel  # what the others' part would be
-    telling = (theirs > SPIKE * typical) & np.isfinite(size[rows]) & (np.arange(len(travel)) != own[:, None])
+    telling = (theirs > SPIKE_SIZE * typical) & np.isfinite(size[rows]) & (np.arange(len(travel)) != own[:, None])
     along = np.einsum("kmx,kx->km", departed[rows], departed[rows, own])
     alike = along > 0.5 * size[rows] * size[rows, own][:, None]
-    shared = telling & alike & (size[rows] > SHARED * theirs)
+    shared = telling & alike & (size[rows] > SHARED_MOTION_SHARE * theirs)
     lone = telling.any(axis=1) & ~shared.any(axis=1)
     out = np.zeros(size.shape, bool)
     out[rows[lone], own[lone]] = True

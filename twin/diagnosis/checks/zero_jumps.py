@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from twin.body import Signals
 from twin.diagnosis.calibration.fit import Fit, Free, Model
-from twin.diagnosis.thresholds import FIRST, SURE
+from twin.diagnosis.thresholds import ROWS_FOR_ZERO, SIGNIFICANT_STANDARD_ERRORS
 from twin.effects import Effect
 from twin.foundation.parameters import Parameter
 from twin.prediction.evaluate import OUTPUT_GROUPS
@@ -104,7 +104,9 @@ def words(prepared: PreparedRecording, fit: Fit) -> list[str]:
         at = [found[f"{x}_{n}"].value or 0.0 for x in jump.numbers]
         before, after = (next(i for i in prepared.inputs if i.clock[0] <= t <= i.clock[-1]) for t in (jump.last, jump.since))
         if jump.joints:
-            sure = [abs(a) > SURE * (found[f"{x}_{n}"].std or 0.0) for a, x in zip(at, jump.numbers, strict=True)]
+            sure = [
+                abs(a) > SIGNIFICANT_STANDARD_ERRORS * (found[f"{x}_{n}"].std or 0.0) for a, x in zip(at, jump.numbers, strict=True)
+            ]
             sizes = [f"joint_{j + 1}_angle by {np.rad2deg(a):.2f} deg" for j, a in zip(jump.joints, at, strict=True)]
             what = f"the zero jumped of {', '.join(s for s, yes in zip(sizes, sure, strict=True) if yes) or ', '.join(sizes)}"
         else:
@@ -125,14 +127,15 @@ def words(prepared: PreparedRecording, fit: Fit) -> list[str]:
 
 
 def rezeroed(prepared: PreparedRecording, group: str, raw: np.ndarray) -> np.ndarray:
-    """Residuals (n, n_output) of a trial less the mean of its first `FIRST` rows: each angle's own, of points one shift of all."""
+    """Residuals (n, n_output) of a trial less the mean of its first `ROWS_FOR_ZERO` rows: each angle's own, of points one shift of
+    all."""
     out = raw.copy()
     alike: dict[int, list[int]] = {}
     for c, o in enumerate(prepared.outputs):
         if o.group == group:
             alike.setdefault(o.axis if OUTPUT_GROUPS[group].is_point else o.index, []).append(c)
     for columns in alike.values():
-        begun = raw[:FIRST, columns]
+        begun = raw[:ROWS_FOR_ZERO, columns]
         if np.isfinite(begun).any():
             out[:, columns] -= np.nanmean(begun)
     return out

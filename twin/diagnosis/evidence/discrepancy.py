@@ -13,7 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.body import Drive
-from twin.diagnosis.thresholds import HIGHEST, LOWEST, MEMORY, NOTHING, ROUNDS, SETTLED
+from twin.diagnosis.thresholds import (
+    FIXED_POINT_ROUNDS,
+    LARGEST_VARIANCE,
+    LEAST_VARIANCE,
+    MEMORY_TIMES,
+    NEGLIGIBLE_VARIANCE,
+    SETTLED_VARIANCE_CHANGE,
+)
 from twin.prediction.prepared import Inputs, PreparedRecording
 
 COMPONENTS = ("static", "direction", "rate", "memory", "slow", "trial")
@@ -94,7 +101,7 @@ def regressors(prepared: PreparedRecording, trials: Sequence[int], noise: np.nda
         sign = np.tanh(dU[:, a] / typical)
         blocks["direction"] += [(f"direction of {T[a]}", sign), (f"direction of {T[a]} x {T[a]}", sign * U[:, a])]
         blocks["rate"] += [(f"rate of {T[a]}", dU[:, a]), (f"rate of {T[a]} x {T[a]}", dU[:, a] * U[:, a])]
-        for tau in MEMORY:
+        for tau in MEMORY_TIMES:
             past = np.concatenate([_lagged(i.time, w[:, a], tau) for i, w in zip(inputs, u, strict=True)])
             blocks["memory"].append((f"{T[a]} over the last {tau:g} s", U[:, a] - past))
         blocks["slow"] += [(f"time x {T[a]}", t * U[:, a]), (f"temperature x {T[a]}", warm * U[:, a])]
@@ -195,7 +202,7 @@ class Evidence:
         variance = np.full((n_group, n_component), 1e-2)
         b = (self.phi.matrix.T @ Z).T  # (m, p)
         component = self.phi.component
-        for _ in range(ROUNDS):
+        for _ in range(FIXED_POINT_ROUNDS):
             D = variance[self.group][:, component]  # (n_kind, p)
             covariance = np.linalg.inv(self.gram + _diagonal(1.0 / D))
             mean = np.einsum("mpq,mq->mp", covariance[self.kind], b)
@@ -206,9 +213,11 @@ class Evidence:
                 rows = self.member == g
                 for c in range(n_component):
                     block = np.ix_(rows, component == c)
-                    new[g, c] = explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else LOWEST
-            new = np.clip(new, LOWEST, HIGHEST)
-            settled = np.all((np.abs(np.log(new / variance)) < SETTLED) | (new < NOTHING))
+                    new[g, c] = (
+                        explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else LEAST_VARIANCE
+                    )
+            new = np.clip(new, LEAST_VARIANCE, LARGEST_VARIANCE)
+            settled = np.all((np.abs(np.log(new / variance)) < SETTLED_VARIANCE_CHANGE) | (new < NEGLIGIBLE_VARIANCE))
             variance = new
             if settled:
                 break
@@ -301,7 +310,7 @@ class Spectrum:
         x = np.log(self.grid / self.grid[0])
         basis, log = np.vander(x, min(3, 1 + x.size // 8)), np.log(power)
         below = np.ones(x.size, dtype=bool)
-        for _ in range(ROUNDS):
+        for _ in range(FIXED_POINT_ROUNDS):
             rest = log - basis @ np.linalg.lstsq(basis[below], log[below], rcond=None)[0]
             before, below = below, rest < 3.0 * 1.4826 * np.median(np.abs(rest[below]))
             if np.array_equal(below, before):

@@ -11,7 +11,7 @@ import numpy as np
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.estimate import repeats
-from twin.diagnosis.thresholds import CLEAR
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE
 
 
 def fast_error(context: FitContext, found: ScoredModel) -> float:
@@ -29,7 +29,7 @@ def fast_error(context: FitContext, found: ScoredModel) -> float:
         return 0.0
     present = context.evidence.present
     square = float(np.mean((found.fit.z.reshape(present.shape) - found.discrepancy.mean)[present] ** 2))
-    return float(np.sqrt(max(0.0, square - 1.0 - np.sqrt(2.0 * CLEAR / differences))))
+    return float(np.sqrt(max(0.0, square - 1.0 - np.sqrt(2.0 * CLEAR_CHI_SQUARE / differences))))
 
 
 def words(size: float) -> str:

@@ -11,7 +11,7 @@ from twin.diagnosis.calibration.fit import fit
 from twin.diagnosis.evidence.left_out import LeftOut, left_out
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import COARSELY, HALVED, LITTLE
+from twin.diagnosis.thresholds import FEWEST_TRIALS_TO_HALVE, HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE
 from twin.foundation.errors import SolveError
 
 
@@ -33,9 +33,9 @@ class PredictiveErrors:
 
 
 def predictive_errors(context: FitContext, weighed: ScoredModel) -> PredictiveErrors:
-    """Near and far; of fewer than `HALVED` fitted trials a half is hardly more than a trial, and far is near."""
+    """Near and far; of fewer than `FEWEST_TRIALS_TO_HALVE` fitted trials a half is hardly more than a trial, and far is near."""
     near = left_out(context, weighed.fit)
-    return PredictiveErrors(near, halves(context, weighed) if len(context.trials) >= HALVED else near)
+    return PredictiveErrors(near, halves(context, weighed) if len(context.trials) >= FEWEST_TRIALS_TO_HALVE else near)
 
 
 def halves(context: FitContext, weighed: ScoredModel) -> LeftOut:
@@ -53,7 +53,14 @@ def halves(context: FitContext, weighed: ScoredModel) -> LeftOut:
     for fitted, rest in (parts, parts[::-1]):
         J = found.J[rows[fitted[0]] : rows[fitted[-1] + 1], own]
         try:
-            half = fit(objective.of(fitted), found.model, near=found.evaluation, J=J, tolerance=COARSELY, worth=LITTLE)
+            half = fit(
+                objective.of(fitted),
+                found.model,
+                near=found.evaluation,
+                J=J,
+                tolerance=HALF_SESSION_TOLERANCE,
+                worth=REFIT_SCORE_TOLERANCE,
+            )
             predicted = objective.of(rest).evaluate(half.model, half.evaluation.traces)
         except SolveError:
             continue

@@ -12,7 +12,13 @@ import numpy as np
 from twin.diagnosis.calibration.fisher_information import solve
 from twin.diagnosis.calibration.fit import Fit, fit, prior_pull, prior_weight
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import BLOCKS, COARSELY, FAR_OFF, LITTLE, WORSE
+from twin.diagnosis.thresholds import (
+    FIRST_ORDER_LIMIT,
+    HALF_SESSION_TOLERANCE,
+    PARTS_OF_ONE_TRIAL,
+    REFIT_SCORE_TOLERANCE,
+    WORSE_ERROR_RATIO,
+)
 from twin.foundation.errors import SolveError
 from twin.prediction.evaluate import headline_group
 
@@ -56,7 +62,7 @@ class LeftOut:
 
         An effect that only tendon displacements show leaves the markers' error where it was, but for its last digits.
         """
-        return self.square > than.square or self.headline > WORSE**2 * than.headline + self.excused
+        return self.square > than.square or self.headline > WORSE_ERROR_RATIO**2 * than.headline + self.excused
 
 
 def left_out(context: FitContext, fitted: Fit, groups: Sequence[Sequence[int]] | None = None) -> LeftOut:
@@ -86,21 +92,28 @@ def left_out(context: FitContext, fitted: Fit, groups: Sequence[Sequence[int]] |
 
 
 def proven(context: FitContext, fitted: Fit, known: LeftOut) -> LeftOut:
-    """`known`, but for trials whose square a step to first order makes more than `FAR_OFF` times what it is: these as a fit to the
-    others, in truth, leaves them; as they are where that has no equilibrium.
+    """`known`, but for trials whose square a step to first order makes more than `FIRST_ORDER_LIMIT` times what it is: these as a
+    fit to the others, in truth, leaves them; as they are where that has no equilibrium.
 
     What few trials show, in a way that bends with a parameter as an obstacle's place does, no step tells when they are left out.
     """
     objective, out, before = context.objective, known.z.ravel().copy(), fitted.z.ravel()
     own = [i for i, f in enumerate(fitted.model.free) if f.effect is None]
     for k, (a, b) in enumerate(pairwise(_ends(context)) if len(context.trials) > 1 else ()):
-        if float(out[a:b] @ out[a:b]) <= FAR_OFF * float(before[a:b] @ before[a:b]):
+        if float(out[a:b] @ out[a:b]) <= FIRST_ORDER_LIMIT * float(before[a:b] @ before[a:b]):
             continue
         context.progress(f"without {context.prepared.inputs[context.trials[k]].name}")
         J = np.delete(fitted.J[:, own], slice(a, b), axis=0)
         try:
             others = [j for j in range(len(context.trials)) if j != k]
-            rest = fit(objective.of(others), fitted.model, near=fitted.evaluation, J=J, tolerance=COARSELY, worth=LITTLE)
+            rest = fit(
+                objective.of(others),
+                fitted.model,
+                near=fitted.evaluation,
+                J=J,
+                tolerance=HALF_SESSION_TOLERANCE,
+                worth=REFIT_SCORE_TOLERANCE,
+            )
             out[a:b] = objective.of([k]).evaluate(rest.model, fitted.evaluation.traces).z
         except SolveError:
             continue
@@ -111,5 +124,5 @@ def _ends(context: FitContext) -> np.ndarray:
     """Where each part begins in the flat residual, and where the last ends."""
     rows = [len(context.prepared.inputs[k].time) for k in context.trials]
     if len(rows) == 1:
-        rows = [len(part) for part in np.array_split(np.arange(rows[0]), BLOCKS)]
+        rows = [len(part) for part in np.array_split(np.arange(rows[0]), PARTS_OF_ONE_TRIAL)]
     return np.cumsum([0, *rows]) * len(context.prepared.outputs)

@@ -22,7 +22,16 @@ from twin.diagnosis.evidence.discrepancy import Spectrum
 from twin.diagnosis.evidence.first_order import Dictionary
 from twin.diagnosis.evidence.ranking import projected
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import ACCEPT, ALONE, DRAWS, FAINT, GUMBEL_99, LEFT, LINE, MATERIAL
+from twin.diagnosis.thresholds import (
+    FAINT_LINE_SHARE,
+    GUMBEL_99_QUANTILE,
+    LARGE_STRUCTURE_WITHOUT_EFFECT,
+    LARGEST_SPECTRAL_LINE,
+    LEAST_CONTRIBUTION,
+    LEAST_EVIDENCE,
+    NO_EFFECT_DRAWS,
+    STRUCTURE_AS_BUILT,
+)
 
 
 @dataclass(frozen=True)
@@ -33,11 +42,11 @@ class AcceptanceLimits:
     contributions (`visible`) but not the part of them that depends on how a pose was reached (`material`).
     """
 
-    accept: float = ACCEPT
-    material: float = MATERIAL
+    accept: float = LEAST_EVIDENCE
+    material: float = LEAST_CONTRIBUTION
     accuracy: float = 0.0
-    left: float = LEFT
-    line: float = LINE
+    left: float = STRUCTURE_AS_BUILT
+    line: float = LARGEST_SPECTRAL_LINE
 
     @property
     def visible(self) -> float:
@@ -47,18 +56,18 @@ class AcceptanceLimits:
     @property
     def slight(self) -> float:
         """Structure (sigma) that a description of this accuracy may leave beside right laws, as it may where none is found."""
-        return max(self.left, min(ALONE, self.accuracy))
+        return max(self.left, min(LARGE_STRUCTURE_WITHOUT_EFFECT, self.accuracy))
 
     @property
     def faint(self) -> float:
         """A line's bar where no effect was found whose law could leave one."""
-        return FAINT * self.line
+        return FAINT_LINE_SHARE * self.line
 
 
 @dataclass(frozen=True)
 class NullDraws:
-    """What each no-effect set shows, (DRAWS,) each: evidence and contribution (sigma) of the effect that imitates it best,
-    structure (sigma), and its strongest spectral line (z)."""
+    """What each no-effect set shows, (NO_EFFECT_DRAWS,) each: evidence and contribution (sigma) of the effect that imitates it
+    best, structure (sigma), and its strongest spectral line (z)."""
 
     gain: np.ndarray
     moved: np.ndarray
@@ -70,10 +79,10 @@ def acceptance_limits(context: FitContext, base: Fit, known: Dictionary, seed: i
     """The larger of floor and null quantile, each."""
     d = draws(context, base, known, seed)
     return AcceptanceLimits(
-        accept=max(ACCEPT, quantile(d.gain)),
-        material=max(MATERIAL, quantile(d.moved)),
-        left=max(LEFT, quantile(d.left)),
-        line=max(LINE, quantile(d.line)),
+        accept=max(LEAST_EVIDENCE, quantile(d.gain)),
+        material=max(LEAST_CONTRIBUTION, quantile(d.moved)),
+        left=max(STRUCTURE_AS_BUILT, quantile(d.left)),
+        line=max(LARGEST_SPECTRAL_LINE, quantile(d.line)),
     )
 
 
@@ -81,13 +90,13 @@ def draws(context: FitContext, base: Fit, known: Dictionary, seed: int) -> NullD
     objective, evidence = context.objective, context.evidence
     n, k = base.z.size, base.J.shape[1]
     present = evidence.present.ravel()[:, None]
-    e = np.random.default_rng(seed).normal(size=(n, DRAWS)) * present
+    e = np.random.default_rng(seed).normal(size=(n, NO_EFFECT_DRAWS)) * present
     H = base.J.T @ base.J + np.diag(prior_weight(base.model) ** 2) + 1e-9 * np.eye(k)
     z = (e - base.J @ solve(H, base.J.T @ e)) * present
     X = np.concatenate([base.J, known.columns], axis=1)
     A = projected(X, X, base)[k:, k:]
     u = known.columns.T @ z
-    gain, fall = np.full(DRAWS, -np.inf), np.zeros(DRAWS)
+    gain, fall = np.full(NO_EFFECT_DRAWS, -np.inf), np.zeros(NO_EFFECT_DRAWS)
     for pattern in known.patterns:
         i = np.array(pattern.where)
         inner = A[np.ix_(i, i)]
@@ -107,4 +116,4 @@ def draws(context: FitContext, base: Fit, known: Dictionary, seed: int) -> NullD
 
 def quantile(x: np.ndarray) -> float:
     """The 99 % quantile of a Gumbel law with the moments of x."""
-    return float(np.mean(x) + GUMBEL_99 * np.std(x, ddof=1))
+    return float(np.mean(x) + GUMBEL_99_QUANTILE * np.std(x, ddof=1))

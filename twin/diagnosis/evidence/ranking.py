@@ -11,7 +11,7 @@ from twin.diagnosis.calibration.fisher_information import solve
 from twin.diagnosis.calibration.fit import Fit, Objective, prior_weight
 from twin.diagnosis.evidence.discrepancy import Discrepancy, Evidence
 from twin.diagnosis.evidence.first_order import Dictionary
-from twin.diagnosis.thresholds import STARTS, TOP
+from twin.diagnosis.thresholds import CANDIDATES_REFITTED, STARTS_PER_EFFECT
 from twin.effects import FitStart, catalogue
 
 
@@ -35,7 +35,7 @@ class Candidate:
 
 
 def rank(
-    objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, known: Dictionary, top: int = TOP
+    objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, known: Dictionary, top: int = CANDIDATES_REFITTED
 ) -> list[Candidate]:
     """The `top` candidates by either measure, best first, a few starts of each effect's forms.
 
@@ -55,7 +55,7 @@ def rank(
                 break
             if c in chosen:
                 taken += 1
-            elif sum(o.law == c.law for o in chosen) < STARTS:
+            elif sum(o.law == c.law for o in chosen) < STARTS_PER_EFFECT:
                 chosen.append(c)
                 taken += 1
     return sorted(chosen, key=lambda c: -c.gain)

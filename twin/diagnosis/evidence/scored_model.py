@@ -10,7 +10,7 @@ from twin.diagnosis.calibration.fit import Fit, Model, fit
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.evidence.discrepancy import Discrepancy
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import LITTLE, ROUGHLY
+from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue
 from twin.effects.base.scaling import scaled_extended_starts
 from twin.foundation.errors import SolveError
@@ -68,7 +68,9 @@ def with_effect_added(
             values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
             model, near = begun.model.without_effect(effect), begun.evaluation
         model = model.with_effect(effect, values, start.free, n_tendon)
-        found = fit(context.objective, model, near=near, J=member.fit.J, tolerance=ROUGHLY, worth=LITTLE, beat=beat)
+        found = fit(
+            context.objective, model, near=near, J=member.fit.J, tolerance=REFIT_TOLERANCE, worth=REFIT_SCORE_TOLERANCE, beat=beat
+        )
         return score_model(context, found)
     except SolveError:
         return None
@@ -109,7 +111,10 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
             values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
             model = plain.fit.model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
-                fuller = score_model(context, fit(context.objective, model, J=_own(plain.fit), tolerance=ROUGHLY, worth=LITTLE))
+                fuller = score_model(
+                    context,
+                    fit(context.objective, model, J=_own(plain.fit), tolerance=REFIT_TOLERANCE, worth=REFIT_SCORE_TOLERANCE),
+                )
             except SolveError:
                 continue
             if fuller.score > max(found.score, plain.score + accept):
@@ -129,7 +134,7 @@ def refit_without(context: FitContext, base: ScoredModel, best: ScoredModel, eff
     as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
     for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
         try:
-            return score_model(context, fit(context.objective, start, J=J, worth=LITTLE))
+            return score_model(context, fit(context.objective, start, J=J, worth=REFIT_SCORE_TOLERANCE))
         except SolveError:
             continue
     return base

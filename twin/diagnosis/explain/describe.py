@@ -18,7 +18,7 @@ from twin.diagnosis.explain.words import components, doubtful, mixed, nearest, s
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.repeatability import repeatability
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import MUCH, TOLD
+from twin.diagnosis.thresholds import LARGE_STRUCTURE, STRUCTURE_WORTH_A_WORD
 from twin.diagnosis.verdict.gate import Gated
 from twin.diagnosis.verdict.judge import Judgement
 
@@ -70,7 +70,7 @@ def describe(context: FitContext, found: Search, gated: Gated, judged: Judgement
 
 
 def _parts(size: float, beyond: float) -> str:
-    within = f", {beyond:.2f} beyond what the robot's description is good for" if size - beyond > TOLD else ""
+    within = f", {beyond:.2f} beyond what the robot's description is good for" if size - beyond > STRUCTURE_WORTH_A_WORD else ""
     return f"{size:.2f} sigma{within}"
 
 
@@ -84,13 +84,13 @@ def _left(context: FitContext, found: Search, judged: Judgement, limits: Accepta
         words += describe_location(prepared, trials, off, predicted)
         pulled = pose_dependent_force(context, final)
         words += pulled.words() if pulled else ""
-    words += chatter(signs.quick) if signs.quick > max(MUCH, limits.left) else ""
+    words += chatter(signs.quick) if signs.quick > max(LARGE_STRUCTURE, limits.left) else ""
     words += since(prepared, trials, found.base.fit.z.reshape(shape))
     words += mixed(prepared, judged.rigs) if judged.rigs else ""
     words += "".join(f" The {limit}." for limit in signs.strained)
     found_something = judged.verdict == "partly_explained"
     return words + (
-        unlike(signs.unseen, final.discrepancy.size) if found_something and signs.unseen > max(MUCH, limits.left) else ""
+        unlike(signs.unseen, final.discrepancy.size) if found_something and signs.unseen > max(LARGE_STRUCTURE, limits.left) else ""
     )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twin.diagnosis.thresholds import ALIKE, APART, TWICE
+from twin.diagnosis.thresholds import BEND_JUMP_RATIO, EVEN_MARKER_ERRORS_RATIO, SINGLE_MARKER_ERROR_RATIO
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
 from twin.robots.family import load_family
@@ -33,9 +33,9 @@ def place(prepared: PreparedRecording, x: np.ndarray) -> str:
     names = list(columns)
     size = np.array([np.sqrt((x[:, c] ** 2).mean()) for c in columns.values()])
     most = int(np.argmax(size))
-    if size[most] < ALIKE * size.min():
+    if size[most] < EVEN_MARKER_ERRORS_RATIO * size.min():
         return "it is alike along the body"
-    if size[most] > APART * np.sort(size)[-2]:
+    if size[most] > SINGLE_MARKER_ERROR_RATIO * np.sort(size)[-2]:
         return f"{names[most]} alone carries most of it: check that marker"
     if most == len(names) - 1:
         return f"it grows from {names[0]} to {names[-1]}"
@@ -75,7 +75,7 @@ def misbent_segment(
     jump = (np.diff(turn, axis=1, prepend=0.0) ** 2).sum(axis=2).mean(axis=0)  # at the base and every marker but the last
     both = np.minimum(jump[:-1], jump[1:])
     at = int(np.argmax(both))
-    return at if both[at] > TWICE * np.delete(jump, [at, at + 1]).max() else None
+    return at if both[at] > BEND_JUMP_RATIO * np.delete(jump, [at, at + 1]).max() else None
 
 
 def _chords(x: np.ndarray) -> np.ndarray:

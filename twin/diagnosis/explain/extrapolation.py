@@ -16,12 +16,12 @@ from twin.diagnosis.evidence.half_session import halves
 from twin.diagnosis.evidence.left_out import left_out
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import EDGE, HALVED, PACE, WORSE
+from twin.diagnosis.thresholds import FEWEST_TRIALS_TO_HALVE, RANGE_END_SHARE, SAME_RATE_RATIO, WORSE_ERROR_RATIO
 from twin.diagnosis.verdict.gate import Gated
 from twin.foundation.display_names import display_name
 from twin.prediction.prepared import PreparedRecording
 
-SHOWN = {"payload": "payload", "torque": "load torque", "rate": "rate of pull", "mount": "mount"}
+NAMED_CONDITIONS = {"payload": "payload", "torque": "load torque", "rate": "rate of pull", "mount": "mount"}
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ def extrapolation(context: FitContext, final: ScoredModel, gated: Gated, by_time
     inside = {e: left_out(context, w.fit).square for e, w in models.items()}
 
     def told(condition: str, count: int, far: dict[str, float]) -> Extrapolation:
-        harmful = tuple(e for e in added if inside[e] > inside[""] and far[""] > WORSE**2 * far[e])
+        harmful = tuple(e for e in added if inside[e] > inside[""] and far[""] > WORSE_ERROR_RATIO**2 * far[e])
         return Extrapolation(condition, count, float(np.sqrt(inside[""])), float(np.sqrt(far[""])), harmful)
 
     out = []
     for condition, groups in levels(context.prepared, context.trials).items():
         out.append(told(condition, len(groups), {e: left_out(context, w.fit, groups).square for e, w in models.items()}))
-    if by_time and len(context.trials) >= HALVED:
+    if by_time and len(context.trials) >= FEWEST_TRIALS_TO_HALVE:
         out.append(told("half of the session", 2, {e: halves(context, w).square for e, w in models.items()}))
     return tuple(out)
 
@@ -75,12 +75,12 @@ def levels(prepared: PreparedRecording, trials: Sequence[int]) -> dict[str, list
     values = {
         "payload": np.array([i.loads.payload for i in inputs]),
         "torque": np.array([np.mean(i.loads.torque) for i in inputs]),
-        "rate": np.log(np.maximum(speed, 1e-12)) / np.log(PACE),
+        "rate": np.log(np.maximum(speed, 1e-12)) / np.log(SAME_RATE_RATIO),
     }
-    found = {name: _apart(v, 1.0 if name == "rate" else EDGE * np.ptp(v)) for name, v in values.items()}
+    found = {name: _apart(v, 1.0 if name == "rate" else RANGE_END_SHARE * np.ptp(v)) for name, v in values.items()}
     mounts = [tuple(np.round(i.loads.gravity, 3)) for i in inputs]
     found["mount"] = [[k for k, m in enumerate(mounts) if m == each] for each in dict.fromkeys(mounts)]
-    return {SHOWN[name]: groups for name, groups in found.items() if len(groups) > 2 and max(map(len, groups)) > 1}
+    return {NAMED_CONDITIONS[name]: groups for name, groups in found.items() if len(groups) > 2 and max(map(len, groups)) > 1}
 
 
 def _apart(values: np.ndarray, gap: float) -> list[list[int]]:

@@ -18,7 +18,7 @@ from twin.diagnosis.calibration.fit import Evaluation, Fit, Objective
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
-from twin.diagnosis.thresholds import CLEAR, HEAVIEST, HELD, LEAST_LOAD, MOST_RUNS
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, HEAVIEST_PAYLOAD, HELD_COMMAND_SHARE, LEAST_PAYLOAD, MOST_REPEATS
 from twin.foundation.errors import SolveError
 from twin.measurements import Channel
 from twin.prediction.prepared import Inputs, Output, PreparedRecording
@@ -58,7 +58,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
         loaded = [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]
     else:
         heaviest = max(i.loads.payload for i in prepared.inputs)
-        payloads = sorted({0.0, min(HEAVIEST, max(LEAST_LOAD, 3.0 * heaviest))})
+        payloads = sorted({0.0, min(HEAVIEST_PAYLOAD, max(LEAST_PAYLOAD, 3.0 * heaviest))})
         loaded = [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
@@ -69,7 +69,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
     up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
-    hold = np.concatenate([[0.0], np.full(60, HELD)])
+    hold = np.concatenate([[0.0], np.full(60, HELD_COMMAND_SHARE)])
     for i in np.flatnonzero(top > 0.0):  # what was never commanded has no range to stay within
         alone = np.eye(n)[i]
         what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", 4.0)
@@ -132,8 +132,8 @@ def next_experiment(prepared: PreparedRecording, noise: Noise, a: Fit, b: Fit, j
         except SolveError:  # a neighbour of b has no equilibrium there: no trial to send anyone to
             continue
         if best is None or best.separation < T:
-            best = Experiment(words, inputs, T, max(1, int(np.ceil(CLEAR / max(T, 1e-9)))), rivals)
-    return best if best is not None and best.repeats <= MOST_RUNS else None
+            best = Experiment(words, inputs, T, max(1, int(np.ceil(CLEAR_CHI_SQUARE / max(T, 1e-9)))), rivals)
+    return best if best is not None and best.repeats <= MOST_REPEATS else None
 
 
 def _foreseen(prepared: PreparedRecording, noise: Noise) -> tuple[PreparedRecording, Noise]:

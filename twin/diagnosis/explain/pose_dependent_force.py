@@ -5,8 +5,8 @@ No law of the catalogue, since every such thing has its own. To first order in w
     F(x) = f + G (x - mean x),
 
 twelve numbers, whose effect on the white residual is C_a per newton along axis a, so that z ~ C_a (f_a + G_ab (x - mean x)_b) is
-linear least squares beside the robot's own parameters. It is said where it takes `FELT` of the smooth error, f alone does not, and
-the evidence is `ACCEPT` after twelve numbers.
+linear least squares beside the robot's own parameters. It is said where it takes `TIP_FORCE_SHARE` of the smooth error, f alone
+does not, and the evidence is `LEAST_EVIDENCE` after twelve numbers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from twin.body import Loads
 from twin.diagnosis.calibration.fit import Model, prior_weight
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import ACCEPT, FELT, PROBE
+from twin.diagnosis.thresholds import LEAST_EVIDENCE, PROBE_FORCE, TIP_FORCE_SHARE
 from twin.effects.base.effect import Effect
 from twin.foundation.parameters import Parameter
 
@@ -28,7 +28,7 @@ class TipForce(Effect):
     """A constant force on the tip, in the base frame."""
 
     id = "tip_force"
-    parameters = tuple(Parameter(f"along_{a}", 0.0, "N", -10.0, 10.0, "of a difference", scale=PROBE) for a in "xyz")
+    parameters = tuple(Parameter(f"along_{a}", 0.0, "N", -10.0, 10.0, "of a difference", scale=PROBE_FORCE) for a in "xyz")
     moves_with = "nothing"
 
     def surround(self, loads: Loads) -> Loads:
@@ -57,7 +57,7 @@ def pose_dependent_force(context: FitContext, final: ScoredModel) -> PoseDepende
         return None
     at = body.senses["tip_x"].index
     tip = np.concatenate([fit.evaluation.traces[k].true.markers[:, at] for k in context.trials])
-    twin, probe = fit.model.twin, PROBE * context.prepared.robot.size.force
+    twin, probe = fit.model.twin, PROBE_FORCE * context.prepared.robot.size.force
     pushed = [(Model(replace(twin, effects=(*twin.effects, TipForce({f"along_{a}": probe}))), ()), probe) for a in "xyz"]
     C = context.objective.columns(fit.evaluation, pushed, unsolved="zeros")
     away = tip - tip.mean(axis=0)
@@ -65,8 +65,8 @@ def pose_dependent_force(context: FitContext, final: ScoredModel) -> PoseDepende
     linear = (C[:, :, None] * rows[:, None, :]).reshape(len(C), -1)
     (constant, _), (whole, numbers) = (_taken(context, final, K) for K in (C, np.hstack([C, linear])))
     structure = size**2 * context.objective.n
-    chance = len(numbers) * np.log(context.objective.n) + ACCEPT
-    if whole < max(FELT * structure, chance) or constant >= FELT * structure:
+    chance = len(numbers) * np.log(context.objective.n) + LEAST_EVIDENCE
+    if whole < max(TIP_FORCE_SHARE * structure, chance) or constant >= TIP_FORCE_SHARE * structure:
         return None
     change = np.linalg.norm(away @ numbers[3:].reshape(3, 3).T, axis=1)
     return PoseDependentForce(min(1.0, whole / structure), float(np.quantile(change, 0.9)))

@@ -21,7 +21,7 @@ from twin.diagnosis.evidence.first_order import Dictionary, dictionary
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
-from twin.diagnosis.thresholds import ALONE, EVEN, RIVAL
+from twin.diagnosis.thresholds import EVEN_CHANCE, LARGE_STRUCTURE_WITHOUT_EFFECT, RIVAL_SHARE
 
 Share = tuple[str, float]
 
@@ -35,12 +35,12 @@ class WithinTrial:
     shares: tuple[Share, ...]
 
     def words(self) -> str:
-        if self.size < np.hypot(1.0, ALONE):
+        if self.size < np.hypot(1.0, LARGE_STRUCTURE_WITHOUT_EFFECT):
             return "as much as rows scatter by"
-        if not self.shares or self.shares[0][1] < EVEN:
+        if not self.shares or self.shares[0][1] < EVEN_CHANCE:
             return "of which no effect known here takes half"
         (first, most), *others = self.shares
-        rivals = [f"{e.replace('_', ' ')} {100 * s:.0f} %" for e, s in others if s > RIVAL * most]
+        rivals = [f"{e.replace('_', ' ')} {100 * s:.0f} %" for e, s in others if s > RIVAL_SHARE * most]
         told = f"; told apart by nothing here: {', '.join(rivals)}" if rivals else ""
         return f"of whose square {first.replace('_', ' ')} takes {100 * most:.0f} % on trials left out in turn{told}"
 

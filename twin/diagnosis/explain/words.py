@@ -14,7 +14,7 @@ from twin.diagnosis.checks.mixed_robots import MixedRobots
 from twin.diagnosis.evidence.discrepancy import COMPONENTS, IN_WORDS, Discrepancy
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.explain.error_location import place
-from twin.diagnosis.thresholds import NEAR, SHOWN, SHUFFLES, STEP
+from twin.diagnosis.thresholds import HINT_SHARE, SHUFFLED_ORDERS, STEP_LEFTOVER_SHARE, TRIALS_NAMED
 from twin.foundation.display_names import display_name
 from twin.prediction.prepared import PreparedRecording
 
@@ -73,8 +73,8 @@ def since(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) -> 
 def mixed(prepared: PreparedRecording, rigs: MixedRobots) -> str:
     """Two rigs' data in one set, in words."""
     label = {t.name: t.label for t in prepared.recording.trials}
-    few = ", ".join(label[prepared.inputs[k].name] for k in rigs.other[:SHOWN])
-    more = f" and {len(rigs.other) - SHOWN} more" if len(rigs.other) > SHOWN else ""
+    few = ", ".join(label[prepared.inputs[k].name] for k in rigs.other[:TRIALS_NAMED])
+    more = f" and {len(rigs.other) - TRIALS_NAMED} more" if len(rigs.other) > TRIALS_NAMED else ""
     return (
         f" The trials want two different robots, {len(rigs.one)} the one, {len(rigs.other)} the other ({few}{more}), more than "
         "any known effect: are two rigs in this set, or was it rebuilt? Diagnose the two groups apart."
@@ -91,7 +91,7 @@ def unlike(unseen: float, seen: float) -> str:
 
 def nearest(effects: Sequence[str], share: float) -> str:
     """A hint: the best known explanation that was not claimed, and the share it takes off the error left out; "" if little."""
-    if not share > NEAR:
+    if not share > HINT_SHARE:
         return ""
     names = " with ".join(display_name(e) for e in effects)
     return f" Of the known effects {names} comes nearest, but takes only {100 * share:.0f} % off the error on trials left out."
@@ -126,7 +126,7 @@ def change(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) ->
     M -= M.mean(axis=0)
     K = len(M)
     after = np.arange(2, K - 1)  # two trials at least on either side: one alone is that trial's
-    orders = np.random.default_rng(0).permuted(np.tile(np.arange(K), (SHUFFLES, 1)), axis=1)
+    orders = np.random.default_rng(0).permuted(np.tile(np.arange(K), (SHUFFLED_ORDERS, 1)), axis=1)
 
     def explained(rows: np.ndarray) -> np.ndarray:
         return (np.cumsum(rows, axis=-2)[..., after - 1, :] ** 2).sum(axis=-1) * K / (after * (K - after))
@@ -137,7 +137,7 @@ def change(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) ->
     t = np.array([prepared.inputs[k].clock[0] for k in trials])
     t = (t - t.mean()) / np.linalg.norm(t - t.mean())
     scatter, drift = float((M**2).sum()), float(((t @ M) ** 2).sum())
-    if steps[best] <= max(by_chance, (1.0 - STEP) * scatter, drift):
+    if steps[best] <= max(by_chance, (1.0 - STEP_LEFTOVER_SHARE) * scatter, drift):
         return None
     return trials[after[best] - 1], trials[after[best]]
 

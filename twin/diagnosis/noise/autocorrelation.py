@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-LEAST = 4  # directions without anything shared, that a correlation is read from
-SEEN = 0.7  # of the rows: a channel seen in fewer is left out
-CLEAR = 3.0  # standard errors
+FEWEST_DIRECTIONS = 4  # directions without anything shared, that a correlation is read from
+LEAST_ROWS_SEEN = 0.7  # of the rows: a channel seen in fewer is left out
+CLEAR_AUTOCORRELATION = 3.0  # standard errors
 
 
 def autocorrelation(residual: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
@@ -28,18 +28,18 @@ def autocorrelation(residual: Sequence[np.ndarray], member: np.ndarray) -> np.nd
     rho = np.zeros(member.size)
     seen = np.isfinite(np.concatenate(residual)).mean(axis=0)
     for g in range(member.max() + 1):
-        columns = np.flatnonzero((member == g) & (seen > SEEN))
-        if columns.size < LEAST:
+        columns = np.flatnonzero((member == g) & (seen > LEAST_ROWS_SEEN))
+        if columns.size < FEWEST_DIRECTIONS:
             continue
         one, two, four = (_differences([r[:, columns] for r in residual], lag) for lag in (1, 2, 4))
         if len(four) <= columns.size:
             continue
         own = _own(four)
-        if own.shape[1] < LEAST:
+        if own.shape[1] < FEWEST_DIRECTIONS:
             continue
         V_1, V_2 = (float(np.mean((d @ own) ** 2)) for d in (one, two))
         found = V_2 / V_1 - 1.0 if V_1 > 0.0 else 0.0
-        if found > CLEAR * np.sqrt(2.0 / (len(two) * own.shape[1])):
+        if found > CLEAR_AUTOCORRELATION * np.sqrt(2.0 / (len(two) * own.shape[1])):
             rho[member == g] = min(found, 0.9)
     return rho
 

@@ -14,13 +14,13 @@ from twin.diagnosis.noise.autocorrelation import autocorrelation
 from twin.diagnosis.noise.model import DECLARED, Noise
 from twin.prediction.prepared import Inputs, PreparedRecording
 
-LOCKED = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
-LAGS = (1, 2, 3, 4)  # rows, at which what noise remembers is read off repeats
-CLEAR = 3.0  # standard errors of a correlation that is clearly there
-MOST = 0.9  # correlation from row to row: beyond it noise is no noise, but drifts
-SLOWEST = 0.97  # the same, of what lasts beside white noise
-OUTLYING = 1e-6  # probability: rows that noise makes less often are not noise
-SAME = (
+INPUT_NOISE_RATIO = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
+CORRELATION_LAGS = (1, 2, 3, 4)  # rows, at which what noise remembers is read off repeats
+CLEAR_CORRELATION = 3.0  # standard errors of a correlation that is clearly there
+LARGEST_CORRELATION = 0.9  # correlation from row to row: beyond it noise is no noise, but drifts
+LARGEST_FADE = 0.97  # the same, of what lasts beside white noise
+OUTLIER_PROBABILITY = 1e-6  # probability: rows that noise makes less often are not noise
+REPEAT_DIFFERENCE = (
     0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
 )
 
@@ -38,13 +38,13 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
             )
             if not same_loads or len(A.time) != len(B.time):
                 continue
-            if np.abs((A.time - A.time[0]) - (B.time - B.time[0])).max() > SAME * np.ptp(A.time):
+            if np.abs((A.time - A.time[0]) - (B.time - B.time[0])).max() > REPEAT_DIFFERENCE * np.ptp(A.time):
                 continue  # the same way at another pace
             torque = np.broadcast_arrays(A.loads.torque, B.loads.torque)
-            if np.sqrt(np.mean((torque[0] - torque[1]) ** 2)) > SAME * np.abs(torque).max():
+            if np.sqrt(np.mean((torque[0] - torque[1]) ** 2)) > REPEAT_DIFFERENCE * np.abs(torque).max():
                 continue
             a_u, b_u = A.command / prepared.reading, B.command / prepared.reading
-            if np.sqrt(np.mean((a_u - b_u) ** 2)) < max(SAME * np.ptp(a_u), 2.0):
+            if np.sqrt(np.mean((a_u - b_u) ** 2)) < max(REPEAT_DIFFERENCE * np.ptp(a_u), 2.0):
                 pairs.append((a, b))
     return pairs
 
@@ -135,15 +135,16 @@ def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray,
     and a gain of each input, felt through its sensitivities G (n, m, n_tendon).
 
     All gains together are a stiffness: a robot that was warmer, or older, the second time is not noise. Each counts by what it may
-    scatter by, its group's spread and the inputs' `reading` (n_tendon,); NaN where the inputs' share is `LOCKED` times the spread.
-    There tendons hold each other, a tenth of a millimetre is newtons to the twin, and what gives way in the robot is not known.
+    scatter by, its group's spread and the inputs' `reading` (n_tendon,); NaN where the inputs' share is `INPUT_NOISE_RATIO` times
+    the spread. There tendons hold each other, a tenth of a millimetre is newtons to the twin, and what gives way in the robot is
+    not known.
     """
     t = (inputs.time - inputs.time[0]) / max(inputs.time[-1] - inputs.time[0], 1e-9) - 0.5
     basis = np.stack([np.ones_like(t), t], axis=1)
     felt = np.concatenate([G, G * inputs.command[:, None, :]], axis=2)
     scale, noise = _scales(d, member)[member], np.sqrt(((G * reading) ** 2).sum(axis=2))  # (m,), (n, m)
     weight = 1.0 / np.hypot(scale, noise)
-    locked = noise >= LOCKED * scale
+    locked = noise >= INPUT_NOISE_RATIO * scale
     d = np.where(locked & ~locked.all(axis=0), np.nan, d)  # a channel that would be left out altogether is what there is
     out, moved = np.full_like(d, np.nan), np.zeros_like(felt)
     for j in range(d.shape[1]):
@@ -171,7 +172,7 @@ def _likeliest(
     d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Where sigma is sought, rows whose |z|^2 noise exceeds in one of a
     million are left out, again and again until none is left: a body that snaps over an obstacle from row to row is not noisy."""
     present = np.isfinite(d)
-    unlikely = chi2.isf(OUTLYING, np.maximum(present.sum(axis=1), 1))
+    unlikely = chi2.isf(OUTLIER_PROBABILITY, np.maximum(present.sum(axis=1), 1))
     scale = _scales(d, member)
     d, G = np.where(present, d, 0.0), G * present[:, :, None]  # what is missing says nothing, of no channel and no input
 
@@ -226,19 +227,19 @@ def _remembered(
         if not alone > 0.0:  # never measured
             continue
         power = sum(float((x[:, own] ** 2).sum()) for x in y) / alone
-        lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in LAGS]) / (told * power)
-        sure = CLEAR * spread / told
+        lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in CORRELATION_LAGS]) / (told * power)
+        sure = CLEAR_CORRELATION * spread / told
         if lagged[0] > sure:
-            rho[own] = fade[own] = min(lagged[0], MOST)
+            rho[own] = fade[own] = min(lagged[0], LARGEST_CORRELATION)
             if lagged[1] - lagged[0] ** 2 > sure * np.sqrt(1.0 + 4.0 * lagged[0] ** 2):
                 rho[own], fade[own] = _fading(lagged)
     return rho, fade
 
 
 def _fading(lagged: np.ndarray) -> tuple[float, float]:
-    """s f and f of the s f^k, s at most 1, that are nearest to the correlations `lagged` at `LAGS`."""
-    fade = np.linspace(max(lagged[0], 0.01), SLOWEST, 200)
-    powers = fade[:, None] ** np.array(LAGS)
+    """s f and f of the s f^k, s at most 1, that are nearest to the correlations `lagged` at `CORRELATION_LAGS`."""
+    fade = np.linspace(max(lagged[0], 0.01), LARGEST_FADE, 200)
+    powers = fade[:, None] ** np.array(CORRELATION_LAGS)
     share = np.clip(powers @ lagged / (powers**2).sum(axis=1), 0.0, 1.0)
     best = int(np.argmin(((lagged - share[:, None] * powers) ** 2).sum(axis=1)))
     return float(share[best] * fade[best]), float(fade[best])

@@ -14,7 +14,7 @@ import numpy as np
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import SHAKEN
+from twin.diagnosis.thresholds import FRICTION_NOISE_DRAWS
 from twin.foundation.errors import SolveError
 from twin.prediction.simulate import SolveOptions, simulate
 
@@ -35,12 +35,12 @@ def noise_credit(context: FitContext, with_it: ScoredModel, without: ScoredModel
 
 
 def resimulated_noise(context: FitContext, fit: Fit) -> float:
-    """|z|^2 of what moves when as much noise is drawn onto the readings once more, in the mean of `SHAKEN` draws, the same ones for
-    every set. Raises SolveError."""
+    """|z|^2 of what moves when as much noise is drawn onto the readings once more, in the mean of `FRICTION_NOISE_DRAWS` draws, the
+    same ones for every set. Raises SolveError."""
     prepared, whitener, twin = context.prepared, context.objective.whitener, fit.model.twin
     rng, total = np.random.default_rng(0), 0.0
     at = [fit.evaluation.traces[k].outputs(twin, prepared) for k in context.trials]
-    for _ in range(SHAKEN):
+    for _ in range(FRICTION_NOISE_DRAWS):
         inputs = tuple(
             replace(i, command=i.command + whitener.noise.drive * rng.normal(size=i.command.shape)) for i in prepared.inputs
         )
@@ -49,4 +49,4 @@ def resimulated_noise(context: FitContext, fit: Fit) -> float:
         )
         moved = [t.outputs(twin, prepared) - y for t, y in zip(traces, at, strict=True)]
         total += sum(float((whitener.trial(k, d) ** 2).sum()) for k, d in enumerate(moved))
-    return total / SHAKEN
+    return total / FRICTION_NOISE_DRAWS

@@ -15,7 +15,7 @@ from twin.diagnosis.calibration.objective import sensitivity_at
 from twin.diagnosis.explain.within_trial import within_trial
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.estimate import repeats, row_noise
-from twin.diagnosis.thresholds import BREAK, LASTING, OVERSTATED, SURE
+from twin.diagnosis.thresholds import LASTING_DIFFERENCE, LONG_PAUSE, OVERSTATED_NOISE_RATIO, SIGNIFICANT_STANDARD_ERRORS
 from twin.foundation.errors import SolveError
 from twin.prediction.evaluate import OUTPUT_GROUPS
 
@@ -23,13 +23,13 @@ from twin.prediction.evaluate import OUTPUT_GROUPS
 def repeatability(context: FitContext, found: Fit) -> tuple[str, ...]:
     """Of each group of outputs, in words, where it matters.
 
-    Declared noise (where no trial repeats another) that is `OVERSTATED` times what rows scatter by, s = RMS (r_(i-1) - 2 r_i +
-    r_(i+1)) / sqrt(6) of the residuals r under the twin in force, less what the inputs' noise makes: it says how trials repeat.
-    What r moves by within trials is named beside it, for there s is what a right twin would leave, and the effect that goes that
-    way (`within`).
+    Declared noise (where no trial repeats another) that is `OVERSTATED_NOISE_RATIO` times what rows scatter by, s = RMS (r_(i-1) -
+    2 r_i + r_(i+1)) / sqrt(6) of the residuals r under the twin in force, less what the inputs' noise makes: it says how trials
+    repeat. What r moves by within trials is named beside it, for there s is what a right twin would leave, and the effect that goes
+    that way (`within`).
 
-    Pairs of repeats whose means differ, by RMS d / sqrt(2), more than `LASTING` of the noise and than chance: between sessions,
-    `BREAK` apart, and within one.
+    Pairs of repeats whose means differ, by RMS d / sqrt(2), more than `LASTING_DIFFERENCE` of the noise and than chance: between
+    sessions, `LONG_PAUSE` apart, and within one.
     """
     groups = dict.fromkeys(o.group for o in context.prepared.outputs)
     if context.objective.whitener.noise.declared:
@@ -47,7 +47,7 @@ def _declared(context: FitContext, found: Fit, groups: Iterable[str]) -> Iterato
     for group in groups:
         own = np.array([g == group for g in of])
         declared, scatter = _rms(noise.sigma[own]), _rms(rows.sigma[own])
-        if not declared > OVERSTATED * scatter > 0.0:
+        if not declared > OVERSTATED_NOISE_RATIO * scatter > 0.0:
             continue
         unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
         moves = _rms(np.concatenate([(r - _means(r))[:, own].ravel() for r in raw]))
@@ -72,7 +72,7 @@ def _repeated(context: FitContext, raw: list[np.ndarray], group: str) -> Iterato
     sigma = _rms(noise.sigma[own])
     chance = _rms(noise.in_means(min(len(raw[place[a]]) for a, _ in pairs))[own])
     whole = _rms(np.array(list(size.values())))
-    if not whole > max(LASTING * sigma, SURE * chance):
+    if not whole > max(LASTING_DIFFERENCE * sigma, SIGNIFICANT_STANDARD_ERRORS * chance):
         return
     unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
 
@@ -95,7 +95,7 @@ def _session(context: FitContext, trial: int) -> int:
     """How many breaks there were before a trial."""
     inputs = sorted(context.prepared.inputs, key=lambda i: float(i.clock[0]))
     begun = context.prepared.inputs[trial].clock[0]
-    return sum(int(b.clock[0] - a.clock[-1] > BREAK and b.clock[0] <= begun) for a, b in pairwise(inputs))
+    return sum(int(b.clock[0] - a.clock[-1] > LONG_PAUSE and b.clock[0] <= begun) for a, b in pairwise(inputs))
 
 
 def _means(r: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnosis.thresholds import ENDED, PROBED
+from twin.diagnosis.thresholds import DRIVE_END_RATIO, PROBED_ROWS
 from twin.prediction.prepared import Inputs
 from twin.prediction.twin import Twin
 
@@ -29,10 +29,10 @@ def transmitted_noise(twin: Twin, inputs: Inputs, noise: np.ndarray, antagonists
             read = replace(inputs, command=command + by * noise).signals.with_changes(antagonists=antagonists)
             return laws.drive(laws.command(read)).command
 
-        at, rows = driven(0.0), np.arange(len(command))[:, None] % PROBED
+        at, rows = driven(0.0), np.arange(len(command))[:, None] % PROBED_ROWS
         lasting = (driven(1.0) - at) ** 2
-        whole = np.maximum(lasting, ENDED**2 * lasting.max(axis=0))
-        square = sum((driven(1.0 * (rows == first)) - at) ** 2 for first in range(PROBED))
+        whole = np.maximum(lasting, DRIVE_END_RATIO**2 * lasting.max(axis=0))
+        square = sum((driven(1.0 * (rows == first)) - at) ** 2 for first in range(PROBED_ROWS))
         np.divide(square, whole, out=share, where=whole > 0.0)
     time = inputs.time - inputs.time[0]
     late = sum(a * -np.expm1(-time / tau).mean() for a, tau in zip(laws.creep.amplitude, laws.creep.time, strict=True))

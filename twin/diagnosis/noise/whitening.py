@@ -16,7 +16,7 @@ if A S A' were the same in the rows before. A channel that was not seen in the r
 A tendon that a law makes slack does not feel its reading's noise, and |z|^2 falls by it though the law need not be true: the robot
 has never felt it. `Whitener.heard` is what that noise adds where the tendon is taut, so that laws can be compared without it
 (the corrected score of errors in variables, Nakamura, Biometrika 77, 1990). A tendon that a law leaves x noises above slack feels
-max(0, x + e): of the noise's square 1 - Var max(0, x + e) is lost, which is the share of readings under `SILENT`, to 0.03.
+max(0, x + e): of the noise's square 1 - Var max(0, x + e) is lost, which is the share of readings under `SLACK_READING`, to 0.03.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from scipy.special import ndtr
 from twin.diagnosis.noise.model import Noise
 from twin.foundation.compiled import jit
 
-SYNC = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
-SILENT = 0.4  # noises of a reading above slack: as many are below as noise's square is cut off there
-BLUR = 0.25  # noises, over which that is blurred where a fit is to feel it: derivatives then reach the readings beside it
-APART = 12  # rows, after which what a filter kept of one reading's noise is forgotten
-SETTLED = 1e-12  # of the covariance S, which is at most I
+ROW_SYNCHRONY = 0.05  # of a sample interval: how well inputs and markers of one row are known to belong to the same moment
+SLACK_READING = 0.4  # noises of a reading above slack: as many are below as noise's square is cut off there
+SLACK_BLUR = 0.25  # noises, over which that is blurred where a fit is to feel it: derivatives then reach the readings beside it
+FILTER_MEMORY_ROWS = 12  # rows, after which what a filter kept of one reading's noise is forgotten
+SETTLED_COVARIANCE = 1e-12  # of the covariance S, which is at most I
 
 
 class Filter:
@@ -65,7 +65,7 @@ class Filter:
                 self.F = np.concatenate([self.F, np.where(last[:, :, None], back, 0.0) @ root * self.scale[:, :, None]], axis=2)
             gram = self.F.transpose(0, 2, 1) @ self.F
             self.told = np.ascontiguousarray(np.linalg.inv(np.eye(gram.shape[1]) + gram)[:, :t])
-            settled = not back.any() or np.abs(self.told[:, :, :t] - covariance).max() < SETTLED
+            settled = not back.any() or np.abs(self.told[:, :, :t] - covariance).max() < SETTLED_COVARIANCE
             covariance = self.told[:, :, :t]
         eigen, V = np.linalg.eigh(gram)
         eigen = np.maximum(eigen, 1e-12)
@@ -139,13 +139,13 @@ class Whitener:
 
     def _shared(self, present: np.ndarray, G: np.ndarray, command: np.ndarray) -> np.ndarray:
         change = np.abs(np.diff(command, axis=0, prepend=command[:1], append=command[-1:]))  # (n + 1, t)
-        spread = np.hypot(self.noise.drive, SYNC * np.maximum(change[1:], change[:-1]))  # (n, t)
+        spread = np.hypot(self.noise.drive, ROW_SYNCHRONY * np.maximum(change[1:], change[:-1]))  # (n, t)
         return spread[:, None, :] * G / self.noise.sigma[:, None] * present[:, :, None]
 
     def _heard(self, k: int, G: np.ndarray) -> np.ndarray:
         """Each row's noise by itself, of all rows that are so far apart that none is felt in another's."""
         n, _, n_tendon = G.shape
-        heard, steps = np.zeros((n, n_tendon)), min(APART, n) if self.filters[k].gain.any() else 1
+        heard, steps = np.zeros((n, n_tendon)), min(FILTER_MEMORY_ROWS, n) if self.filters[k].gain.any() else 1
         for t in np.flatnonzero(self.noise.drive):
             noise = self.noise.drive[t] * G[:, :, t]
             for first in range(steps):
@@ -158,12 +158,12 @@ class Whitener:
     def clipped_input_noise(self, k: int, tension: np.ndarray) -> np.ndarray:
         """Of `heard`, what is cut off near slack where a law has a tendon under tension (n_k, n_tendon) N, slack below zero."""
         above = np.divide(tension, self.noise.drive, out=np.full_like(tension, np.inf), where=self.noise.drive > 0.0)
-        return self.input_noise_energy[k] * ndtr((SILENT - above) / BLUR)
+        return self.input_noise_energy[k] * ndtr((SLACK_READING - above) / SLACK_BLUR)
 
     def of(self, which: Sequence[int]) -> Whitener:
         """The same of some of its trials alone, by their positions."""
         part = copy(self)
-        for name in ("present", "heard", "filters"):
+        for name in ("present", "input_noise_energy", "filters"):
             setattr(part, name, [getattr(self, name)[k] for k in which])
         return part
 

@@ -13,7 +13,7 @@ from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.scored_model import EffectForms, ScoredModel, score_model
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.search import Known, Search, extend
-from twin.diagnosis.thresholds import BESIDE, FAR, HALF
+from twin.diagnosis.thresholds import LEFT_BY_EACH_EFFECT, LEFT_BY_EFFECTS, SETS_FITTED_TO_HALVES
 from twin.foundation.errors import SolveError
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
@@ -56,7 +56,7 @@ def most_predictive(context: FitContext, found: Search) -> ScoredModel | None:
         return seen[laws]
 
     near = {e: _each(e, left_out(context, w.fit).square) for e, w in sets.items()}
-    few = sorted((e for e in sets if near[e] < near[base.forms]), key=lambda e: near[e])[:FAR]
+    few = sorted((e for e in sets if near[e] < near[base.forms]), key=lambda e: near[e])[:SETS_FITTED_TO_HALVES]
     for laws in sorted(few, key=lambda e: _each(e, error(e).square)):
         fewer = [e for e in combinations(laws, len(laws) - 1) if e in sets]
         if _half(error(laws), error(base.forms)) and all(_quarter(error(laws), error(e)) for e in fewer):
@@ -66,7 +66,7 @@ def most_predictive(context: FitContext, found: Search) -> ScoredModel | None:
 
 def _each(laws: EffectForms, square: float) -> float:
     """A squared error that every effect of a set must pay for."""
-    return square / BESIDE ** len(laws)
+    return square / LEFT_BY_EACH_EFFECT ** len(laws)
 
 
 def add_one_effect(context: FitContext, core: ScoredModel, found: Search, limits: AcceptanceLimits) -> ScoredModel:
@@ -75,7 +75,7 @@ def add_one_effect(context: FitContext, core: ScoredModel, found: Search, limits
     context.progress(f"beside {' + '.join(core.effects)}")
     fresh: Known = {}
     extend(context, found.base, core, dictionary(context.objective, core.fit), limits, fresh)
-    bar = BESIDE * left_out(context, core.fit).square
+    bar = LEFT_BY_EACH_EFFECT * left_out(context, core.fit).square
     helpful = [w for w in fresh.values() if left_out(context, w.fit).square <= bar and solves(context, w.fit.model.twin)]
     best = max(helpful, key=lambda w: w.score, default=core)
     return _converged(context, best) if best.score >= core.score + limits.accept else core
@@ -91,15 +91,19 @@ def halved(context: FitContext, base: ScoredModel, best: ScoredModel) -> bool:
 
 
 def _half(after: PredictiveErrors, before: PredictiveErrors) -> bool:
-    return isfinite(after.square) and after.square <= HALF * before.square and after.headline <= HALF * before.headline
+    return (
+        isfinite(after.square)
+        and after.square <= LEFT_BY_EFFECTS * before.square
+        and after.headline <= LEFT_BY_EFFECTS * before.headline
+    )
 
 
 def _quarter(after: PredictiveErrors, before: PredictiveErrors) -> bool:
-    return after.square <= BESIDE * before.square
+    return after.square <= LEFT_BY_EACH_EFFECT * before.square
 
 
 def _smaller(context: FitContext, base: ScoredModel, best: ScoredModel) -> bool:
-    return best.discrepancy.beyond(context.accuracy) <= HALF * base.discrepancy.beyond(context.accuracy)
+    return best.discrepancy.beyond(context.accuracy) <= LEFT_BY_EFFECTS * base.discrepancy.beyond(context.accuracy)
 
 
 def solves(context: FitContext, twin: Twin) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnosis.thresholds import EVENLY, EXACT, NEIGHBOUR, SPLINE, SUBROWS
+from twin.diagnosis.thresholds import LEAST_COMMAND_NOISE, LEAST_SPLINE_COMPLIANCE, MOMENTS_PER_ROW, NEIGHBOUR_WEIGHT, SPLINE_ROUNDS
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class SmoothedCommand:
 
 
 def smooth_command(time: np.ndarray, command: np.ndarray, noise: float) -> SmoothedCommand:
-    """Of rows at `time` (n,) s with `command` (n, n_tendon), read with `noise`; `SUBROWS` moments for each row."""
+    """Of rows at `time` (n,) s with `command` (n, n_tendon), read with `noise`; `MOMENTS_PER_ROW` moments for each row."""
     n = len(command)
-    unit = max(noise, EXACT * float(np.ptp(command, axis=0).max()), 1e-12)
-    fine = np.interp(np.arange((n - 1) * SUBROWS + 1) / SUBROWS, np.arange(n), time)
+    unit = max(noise, LEAST_COMMAND_NOISE * float(np.ptp(command, axis=0).max()), 1e-12)
+    fine = np.interp(np.arange((n - 1) * MOMENTS_PER_ROW + 1) / MOMENTS_PER_ROW, np.arange(n), time)
     interval = float(np.median(np.diff(time)))
     q = _intensity(np.diff(time) / interval, command / unit)
-    found = _smooth(np.diff(fine) / interval, np.repeat(q, SUBROWS), np.arange(n) * SUBROWS, command / unit)
+    found = _smooth(np.diff(fine) / interval, np.repeat(q, MOMENTS_PER_ROW), np.arange(n) * MOMENTS_PER_ROW, command / unit)
     return SmoothedCommand(fine, unit * found.state[:, 0], unit**2 * found.spread[:, 0, 0])
 
 
@@ -48,8 +48,11 @@ class _Smoothed:
 def _intensity(step: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """q (n - 1,) of every interval between rows (n, n_tendon), which are `step` long."""
     tendons = rows.shape[1]
-    q = np.full(len(step), max(EVENLY, float(np.mean(np.diff(rows, 2, axis=0) ** 2))) if len(step) > 1 else EVENLY)
-    for _ in range(SPLINE):
+    q = np.full(
+        len(step),
+        max(LEAST_SPLINE_COMPLIANCE, float(np.mean(np.diff(rows, 2, axis=0) ** 2))) if len(step) > 1 else LEAST_SPLINE_COMPLIANCE,
+    )
+    for _ in range(SPLINE_ROUNDS):
         found = _smooth(step, q, np.arange(len(rows)), rows)
         F, unit = _steps(step)
         went = found.state[1:] - F @ found.state[:-1]
@@ -57,8 +60,10 @@ def _intensity(step: np.ndarray, rows: np.ndarray) -> np.ndarray:
         spread = found.spread[1:] - turn - np.swapaxes(turn, 1, 2) + F @ found.spread[:-1] @ np.swapaxes(F, 1, 2)
         square = np.einsum("nac,nab,nbc->n", went, np.linalg.inv(unit), went)
         square += tendons * np.einsum("nab,nba->n", np.linalg.inv(unit), spread)
-        square = np.convolve(np.pad(square, 1, mode="edge"), [NEIGHBOUR, 1.0 - 2.0 * NEIGHBOUR, NEIGHBOUR], mode="valid")
-        q = np.maximum(EVENLY, square / (2 * tendons + 2))
+        square = np.convolve(
+            np.pad(square, 1, mode="edge"), [NEIGHBOUR_WEIGHT, 1.0 - 2.0 * NEIGHBOUR_WEIGHT, NEIGHBOUR_WEIGHT], mode="valid"
+        )
+        q = np.maximum(LEAST_SPLINE_COMPLIANCE, square / (2 * tendons + 2))
     return q
 
 

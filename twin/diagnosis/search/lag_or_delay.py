@@ -26,7 +26,7 @@ from twin.diagnosis.evidence.scored_model import ScoredModel, score_model
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.command_spline import SmoothedCommand, smooth_command
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import CLEAR, LATE_ROWS, TAILS
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LAG_OR_DELAY_ROWS, STUDENT_DEGREES
 from twin.effects.actuator_lag import ActuatorLag, lag_response
 from twin.effects.time_delay import TimeDelay
 from twin.foundation.errors import SolveError
@@ -138,14 +138,14 @@ def weighed(trials: list[Given], late: float) -> dict[LateEffects, Weight] | Non
     cost = float(np.log(n))
     lagging = max(
         Weight(first[0] - cost, {LAG: {"time": first[1][1]}}),
-        Weight(second[0] - 2 * cost - CLEAR, {LAG: {"time": second[1][1], "inertia": second[1][2]}}),
+        Weight(second[0] - 2 * cost - CLEAR_CHI_SQUARE, {LAG: {"time": second[1][1], "inertia": second[1][2]}}),
         key=lambda w: w.score,
     )
     together = {DELAY: {"delay": both[1][0]}, LAG: {"time": both[1][1]}}
     return {
         delay: Weight(delayed[0] - cost, {DELAY: {"delay": delayed[1][0]}}),
         lag: lagging,
-        delay | lag: Weight(both[0] - 2 * cost - 2 * CLEAR, together),
+        delay | lag: Weight(both[0] - 2 * cost - 2 * CLEAR_CHI_SQUARE, together),
     }
 
 
@@ -177,7 +177,9 @@ def likelihood(seen: Given, delay: float, lag: float, inertia: float) -> float:
         chords, delivered = np.diff(way.mean, axis=0) / np.diff(way.time)[:, None], np.empty_like(way.mean)
         lag_response(way.time, np.stack([0.0 * chords, 0.0 * chords, chords, way.mean[:-1]]), lag, inertia, delivered)
     e = seen.pull - shifted(way.time, delivered, seen.time - delay)
-    return float(-0.5 * (TAILS + tendons) * np.log1p(np.einsum("na,nab,nb->n", e, seen.precision, e) / TAILS).sum())
+    return float(
+        -0.5 * (STUDENT_DEGREES + tendons) * np.log1p(np.einsum("na,nab,nb->n", e, seen.precision, e) / STUDENT_DEGREES).sum()
+    )
 
 
 def shifted(time: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
@@ -186,8 +188,8 @@ def shifted(time: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarra
 
 
 def given(context: FitContext, best: ScoredModel) -> list[Given]:
-    """Of the fitted trials that move fastest, `LATE_ROWS` of each at most, under the best set: what it has the tendons given, and
-    what its residuals add."""
+    """Of the fitted trials that move fastest, `LAG_OR_DELAY_ROWS` of each at most, under the best set: what it has the tendons
+    given, and what its residuals add."""
     prepared, at = context.prepared, best.fit.evaluation
     twin, place = at.model.twin, {k: i for i, k in enumerate(context.trials)}
     laws = [e for e in twin.effects if e.id in LATE]
@@ -198,7 +200,7 @@ def given(context: FitContext, best: ScoredModel) -> list[Given]:
         inputs, delivered = prepared.inputs[k], prepared.inputs[k].signals
         for law in laws:
             delivered = law.drive(law.command(delivered))
-        rows = slice(0, LATE_ROWS)
+        rows = slice(0, LAG_OR_DELAY_ROWS)
         raw, time, command = at.raw[place[k]][rows], inputs.time[rows], _driving(prepared, inputs.signals)[rows]
         seen = np.isfinite(raw)
         per_sigma = np.where(seen[:, :, None], g[rows] / noise.sigma[:, None], 0.0)
@@ -219,13 +221,13 @@ def _driving(prepared: PreparedRecording, signals: Signals) -> np.ndarray:
 
 
 def _fastest(prepared: PreparedRecording, trials: list[int]) -> list[int]:
-    """Trials of three rows or more by the rate of their commands, as many as `LATE_ROWS` hold and at least one."""
+    """Trials of three rows or more by the rate of their commands, as many as `LAG_OR_DELAY_ROWS` hold and at least one."""
     long = [k for k in trials if len(prepared.inputs[k].time) > 2]
     rate = {k: float(np.abs(np.diff(prepared.inputs[k].command, axis=0)).sum() / np.ptp(prepared.inputs[k].time)) for k in long}
     out, rows = [], 0
     for k in sorted(long, key=lambda k: -rate[k]):
         rows += len(prepared.inputs[k].time)
-        if out and rows > LATE_ROWS:
+        if out and rows > LAG_OR_DELAY_ROWS:
             break
         out.append(k)
     return out

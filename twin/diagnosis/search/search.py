@@ -19,7 +19,17 @@ from twin.diagnosis.evidence.scored_model import (
 )
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.friction import noise_credit
-from twin.diagnosis.thresholds import BEHIND, DEEPER, DEEPEST, FORM, HOPELESS, PROMISE, STALE, WHITER, WIDTH
+from twin.diagnosis.thresholds import (
+    BEAM_WIDTH,
+    HOPELESS_COST_RATIO,
+    LARGEST_SCORE_GAP,
+    LAW_FORM_SHARE,
+    LEFT_FOR_THIRD_EFFECT,
+    MOST_EFFECTS,
+    PROMISED_SHARE,
+    REUSED_PROMISE_SHARE,
+    WHITER_MODEL_LEAVES,
+)
 from twin.effects import FitStart, catalogue
 
 Known = dict[EffectForms, ScoredModel]
@@ -40,7 +50,7 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
     """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
     known: Known = {base.forms: base}
     beam, step = [base], []
-    for level in range(1, DEEPEST + 1):
+    for level in range(1, MOST_EFFECTS + 1):
         best_before = max(w.score for w in known.values())
         fresh: Known = {}
         for member in (*beam, *step):
@@ -48,22 +58,22 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
             # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
             # effects that promise something by the base's; the others' are the base's.
             if member is (*beam, *step)[0] and member is not base:
-                least = STALE * _asked(context, base, member, limits)
+                least = REUSED_PROMISE_SHARE * _asked(context, base, member, limits)
                 promise = rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
                 lacks = dictionary(context.objective, member.fit, {c.effect for c in promise if c.gain >= least})
             context.progress(f"effects, {level} at once")
             before = dict(fresh)
             extend(context, base, member, lacks, limits, fresh)
             if any(member is s for s in step):
-                more, half = best_before + limits.accept, WHITER * _leaves(context, base, member)
+                more, half = best_before + limits.accept, WHITER_MODEL_LEAVES * _leaves(context, base, member)
                 fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(context, base, w) < half}
-        leading = max((w.score for w in fresh.values()), default=0.0) - BEHIND
+        leading = max((w.score for w in fresh.values()), default=0.0) - LARGEST_SCORE_GAP
         fresh = {
             k: with_extended_law(context, w, limits.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()
         }
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
-        if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > DEEPER):
+        if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > LEFT_FOR_THIRD_EFFECT):
             break
     best = max(known.values(), key=lambda w: w.score - limits.accept * len(w.effects))
     best = exchanged(context, best, known)
@@ -75,18 +85,18 @@ def carried(
     context: FitContext, base: ScoredModel, beam: list[ScoredModel], fresh: list[ScoredModel], bar: float
 ) -> tuple[list[ScoredModel], list[ScoredModel]]:
     """The models of the `beam` and one effect to which one more is added next: where evidence passes the `bar` the best by it,
-    `WIDTH` of them, none far behind; and, as a step only, the one that leaves least of |z|^2, where that is less than `WHITER` of
-    what these leave, or where there are none the beam. What is built on a step counts where it passes the bar and halves the error
-    once more: it explains what lay under the smooth one.
+    `BEAM_WIDTH` of them, none far behind; and, as a step only, the one that leaves least of |z|^2, where that is less than
+    `WHITER_MODEL_LEAVES` of what these leave, or where there are none the beam. What is built on a step counts where it passes the
+    bar and halves the error once more: it explains what lay under the smooth one.
 
     Evidence forgives a smooth error whatever its size: of two effects that bend alike either may leave it as smooth as none, and
     so have no evidence until the other is there.
     """
     best = max((w.score for w in fresh), default=-np.inf)
-    ahead = sorted((w for w in fresh if best >= bar and w.score >= best - BEHIND), key=lambda w: -w.score)[:WIDTH]
+    ahead = sorted((w for w in fresh if best >= bar and w.score >= best - LARGEST_SCORE_GAP), key=lambda w: -w.score)[:BEAM_WIDTH]
     least = min(_leaves(context, base, w) for w in ahead or beam)
     whitest = min(fresh, key=lambda w: _leaves(context, base, w), default=base)
-    return ahead, [whitest] if _leaves(context, base, whitest) < WHITER * least else []
+    return ahead, [whitest] if _leaves(context, base, whitest) < WHITER_MODEL_LEAVES * least else []
 
 
 def extend(
@@ -100,7 +110,7 @@ def extend(
         if not context.budget.allows(name):
             continue
         context.progress(name)
-        beat = HOPELESS * min((w.fit.cost for w in fresh.values()), default=np.inf)
+        beat = HOPELESS_COST_RATIO * min((w.fit.cost for w in fresh.values()), default=np.inf)
         found = with_effect_added(context, member, candidate.effect, candidate.start, beat)
         if found is not None and (found.forms not in fresh or better(found, fresh[found.forms])):
             fresh[found.forms] = found
@@ -114,14 +124,14 @@ def _leaves(context: FitContext, base: ScoredModel, member: ScoredModel) -> floa
 
 def _asked(context: FitContext, base: ScoredModel, member: ScoredModel, limits: AcceptanceLimits) -> float:
     """The gain an effect's pattern must promise beside `member` to be fitted there."""
-    return PROMISE * max(limits.accept, _material(context, base, member, limits.visible))
+    return PROMISED_SHARE * max(limits.accept, _material(context, base, member, limits.visible))
 
 
 def _material(context: FitContext, base: ScoredModel, member: ScoredModel, bar: float) -> float:
     """The fall of |z|^2 below which an effect added to `member` would be immaterial: in the group of outputs in which `member`
     explains least, where its laws' faults show least."""
     explained = max(0.0, float(context.fall_by_group(base.fit, member.fit).min()))
-    return max(bar**2 * context.objective.n, FORM**2 * explained)
+    return max(bar**2 * context.objective.n, LAW_FORM_SHARE**2 * explained)
 
 
 def exchanged(context: FitContext, best: ScoredModel, known: Known) -> ScoredModel:

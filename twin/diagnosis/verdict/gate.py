@@ -13,7 +13,7 @@ from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.lag_or_delay import LATE, tells_laws
 from twin.diagnosis.search.screen import Screening
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import CLEAR, FORM, HALF, MUCH
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LARGE_STRUCTURE, LAW_FORM_SHARE, LEFT_BY_EFFECTS
 
 
 @dataclass(frozen=True)
@@ -106,17 +106,17 @@ def _may_be_form(
     all that is left without it, on trials left out in turn too. A large law's faults leave more. They show where that law acts: in
     a group of outputs that it leaves alone, an effect is as large as it is there."""
     moved = {e: np.sqrt(np.maximum(0.0, context.fall_by_group(w.fit, best.fit)) / context.objective.n) for e, w in without.items()}
-    if np.any((moved[least] >= limits.material) & (moved[least] >= FORM * np.max(list(moved.values()), axis=0))):
+    if np.any((moved[least] >= limits.material) & (moved[least] >= LAW_FORM_SHARE * np.max(list(moved.values()), axis=0))):
         return False
     sizes = [(w.discrepancy.beyond(context.accuracy), left_out(context, w.fit).structure) for w in (best, without[least])]
-    return not all(after <= HALF * before for after, before in zip(*sizes, strict=True))
+    return not all(after <= LEFT_BY_EFFECTS * before for after, before in zip(*sizes, strict=True))
 
 
 def _harms(context: FitContext, limits: AcceptanceLimits, best: ScoredModel, without: ScoredModel) -> bool:
     """Whether trials left out are predicted better without an effect; of a set that leaves noise alone of those fitted, where a
     step to first order throws one that is left out, by fits in truth."""
     own, other = left_out(context, best.fit), left_out(context, without.fit)
-    if not own.worse(other) or best.discrepancy.size > max(MUCH, limits.left):
+    if not own.worse(other) or best.discrepancy.size > max(LARGE_STRUCTURE, limits.left):
         return own.worse(other)
     return proven(context, best.fit, own).worse(proven(context, without.fit, other))
 
@@ -137,7 +137,7 @@ def _doubt(
         if contribution(context, best, without[effect]) >= row.apart:
             continue
         other = _in_its_place(context, found, screening, without[effect], row.rival)
-        if other is not None and other.score > best.score - CLEAR:
+        if other is not None and other.score > best.score - CLEAR_CHI_SQUARE:
             return Ambiguity(effect, row.rival, best, other)
     return None
 

@@ -21,7 +21,15 @@ from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.choose import halved
 from twin.diagnosis.search.lag_or_delay import LATE
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import ACCEPT, ALONE, EVEN, MUCH, RUNNERS, SHARE, TEMPER
+from twin.diagnosis.thresholds import (
+    EVEN_CHANCE,
+    LARGE_STRUCTURE,
+    LARGE_STRUCTURE_WITHOUT_EFFECT,
+    LEAST_EVIDENCE,
+    LEFTOVER_SHARE,
+    RUNNERS_UP_SHOWN,
+    SCORE_TEMPERATURE,
+)
 from twin.diagnosis.verdict.gate import Gated
 
 
@@ -116,17 +124,21 @@ def out_of_sample(context: FitContext, best: ScoredModel, limits: AcceptanceLimi
     """A set on trials left out. Where it leaves no more than noise of those fitted, and much to first order of those left out, the
     latter are fitted to the others in truth."""
     first = left_out(context, best.fit)
-    much = max(MUCH, limits.left)
+    much = max(LARGE_STRUCTURE, limits.left)
     return proven(context, best.fit, first) if best.discrepancy.size <= much < first.structure else first
 
 
 def verdict(added: bool, signs: VerdictInputs, limits: AcceptanceLimits) -> str:
     """In the words of the report's contract; `added`: effects passed the gates."""
     s = signs
-    much = max(s.after, s.unseen, s.quick) > max(MUCH, limits.left) or s.line[0] > limits.line
+    much = max(s.after, s.unseen, s.quick) > max(LARGE_STRUCTURE, limits.left) or s.line[0] > limits.line
     if not added:
-        return "unexplained" if much or s.line[0] > limits.faint or s.after > max(ALONE, limits.left) else "noise"
-    if not much and not (s.after > limits.slight and s.after > SHARE * s.before):
+        return (
+            "unexplained"
+            if much or s.line[0] > limits.faint or s.after > max(LARGE_STRUCTURE_WITHOUT_EFFECT, limits.left)
+            else "noise"
+        )
+    if not much and not (s.after > limits.slight and s.after > LEFTOVER_SHARE * s.before):
         return "partly_explained" if s.strange else "explained"
     return "partly_explained" if s.halved else "unexplained"
 
@@ -135,7 +147,7 @@ def unsure(claims: tuple[Claim, ...], either: Mapping[str, float]) -> tuple[str,
     """Claims less likely than not: other sets explain the data better, and what they all imitate may be none of them. A lag or a
     delay is one of few laws that `lateness` weighed, and the likeliest; of a claim that `settle` took, and of its rival, one or the
     other must be likely, and that is `either`."""
-    return tuple(c.effect for c in claims if max(c.probability, either.get(c.effect, 0.0)) < EVEN and c.effect not in LATE)
+    return tuple(c.effect for c in claims if max(c.probability, either.get(c.effect, 0.0)) < EVEN_CHANCE and c.effect not in LATE)
 
 
 def probability(found: Search, effects: Collection[str], small: set[str]) -> float:
@@ -146,7 +158,7 @@ def probability(found: Search, effects: Collection[str], small: set[str]) -> flo
     if not any(wanted & set(w.effects) for w in material):
         material = list(found.all)
     top = max(w.score for w in material)
-    weights = np.array([np.exp((w.score - top) / TEMPER) for w in material])
+    weights = np.array([np.exp((w.score - top) / SCORE_TEMPERATURE) for w in material])
     inside = np.array([bool(wanted & set(w.effects)) for w in material])
     return float(weights[inside].sum() / weights.sum())
 
@@ -163,7 +175,7 @@ def _claims(
     """The largest first."""
     # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
     sure = max(0.0, 1.0 - signs.after / signs.before) if signs.after > limits.slight else 1.0
-    sure = min(sure, EVEN) if signs.strained else sure
+    sure = min(sure, EVEN_CHANCE) if signs.strained else sure
     small = {s.effect for s in gated.small}
     claims = [
         Claim(e, best.fit.fitted(e), float("nan"), sure * probability(found, (e,), small), gated.contribution(context, e))
@@ -181,13 +193,13 @@ def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[
             if e not in claimed and e not in found.base.effects and e not in out and e not in small:
                 others = tuple(o for o in w.effects if o != e)
                 out[e] = Claim(e, w.fit.fitted(e), float("nan"), probability(found, (e,), small), beside=others)
-    return tuple(list(out.values())[:RUNNERS])
+    return tuple(list(out.values())[:RUNNERS_UP_SHOWN])
 
 
 def _as_good(found: Search, gated: Gated, final: ScoredModel) -> tuple[tuple[str, ...], ...]:
-    """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `ACCEPT` of it, and two
-    standard deviations of what only one of them hears. What was too small to claim was dropped from the claimed set, and lends no
-    other its evidence.
+    """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `LEAST_EVIDENCE` of it, and
+    two standard deviations of what only one of them hears. What was too small to claim was dropped from the claimed set, and lends
+    no other its evidence.
 
     In a row whose tendon one law has taut and another slack the one's z is the other's less what the reading's noise adds to it,
     e with E|e|^2 = h: |z|^2 differs by h in the mean, which evidence is corrected for, and by 2 sqrt(h) of chance.
@@ -197,7 +209,7 @@ def _as_good(found: Search, gated: Gated, final: ScoredModel) -> tuple[tuple[str
         w for w in found.all if not claimed <= set(w.effects) and not set(w.effects) <= claimed and not small & set(w.effects)
     ]
     chance = [2.0 * float(np.sqrt(abs(w.unheard - final.unheard))) for w in others]
-    return tuple(w.effects for w, sd in zip(others, chance, strict=True) if w.score > final.score - ACCEPT - 2.0 * sd)
+    return tuple(w.effects for w, sd in zip(others, chance, strict=True) if w.score > final.score - LEAST_EVIDENCE - 2.0 * sd)
 
 
 def _rivals(found: Search, gated: Gated, final: ScoredModel) -> tuple[ScoredModel, ScoredModel] | None:

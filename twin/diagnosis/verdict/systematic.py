@@ -20,7 +20,7 @@ from twin.diagnosis.calibration.fisher_information import solve
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.evidence.first_order import Dictionary
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import INVISIBLE
+from twin.diagnosis.thresholds import INVISIBLE_PATTERN_SHARE
 from twin.diagnosis.verdict.judge import Judgement
 
 
@@ -44,7 +44,7 @@ def systematic(fit: Fit, unclaimed: Dictionary, left: float) -> np.ndarray:
     G = solve(H, J.T @ C)
     raw = C.T @ C
     A = raw - (C.T @ J) @ G
-    shows = np.diag(A) > INVISIBLE * np.diag(raw)
+    shows = np.diag(A) > INVISIBLE_PATTERN_SHARE * np.diag(raw)
     most: dict[str, np.ndarray] = {}
     for pattern in unclaimed.patterns:
         i = np.array([w for w in pattern.where if shows[w]], int)

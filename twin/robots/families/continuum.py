@@ -24,7 +24,8 @@ from twin.mechanics.rod import Equilibrium
 from twin.mechanics.rod.drawing import ChainFigure
 from twin.mechanics.rod.dynamics import Dynamics
 from twin.robots.families.backbone import BACKBONES, Backbone, Piece
-from twin.robots.families.continuum_schema import SCHEMA, Continuum, disk_masses, hole_places
+from twin.robots.families.continuum_schema import CONTINUUM_SCHEMA as SCHEMA
+from twin.robots.families.continuum_schema import Continuum, disk_masses, hole_places
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 

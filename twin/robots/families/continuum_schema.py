@@ -15,7 +15,7 @@ from twin.robots.schema import FULL_TURN, Row, Schema, Structure
 
 Disk = Annotated[int, Field(ge=1, le=200)]
 WIRE, CAST = frozenset({'body = "wire"'}), frozenset({'body = "cast"'})
-ROUND, OTHER = frozenset({'section = "round"'}), frozenset({'section = "other"'})
+ROUND_SECTION, OTHER_SECTION = frozenset({'section = "round"'}), frozenset({'section = "other"'})
 ON_DISKS, LISTED = frozenset({'markers = "disk"'}), frozenset({"markers = [disk, ...]"})
 MIN_FREE_SHARE = 0.02  # of a pitch between disks' faces that must be free to bend
 LENGTH_TOLERANCE = 5e-3  # of the length: pitches written with three digits may add up to as much more or less
@@ -52,7 +52,7 @@ class Continuum(Structure):
         return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers)}
 
     def kinds(self) -> frozenset[str]:
-        body = CAST if self.body == "cast" else WIRE | (ROUND if self.section == "round" else OTHER)
+        body = CAST if self.body == "cast" else WIRE | (ROUND_SECTION if self.section == "round" else OTHER_SECTION)
         return body | (ON_DISKS if self.markers == "disk" else LISTED)
 
     def ends(self) -> list[int]:
@@ -174,7 +174,7 @@ class _Rows:
         return replace(Row(name, si, usual or si, meaning, low, high, for_kinds=self.only, shape=self.shape), **more)  # type: ignore[arg-type]
 
 
-_all, _wire, _cast, _round, _other = _Rows(), _Rows(WIRE), _Rows(CAST), _Rows(ROUND), _Rows(OTHER)
+_all, _wire, _cast, _round, _other = _Rows(), _Rows(WIRE), _Rows(CAST), _Rows(ROUND_SECTION), _Rows(OTHER_SECTION)
 _disk, _tendon, _station = _Rows(shape=("disk",)), _Rows(shape=("tendon",)), _Rows(CAST, ("station",))
 _on_wire, _hole = _Rows(WIRE, ("disk",)), _Rows(shape=("tendon", "disk"))
 _glued = _Rows(LISTED, ("marker",))
@@ -195,7 +195,7 @@ CONTINUUM_ROWS = (
         0.1,
     ),
     _wire.row("backbone.mass", "kg g", "mass of the whole wire", 1e-6, 10.0),
-    _Rows(ROUND | CAST).row(
+    _Rows(ROUND_SECTION | CAST).row(
         "backbone.youngs_modulus", "Pa GPa", "Young's modulus E of the backbone (of a cast body at small strain)", 1e3, 2e12
     ),
     _round.row(
@@ -341,7 +341,7 @@ CONTINUUM_DIAGRAM = """\
      Tension is positive; displacement is positive where a tendon is pulled in at the base.
 """
 
-SCHEMA = Schema(
+CONTINUUM_SCHEMA = Schema(
     structure=Continuum,
     rows=CONTINUUM_ROWS,
     accuracy=Row("accuracy", "m", "mm", "what the description is believed to be good for: no smaller effect is claimed", 1e-9, 0.1),

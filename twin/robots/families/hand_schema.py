@@ -96,13 +96,13 @@ HAND_DIAGRAM = """\
                  finger 3        z and the fingers come towards you; each finger's tendon 1 is on its side of the palm's axis
 """
 
-SCHEMA = Schema(
+HAND_SCHEMA = Schema(
     structure=Hand,
     rows=(
         Row("palm.radius", "m", "mm", "distance of the fingers' axes from the palm's axis", 5e-3, 1.0),
         *(_row(row) for row in soft_schema.SOFT_ROWS),
     ),
-    accuracy=soft_schema.SCHEMA.accuracy,
+    accuracy=soft_schema.SOFT_SCHEMA.accuracy,
     find_conflicts=find_conflicts,
     usual_channels=usual_channels,
     diagram=HAND_DIAGRAM,

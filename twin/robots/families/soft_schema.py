@@ -125,7 +125,7 @@ SOFT_DIAGRAM = """\
      x up; azimuth 90 deg is y, out of the page. Origin in the centre of the base face.
 """
 
-SCHEMA = Schema(
+SOFT_SCHEMA = Schema(
     structure=Soft,
     rows=SOFT_ROWS,
     accuracy=Row("accuracy", "m", "mm", "what the description is believed to be good for: no smaller effect is claimed", 1e-9, 0.1),

@@ -15,7 +15,8 @@ import numpy as np
 
 from twin.body import Body, Drive, Port, Problem, Sense, Solution
 from twin.mechanics.rod.antagonists import TendonPair, solve_jaw
-from twin.robots.families.transmission_schema import SCHEMA, Transmission
+from twin.robots.families.transmission_schema import TRANSMISSION_SCHEMA as SCHEMA
+from twin.robots.families.transmission_schema import Transmission
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 

@@ -71,7 +71,7 @@ TRANSMISSION_DIAGRAM = """\
      Turning the drum by q > 0 pulls tendon 1 in; a crossed pair turns the jaw the other way.
 """
 
-SCHEMA = Schema(
+TRANSMISSION_SCHEMA = Schema(
     structure=Transmission,
     rows=TRANSMISSION_ROWS,
     accuracy=Row(

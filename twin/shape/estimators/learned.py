@@ -41,8 +41,6 @@ def interpolate_levels(level: np.ndarray, levels: np.ndarray, values: np.ndarray
 class LearnedEstimator(Estimator):
     """Base of all estimators with weights. It has no memory."""
 
-    limitations: str = ""  # what it does not know beyond what no trained estimator does
-
     def __init__(self, twin: Twin, arrays: dict[str, Any] | None = None) -> None:
         """`arrays`: weights other than those beside the robot. Raises DataError for a robot or weights that do not go together."""
         super().__init__(twin)

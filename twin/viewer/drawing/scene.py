@@ -18,7 +18,7 @@ from twin.viewer.drawing.colours import colour_values
 
 MEASURED_RGB, PREDICTED_RGB, ARROW_RGB, PUSH_RGB, DARK_GREY = (214, 39, 40), (31, 119, 180), (20, 20, 20), (255, 54, 1), 60
 CORD_THICKNESS, THIN_LINE, GLASS_RGB = 0.014, 0.006, (200, 205, 215)
-NO_POINTS = np.zeros((0, 3), np.float32)
+EMPTY_CLOUD = np.zeros((0, 3), np.float32)
 ROBOT_DISTANCE, NARROW_ROBOT = 0.9, 0.2  # heights: distance of two robots side by side, up to this width
 LONGEST_PUSH_ARROW = 0.3  # heights, of the largest push
 
@@ -55,9 +55,9 @@ class Scene:
         self._skin: viser.GlbHandle | None = None
         self._glass: viser.MeshHandle | None = None
         self._predicted = scene.add_point_cloud(
-            f"{root}/predicted", NO_POINTS, PREDICTED_RGB, point_size=0.03, point_shape="circle"
+            f"{root}/predicted", EMPTY_CLOUD, PREDICTED_RGB, point_size=0.03, point_shape="circle"
         )
-        self._measured = scene.add_point_cloud(f"{root}/measured", NO_POINTS, MEASURED_RGB, point_size=0.03, point_shape="circle")
+        self._measured = scene.add_point_cloud(f"{root}/measured", EMPTY_CLOUD, MEASURED_RGB, point_size=0.03, point_shape="circle")
         none = np.zeros((0, 2, 3), np.float32)
         self._arrows = scene.add_arrows(f"{root}/residual", none, ARROW_RGB, shaft_radius=0.004, head_radius=0.01, head_length=0.02)
         self._push = scene.add_arrows(f"{root}/push", none, PUSH_RGB, shaft_radius=0.009, head_radius=0.022, head_length=0.045)

@@ -23,9 +23,9 @@ from twin.diagnosis.calibration.fit import Evaluation, Model, prior_weight
 from twin.effects import catalogue
 from twin.foundation.errors import SolveError
 
-CLOSE = 1e-3  # of a parameter's range: at its bound, mujoco.sysid.report.sections.insights
-ROUNDS = 8  # of Gauss-Newton at most
-SETTLED = 1e-3  # relative step at which a fit stops
+AT_BOUND = 1e-3  # of a parameter's range: at its bound, mujoco.sysid.report.sections.insights
+FIT_STEPS = 8  # of Gauss-Newton at most
+SMALLEST_STEP = 1e-3  # relative step at which a fit stops
 
 
 def bound_hit(start: Calibrated) -> Opinion:
@@ -44,7 +44,7 @@ def bound_hit(start: Calibrated) -> Opinion:
 
 def _at_bound(model: Model) -> bool:
     def close(value: float, low: float, high: float) -> bool:
-        return min(value - low, high - value) < CLOSE * (high - low)
+        return min(value - low, high - value) < AT_BOUND * (high - low)
 
     return any(close(model.value(f), f.parameter.low, f.parameter.high) for f in model.free)
 
@@ -85,7 +85,8 @@ def _least_squares(start: Calibrated, at: Evaluation) -> tuple[Evaluation, np.nd
         return np.vstack([np.hstack([robot, effects]), weight])
 
     parameters, found = sysid.optimize(
-        parameters, residual, verbose=False, jacobian=jacobian, max_iters=ROUNDS, xtol=SETTLED, x_scale="jac", output=io.StringIO()
+        parameters, residual, verbose=False, jacobian=jacobian, max_iters=FIT_STEPS, xtol=SMALLEST_STEP, x_scale="jac",
+        output=io.StringIO(),
     )  # fmt: skip
     interval = sysid.calculate_intervals([np.ravel(residual(found.x, parameters)[0])], found.jac, alpha=0.05 / found.x.size)[1]
     return evaluation(found.x), interval

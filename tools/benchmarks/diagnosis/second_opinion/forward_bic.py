@@ -12,18 +12,18 @@ import math
 from tools.benchmarks.diagnosis.second_opinion.start import Calibrated, Opinion
 from twin.diagnosis.calibration.fit import Fit, fit
 from twin.diagnosis.evidence.ranking import Candidate
-from twin.diagnosis.thresholds import DEEPEST
+from twin.diagnosis.thresholds import MOST_EFFECTS
 from twin.foundation.errors import SolveError
 
 REFITS = 3  # a level, at most
-CLOSE = 0.5  # of the largest promise: a candidate that promises less is not refitted
+PROMISING_SHARE = 0.5  # of the largest promise: a candidate that promises less is not refitted
 
 
 def forward_bic(start: Calibrated) -> Opinion:
     best, own = start.fit, len(start.fit.model.twin.effects)
-    for _ in range(DEEPEST):
+    for _ in range(MOST_EFFECTS):
         promising = start.screened(best)[:REFITS]
-        close = [c for c in promising if c.gain > CLOSE * promising[0].gain]
+        close = [c for c in promising if c.gain > PROMISING_SHARE * promising[0].gain]
         grown = [g for c in close if (g := _with(start, best, c)) is not None]
         winner = min(grown, key=lambda f: _bic(start, f), default=best)
         if _bic(start, winner) >= _bic(start, best):

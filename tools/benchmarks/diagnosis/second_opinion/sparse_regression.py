@@ -16,7 +16,7 @@ import pysindy
 from tools.benchmarks.diagnosis.second_opinion.start import Calibrated, Opinion, amplitudes
 from twin.diagnosis.calibration.fit import Model, fit, prior_weight
 from twin.diagnosis.evidence.ranking import Candidate
-from twin.diagnosis.thresholds import MATERIAL
+from twin.diagnosis.thresholds import LEAST_CONTRIBUTION
 from twin.effects import catalogue
 from twin.foundation.errors import SolveError
 
@@ -35,7 +35,7 @@ def sparse_regression(start: Calibrated) -> Opinion:
     seen = size > 1e-6 * size.max()  # a tilt about the vertical shows in nothing
     owner, terms = owner[seen], terms[:, seen] / size[seen]
     np.random.seed(0)  # noqa: NPY002  pysindy draws its bootstraps from the global stream
-    ensemble = pysindy.EnsembleOptimizer(pysindy.STLSQ(threshold=MATERIAL), bagging=True, n_models=BOOTSTRAPS)
+    ensemble = pysindy.EnsembleOptimizer(pysindy.STLSQ(threshold=LEAST_CONTRIBUTION), bagging=True, n_models=BOOTSTRAPS)
     ensemble.fit(terms, -z)
     included = np.mean([c[0] != 0.0 for c in ensemble.coef_list], axis=0) >= INCLUDED
     used, terms = owner[included], terms[:, included]

@@ -16,7 +16,7 @@ import numpy as np
 from tools.benchmarks.hardware.comparisons.cable_tool import loops
 from tools.benchmarks.hardware.comparisons.row import Row
 from tools.benchmarks.hardware.importers import cable_tool
-from twin.diagnosis.calibration.fit import NUDGE, Fit, Free, Model, Objective, fit
+from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Fit, Free, Model, Objective, fit
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
 from twin.effects import effect_class
@@ -26,9 +26,9 @@ from twin.prediction.prepared import prepare
 from twin.prediction.twin import Twin
 from twin.robots import load
 
-LOADS = (20, 60)  # per cent, fitted
-WIDTH = 0.3  # of a loop's width: the bar
-ROUNDS = 4  # of a fit: derivatives of the robot's own numbers are taken once in each, and here they bend
+FITTED_PERCENTS = (20, 60)  # per cent, fitted
+LOOP_WIDTH_ERROR = 0.3  # of a loop's width: the bar
+FIT_ROUNDS = 4  # of a fit: derivatives of the robot's own numbers are taken once in each, and here they bend
 # Value and spread on the tools of development (R_5, L_Roll_3, L_Pitch_3): what another of the make is believed to have.
 MAKE = {
     "tendon_friction": {"mu": (0.010, 0.005), "presliding": (3e-5, 3e-5)},
@@ -36,7 +36,7 @@ MAKE = {
 }
 
 
-def compare(folder: Path, asked: Sequence[int] = LOADS) -> list[Row]:
+def compare(folder: Path, asked: Sequence[int] = FITTED_PERCENTS) -> list[Row]:
     """The rows of every tool and pose below `folder` that has runs at both fitted loads (or the nearest to them) and at others."""
     lines = []
     for recording in cable_tool.read_all(folder):
@@ -75,15 +75,15 @@ def _loops(found: Fit, recording: Recording) -> Row:
     """How wide loops are at every load. Where two standard errors of a predicted width are more than the bar allows the fit itself
     says that it does not tell: such a load is shown, and not judged, and the bar is not called met."""
     widths, open_ = loops(recording, found.model.twin.predict(recording)), loop_errors(found, recording)
-    told = [abs(b / a - 1.0) for name, (a, b) in widths.items() if 2.0 * open_[name] <= WIDTH * b]
+    told = [abs(b / a - 1.0) for name, (a, b) in widths.items() if 2.0 * open_[name] <= LOOP_WIDTH_ERROR * b]
     shown = ", ".join(
-        f"{name[4:]} %: {a:.1f}/{b:.1f}" + (f" +- {open_[name]:.1f}, not told" if 2.0 * open_[name] > WIDTH * b else "")
+        f"{name[4:]} %: {a:.1f}/{b:.1f}" + (f" +- {open_[name]:.1f}, not told" if 2.0 * open_[name] > LOOP_WIDTH_ERROR * b else "")
         for name, (a, b) in widths.items()
     )
     worst, whole = max(told, default=0.0), len(told) == len(widths)
-    met = False if worst > WIDTH else True if whole else None
+    met = False if worst > LOOP_WIDTH_ERROR else True if whole else None
     what = "  loop width by load, measured/twin, deg"
-    return Row(what, f"within {100 * WIDTH:.0f} %", "within 12 %", shown, met, whole and worst <= 0.12)
+    return Row(what, f"within {100 * LOOP_WIDTH_ERROR:.0f} %", "within 12 %", shown, met, whole and worst <= 0.12)
 
 
 def loop_errors(found: Fit, recording: Recording) -> dict[str, float]:
@@ -92,7 +92,11 @@ def loop_errors(found: Fit, recording: Recording) -> dict[str, float]:
     model, x = found.model, found.model.vector()
     here, slopes = loops(recording, model.twin.predict(recording)), []
     for n, free in enumerate(model.free):
-        size = NUDGE if (x[n] + NUDGE) * free.parameter.step <= free.parameter.high else -NUDGE
+        size = (
+            PARAMETER_DIFFERENCE
+            if (x[n] + PARAMETER_DIFFERENCE) * free.parameter.step <= free.parameter.high
+            else -PARAMETER_DIFFERENCE
+        )
         moved = loops(recording, model.at(x + size * np.eye(len(x))[n]).twin.predict(recording))
         slopes.append([(moved[name][1] - here[name][1]) / size for name in here])
     g = np.array(slopes)
@@ -151,6 +155,6 @@ def refitted(twin: Twin, recording: Recording) -> Fit:
     )
     model = Model(twin, (*Model.base(twin.robot).free, *law))
     found = fit(objective, model, refresh=True)
-    for _ in range(ROUNDS - 1):
+    for _ in range(FIT_ROUNDS - 1):
         found = fit(objective, found.model, refresh=True)
     return found

@@ -26,7 +26,7 @@ from twin.prediction.twin import Twin
 from twin.robots import load
 
 FITTED = {("load20", "0.1Hz"), ("load30", "0.1Hz"), ("load20", "0.3Hz"), ("load30", "0.3Hz")}
-FRICTION = {"tendon_friction", "joint_friction"}  # while no cable falls slack no data tell one from the other
+FRICTION_EFFECTS = {"tendon_friction", "joint_friction"}  # while no cable falls slack no data tell one from the other
 TESTED_LOADS, TESTED_RATE = ("load10", "load40"), "0.5Hz"
 
 
@@ -47,7 +47,7 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
     worst = max(abs(modelled / measured - 1.0) for measured, modelled in widths.values())
     told = ", ".join(f"{name[4:]} %: {measured:.1f}/{modelled:.1f}" for name, (measured, modelled) in widths.items())
     claimed = {c.effect for c in found.claims}
-    named = bool(claimed & FRICTION) and bool(claimed & {"tendon_elasticity", "tendon_backlash"})
+    named = bool(claimed & FRICTION_EFFECTS) and bool(claimed & {"tendon_elasticity", "tendon_backlash"})
     alone = ", ".join(f"{c.effect} {np.rad2deg(c.error):.2f}" for c in found.claims)
     return [
         Row(
@@ -66,7 +66,7 @@ def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:
 def _others(folder: Path, found: Diagnosis) -> str:
     """The error under a load twice the largest that was fitted, on tools of which only ratio and encoder zero are fitted."""
     told = []
-    for tool in cable_tool.OTHERS:
+    for tool in cable_tool.MIRRORED_TOOLS:
         runs = cable_tool.read_other(folder, tool)
         light, heavy = runs.trials
         linear = np.polyfit(light.values["joint_1_angle"], light.values["joint_2_angle"], 1)

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from twin.diagnosis import Settings
+
+SETTINGS = Settings(jobs=1)
+
 
 @dataclass(frozen=True)
 class Row:

@@ -9,10 +9,10 @@ from time import perf_counter
 
 import numpy as np
 
-from tools.benchmarks.hardware.comparisons.row import Row
+from tools.benchmarks.hardware.comparisons.row import SETTINGS, Row
 from tools.benchmarks.hardware.importers import tentacle
 from tools.benchmarks.hardware.residual_gp import Remainder
-from twin.diagnosis import Claim, Diagnosis, Settings, diagnose
+from twin.diagnosis import Claim, Diagnosis, diagnose
 from twin.diagnosis.calibration.fit import fit
 from twin.diagnosis.calibration.objective import objective_of
 from twin.foundation.parameters import Values
@@ -23,7 +23,6 @@ from twin.prediction.twin import Twin
 from twin.robots import load
 
 HOOKE = {"backbone.stiffening": 0.0}
-SETTINGS = Settings(jobs=1)
 
 
 def compare(folder: Path) -> tuple[list[Row], Recording, Diagnosis]:

@@ -13,9 +13,9 @@ from time import perf_counter
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tools.benchmarks.hardware.comparisons.row import Row
+from tools.benchmarks.hardware.comparisons.row import SETTINGS, Row
 from tools.benchmarks.hardware.importers import three_cable
-from twin.diagnosis import Diagnosis, Settings, diagnose
+from twin.diagnosis import Diagnosis, diagnose
 from twin.diagnosis.calibration.fit import Fit, Objective, fit
 from twin.diagnosis.calibration.objective import objective_of
 from twin.effects import effect_class
@@ -27,12 +27,11 @@ from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
 from twin.robots import load
 
-SETTINGS = Settings(jobs=1)
 PLAY = "tendon_backlash"
-BY_HAND = ("transmission_error", "tendon_friction", PLAY)
+EFFECTS_BY_HAND = ("transmission_error", "tendon_friction", PLAY)
 ROPES = ("tendon_elasticity", "transmission_error")
 REGISTERED = 4  # sweeps by which the camera is registered anew
-WAYS = 200  # of choosing them, at most
+MOST_CHOICES = 200  # of choosing them, at most
 EARLY = 0.775  # of the sweeps
 DEAD_BAND = {PLAY, "tendon_friction"}  # play, or a cable that sticks before it slides
 
@@ -98,12 +97,12 @@ def _medians(errors: np.ndarray) -> str:
 
 
 def ways(n: int) -> list[tuple[int, ...]]:
-    """To choose `REGISTERED` of n sweeps: the first ones first, then all others, or `WAYS` drawn ones."""
+    """To choose `REGISTERED` of n sweeps: the first ones first, then all others, or `MOST_CHOICES` drawn ones."""
     first = tuple(range(REGISTERED))
-    if comb(n, REGISTERED) <= WAYS:
+    if comb(n, REGISTERED) <= MOST_CHOICES:
         return [first, *(w for w in combinations(range(n), REGISTERED) if w != first)]
     rng = np.random.default_rng(0)
-    return [first, *(tuple(int(k) for k in rng.choice(n, REGISTERED, replace=False)) for _ in range(WAYS))]
+    return [first, *(tuple(int(k) for k in rng.choice(n, REGISTERED, replace=False)) for _ in range(MOST_CHOICES))]
 
 
 def errors_registered(twin: Twin, bench: PreparedRecording, rows: Sequence[int]) -> np.ndarray:
@@ -155,11 +154,11 @@ def halves(recording: Recording, block: int) -> tuple[list[int], list[int], list
 
 
 def with_all(bench: PreparedRecording, rows: Sequence[int]) -> tuple[Twin, Twin, str]:
-    """The calibrated robot; the same with `BY_HAND` fitted beside its own parameters, one after the other; friction and play in
-    words."""
+    """The calibrated robot; the same with `EFFECTS_BY_HAND` fitted beside its own parameters, one after the other; friction and
+    play in words."""
     model, objective, _ = objective_of(bench, Twin.of(bench.robot), list(rows), SETTINGS)
     base = found = fit(objective, model, refresh=True)
-    for name in BY_HAND:
+    for name in EFFECTS_BY_HAND:
         found = _with(objective, found, name, bench.n_tendon)
     friction, play = found.fitted("tendon_friction"), found.fitted(PLAY)
     mu, slide, (where, gap) = friction["mu"], friction["presliding"], next(p for p in play.items() if p[0].startswith("gap"))

@@ -18,9 +18,9 @@ from twin.foundation.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 
 TOOL = "Tool_4_Maryland_R_5"
-OTHERS = {"Tool_4_Maryland_L_Roll_3": ("200", "203"), "Tool_4_Maryland_L_Pitch_3": ("000", "003")}  # the jaw's mirror image
+MIRRORED_TOOLS = {"Tool_4_Maryland_L_Roll_3": ("200", "203"), "Tool_4_Maryland_L_Pitch_3": ("000", "003")}  # the jaw's mirror image
 RATES = (0.1, 0.2, 0.3, 0.4, 0.5)  # Hz, first digit of a file's name
-LOADS = (10, 20, 30, 40)  # per cent, second digit
+LOAD_PERCENTS = (10, 20, 30, 40)  # per cent, second digit
 START_UP = 1.0  # s
 MEAN = 40  # rows
 IN_TURN, OUT_TURN = 8192.0, 4000.0  # counts a turn, encoders at input and output
@@ -33,15 +33,17 @@ REPEATS = np.deg2rad(0.5)
 def read(folder: Path) -> tuple[Recording, Dropped]:
     """The twenty runs of one tool at five rates and four loads, named by both, and what was left out."""
     dropped = Dropped()
-    runs = {(rate, load): f"{TOOL}/{i}{j}.TXT.gz" for i, rate in enumerate(RATES) for j, load in enumerate(LOADS)}
+    runs = {(rate, load): f"{TOOL}/{i}{j}.TXT.gz" for i, rate in enumerate(RATES) for j, load in enumerate(LOAD_PERCENTS)}
     named = {f"load{load}_{rate:.1f}Hz.csv": name for (rate, load), name in runs.items()}
     return _recording(TOOL, [_run(folder, name, label, dropped) for label, name in named.items()]), dropped
 
 
 def read_other(folder: Path, tool: str) -> Recording:
-    """The runs at 20 and 80 % load and 0.3 Hz of one of `OTHERS`."""
+    """The runs at 20 and 80 % load and 0.3 Hz of one of `MIRRORED_TOOLS`."""
     labels = (f"load{load}_0.3Hz.csv" for load in (20, 80))
-    return _recording(tool, [_run(folder, f"{tool}/{n}.TXT.gz", w, Dropped()) for n, w in zip(OTHERS[tool], labels, strict=True)])
+    return _recording(
+        tool, [_run(folder, f"{tool}/{n}.TXT.gz", w, Dropped()) for n, w in zip(MIRRORED_TOOLS[tool], labels, strict=True)]
+    )
 
 
 def read_all(folder: Path) -> list[Recording]:

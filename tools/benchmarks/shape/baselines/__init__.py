@@ -2,9 +2,7 @@
 
 Importing this package adds them to `twin.shape.estimators.estimator.estimators()`.
 
-pointwise.py           their base: a network that gives every point's displacement
 folding.py             KineSoft's decoder after FoldingNet
-deepsoro.py            a decoder after DeepSoRo, trained by chamfer distance
 constant_curvature.py  an arc, nothing to train
 """
 

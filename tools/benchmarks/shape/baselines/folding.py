@@ -15,13 +15,15 @@ with shares up to LARGEST_LAG_SHARE and a from SLOWEST_PACE to 1.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tools.benchmarks.shape.baselines.pointwise import DISPLACEMENT_SCALE, PLACE_SCALE, PointwiseEstimator
+from twin.robots import Robot
 from twin.shape.estimators.estimator import SensorReadings
 from twin.shape.estimators.features import network_features
+from twin.shape.estimators.learned import LearnedEstimator
 from twin.shape.estimators.weights import pack_layers, perceptron, relu, unpack_layers
 from twin.shape.training.samples import (
     DEAD_SENSOR_SHARE,
@@ -37,6 +39,7 @@ from twin.shape.training.training_spec import TrainingSpec, build_perceptron, pe
 if TYPE_CHECKING:
     import torch
 
+PLACE_SCALE, POINT_DISPLACEMENT_SCALE = 0.05, 0.01  # m: sizes that count as one
 CODE_SIZE, FOLD_WIDTH = 64, 64
 POINTS_PER_STEP = 96  # points of a sample in one training step
 ROWS_BACK = 3  # rows of history
@@ -45,8 +48,11 @@ LARGEST_LAG_SHARE, SLOWEST_PACE = 0.1, 0.2  # of a strain that lags, and the lea
 FRESH_SHARE = 0.2  # of the samples are shown without history
 
 
-class FoldingEstimator(PointwiseEstimator):
-    """A decoder with a history of `ROWS_BACK` rows; a row that follows none starts anew, as if at rest there."""
+class FoldingEstimator(LearnedEstimator):
+    """A decoder with a history of `ROWS_BACK` rows; a row that follows none starts anew, as if at rest there.
+
+    It has no error of its own: (share (n, 1) |moved|)^2 + rest^2 of `error`, fitted to held-out fingers.
+    """
 
     description = "KineSoft's way: a decoder that folds the rest shape, vertex by vertex"
 
@@ -54,12 +60,20 @@ class FoldingEstimator(PointwiseEstimator):
     def weights_format(cls) -> str:
         return f"twin-{cls.name()}/4"  # 3 had no history
 
-    def moved(self, felt: SensorReadings) -> np.ndarray:
+    @classmethod
+    def weights_path(cls, robot: Robot) -> Path:
+        """Return the weights' file in this package."""
+        return Path(__file__).parent / "weights" / f"{cls.name()}.npz"
+
+    def decode(self, felt: SensorReadings) -> tuple[np.ndarray, np.ndarray]:
         code, first, second = (unpack_layers(name, self.arrays) for name in ("code", "first", "second"))
         x = history_features(felt.strain, previous_strains(felt.strain, felt.follows, ROWS_BACK), felt.displacement, felt.pushed)
         c = perceptron(x, code, relu)
         place = np.broadcast_to(self.points.rest / PLACE_SCALE, (len(c), *self.points.rest.shape))
-        return DISPLACEMENT_SCALE * _fold(c, _fold(c, place, first), second)
+        moved = POINT_DISPLACEMENT_SCALE * _fold(c, _fold(c, place, first), second)
+        moved[:, self.points.rest[:, 2] <= self.body.cone.clamp] = 0.0
+        share, rest = self.arrays["error"]
+        return moved, np.hypot(share * np.linalg.norm(moved, axis=2), rest)
 
     @classmethod
     def training_spec(cls, data: TrainingSamples) -> TrainingSpec:
@@ -149,10 +163,10 @@ class FoldingTrainingSpec(TrainingSpec):
 
     def validation_error(self, net: torch.nn.Module, x: torch.Tensor, pick: np.ndarray) -> np.ndarray:
         every = np.arange(0, len(self.samples.point_weights), 5)
-        return DISPLACEMENT_SCALE * self._away(net, x, pick, every).norm(dim=2).mean(dim=1).numpy()
+        return POINT_DISPLACEMENT_SCALE * self._away(net, x, pick, every).norm(dim=2).mean(dim=1).numpy()
 
     def _away(self, net: Any, x: torch.Tensor, pick: np.ndarray, points: np.ndarray) -> torch.Tensor:
-        """Return the errors (b, k, 3) of these points, in DISPLACEMENT_SCALE."""
+        """Return the errors (b, k, 3) of these points, in POINT_DISPLACEMENT_SCALE."""
         import torch
 
         true = np.einsum(
@@ -161,7 +175,7 @@ class FoldingTrainingSpec(TrainingSpec):
         c = net["code"](x)[:, None].expand(-1, len(points), -1)
         place = torch.from_numpy((self.samples.points.rest[points] / PLACE_SCALE).astype(np.float32)).expand(len(x), -1, -1)
         folded = net["second"](torch.cat([c, net["first"](torch.cat([c, place], dim=2))], dim=2))
-        return folded - torch.from_numpy((true / DISPLACEMENT_SCALE).astype(np.float32))
+        return folded - torch.from_numpy((true / POINT_DISPLACEMENT_SCALE).astype(np.float32))
 
     def export_arrays(self, net: Any) -> dict[str, Any]:
         return {k: v for name in ("code", "first", "second") for k, v in pack_layers(name, perceptron_layers(net[name])).items()}

@@ -10,9 +10,20 @@ from pathlib import Path
 import gymnasium
 
 from tools.benchmarks.tasks.policy.bench_reach import BenchReach, robot_of
-from tools.benchmarks.tasks.policy.days import DAYS, twin_of
+from tools.benchmarks.tasks.policy.days import EFFECT_DAYS, twin_of
 from tools.benchmarks.tasks.policy.inverse import InverseKinematics
-from tools.benchmarks.tasks.policy.reach import MOVES, SEEN, STEPS, TASK, Act, acting, distances, episodes_of, task, train
+from tools.benchmarks.tasks.policy.reach import (
+    MOVES,
+    SENSORS_SEEN,
+    TASK,
+    TRAINING_STEPS,
+    Act,
+    acting,
+    distances,
+    episodes_of,
+    task,
+    train,
+)
 
 EPISODES, GLANCE = 50, 25  # on the bench and on the own twin at the end; on the own twin while it learns
 
@@ -33,12 +44,12 @@ class Cell:
 
     @property
     def days(self) -> tuple[str, ...]:
-        return tuple(DAYS) if self.effect == "any" else (self.effect,)
+        return tuple(EFFECT_DAYS) if self.effect == "any" else (self.effect,)
 
 
 def plan(seeds: int) -> list[Cell]:
     """Inverse kinematics, then seed by seed, so that any first part is a fair sample."""
-    twins = [("described", "any"), *((twin, e) for e in DAYS for twin in ("calibrated", "diagnosed", "randomised"))]
+    twins = [("described", "any"), *((twin, e) for e in EFFECT_DAYS for twin in ("calibrated", "diagnosed", "randomised"))]
     who: list[int | None] = [None, *range(seeds)]
     return [
         Cell(twin, effect, blind, seed)
@@ -49,7 +60,7 @@ def plan(seeds: int) -> list[Cell]:
     ]
 
 
-def run(cell: Cell, out: Path, steps: int = STEPS, episodes: int = EPISODES) -> None:
+def run(cell: Cell, out: Path, steps: int = TRAINING_STEPS, episodes: int = EPISODES) -> None:
     """Train, try, and write out/`cell.file` whole; nothing where it is there already."""
     file, source = out / cell.file, twin_of(cell.twin, cell.effect, out / "days")
     if file.is_file():
@@ -72,7 +83,7 @@ def run(cell: Cell, out: Path, steps: int = STEPS, episodes: int = EPISODES) -> 
 
 
 def _bench(cell: Cell, source: str, day: str, out: Path) -> BenchReach:
-    return BenchReach(robot_of(out / "days" / day), source, sensors=SEEN[cell.blind], **TASK)
+    return BenchReach(robot_of(out / "days" / day), source, sensors=SENSORS_SEEN[cell.blind], **TASK)
 
 
 def _by_inverse(cell: Cell, source: str, day: str, out: Path, episodes: int) -> list[float]:

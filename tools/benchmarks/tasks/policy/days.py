@@ -19,18 +19,18 @@ class Day(NamedTuple):
     sigmas: float
 
 
-DAYS = {
+EFFECT_DAYS = {
     "tendon_friction": Day(31012, 8.0),
     "backbone_creep": Day(31013, 8.0),
     "tip_payload": Day(31011, 8.0),
     "base_tilt": Day(31004, 4.0),
 }
-TWINS = ("described", "calibrated", "diagnosed", "randomised")
+TWIN_KINDS = ("described", "calibrated", "diagnosed", "randomised")
 
 
 def prepare(effect: str, folder: Path) -> None:
     """The day of `effect`, its report and its calibrated twin, what is missing of them."""
-    day, wanted = folder / effect, DAYS[effect]
+    day, wanted = folder / effect, EFFECT_DAYS[effect]
     if not day.is_dir():
         part = folder / f"{effect}.part"
         make_set(part, Recipe((effect,), wanted.sigmas, wanted.seed, "hanging", displacement=True))
@@ -43,7 +43,7 @@ def prepare(effect: str, folder: Path) -> None:
 
 
 def twin_of(kind: str, effect: str, folder: Path) -> str:
-    """What `gymnasium.make` takes as the twin of one of TWINS."""
+    """What `gymnasium.make` takes as the twin of one of TWIN_KINDS."""
     if kind == "described":
         return "continuum"
     return str(folder / (f"{effect}-calibrated.toml" if kind == "calibrated" else f"{effect}-report"))

@@ -23,9 +23,9 @@ from twin.foundation.errors import TwinError
 if TYPE_CHECKING:
     from stable_baselines3 import SAC
 
-MOVES, STEPS = 20, 4000
+MOVES, TRAINING_STEPS = 20, 4000
 TASK: dict[str, Any] = {"interval": 0.2, "dynamic": False, "tension_noise": 0.01, "tip_noise": 2.5e-4}
-SEEN = {True: ("load_cells",), False: ("load_cells", "tip")}  # by whether it is blind
+SENSORS_SEEN = {True: ("load_cells",), False: ("load_cells", "tip")}  # by whether it is blind
 TEST_SEED = 900_000  # and on: the episodes that a policy is tried on
 ON_THE_WAY = 1000  # steps between two trials of a policy in training
 Act = Callable[[np.ndarray], np.ndarray]
@@ -55,10 +55,12 @@ def episodes_of(env: ContinuumReach) -> gymnasium.Env:
 
 def task(source: str | Path, blind: bool, randomise: bool = False) -> gymnasium.Env:
     """Reaching on a twin.toml, a report or a robot's name."""
-    return episodes_of(ContinuumReach(source, sensors=SEEN[blind], randomise=randomise, **TASK))
+    return episodes_of(ContinuumReach(source, sensors=SENSORS_SEEN[blind], randomise=randomise, **TASK))
 
 
-def train(env: gymnasium.Env, seed: int, steps: int = STEPS, look: Callable[[int, Act], None] = lambda step, act: None) -> SAC:
+def train(
+    env: gymnasium.Env, seed: int, steps: int = TRAINING_STEPS, look: Callable[[int, Act], None] = lambda step, act: None
+) -> SAC:
     """A policy for `env`; `look` is shown it every ON_THE_WAY steps. Raises TwinError without Stable-Baselines3."""
     try:
         import torch
@@ -108,7 +110,7 @@ def main() -> None:
     asked.add_argument("--blind", action="store_true")
     asked.add_argument("--randomise", action="store_true", help="draw each episode's twin from the diagnosis's own uncertainty")
     asked.add_argument("--seed", type=int, default=0)
-    asked.add_argument("--steps", type=int, default=STEPS)
+    asked.add_argument("--steps", type=int, default=TRAINING_STEPS)
     said = asked.parse_args()
     try:
         learn(said)

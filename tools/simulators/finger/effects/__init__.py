@@ -1,4 +1,4 @@
-"""What a real finger's bench has and the description has not; one law per file, found by its `id`."""
+"""What a real finger's bench has and the description has not; laws by where they act, found by their `id`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a real bench has and the robot's description has not; one law per file, found by its `id`."""
+"""What a real bench has and the robot's description has not; laws by where they act, found by their `id`."""
 
 from __future__ import annotations
 

@@ -17,14 +17,14 @@ from tools.simulators.second_rod.effects.odd import Air, Loom, LooseDisk, Magnet
 from tools.simulators.second_rod.effects.surroundings import Camera, Payload, Post, Tilt, Wall
 from tools.simulators.second_rod.effects.tendon import Elasticity, Friction, Routing
 
-KNOWN: dict[str, type[Effect]] = {
+CATALOGUE_KINDS: dict[str, type[Effect]] = {
     kind.name: kind
     for kind in (
         Friction, Creep, Precurvature, Asymmetry, Gradient, Tilt, Camera, Payload, Gain, Bias, Drift, Crosstalk, Routing, Delay,
         Lag, Saturation, TemperatureSoftening, Ageing, Backlash, Elasticity, Drum, Wall, Post,
     )
 }  # fmt: skip
-ODD: dict[str, type[Effect]] = {kind.name: kind for kind in (Magnet, Air, LooseDisk, Loom, Stalks, Vibration)}
-KINDS = {**KNOWN, **ODD}
+ODD_KINDS: dict[str, type[Effect]] = {kind.name: kind for kind in (Magnet, Air, LooseDisk, Loom, Stalks, Vibration)}
+EFFECT_KINDS = {**CATALOGUE_KINDS, **ODD_KINDS}
 
-__all__ = ["KINDS", "KNOWN", "ODD", "Effect"]
+__all__ = ["CATALOGUE_KINDS", "EFFECT_KINDS", "ODD_KINDS", "Effect"]

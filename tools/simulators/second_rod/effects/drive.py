@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tools.simulators.second_rod.day import Day
 from tools.simulators.second_rod.effects.effect import Array, Effect, floats
 from tools.simulators.second_rod.effects.tendon import BOTH
-from tools.simulators.second_rod.tendons import TENDONS
+from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Saturation(Effect):
 
 @njit(cache=True)
 def lagging(command, carry):
-    """(n, TENDONS) a linear system's answer, exact for a command that is constant over each step.
+    """(n, ROD_TENDONS) a linear system's answer, exact for a command that is constant over each step.
 
     carry (order, order): what one step makes of (place less command, speed).
     """
@@ -79,7 +79,7 @@ class Lag(Effect):
 
 @njit(cache=True)
 def play(command, width):
-    """A play operator of a width, m, centred when the trial begins: (n, TENDONS)."""
+    """A play operator of a width, m, centred when the trial begins: (n, ROD_TENDONS)."""
     out = np.empty_like(command)
     for tendon in range(command.shape[1]):
         at = 0.0
@@ -118,7 +118,7 @@ class Drum(Effect):
 
     @classmethod
     def draw(cls, random: np.random.Generator, day: Day) -> Self:
-        return cls(0.3e-3, random.uniform(5e-3, 8e-3), floats(random.uniform(0, 2 * np.pi, TENDONS)))
+        return cls(0.3e-3, random.uniform(5e-3, 8e-3), floats(random.uniform(0, 2 * np.pi, ROD_TENDONS)))
 
     def delivered(self, command: Array, step: float, day: Day) -> Array:
         phases = np.array(self.phases)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tools.simulators.second_rod.day import Day
 from tools.simulators.second_rod.effects.effect import Array, Effect, any_three, floats
-from tools.simulators.second_rod.tendons import TENDONS
+from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Crosstalk(Effect):
 
     @classmethod
     def draw(cls, random: np.random.Generator, day: Day) -> Self:
-        return cls(tuple(floats(row) for row in random.uniform(0, 0.06, (TENDONS, TENDONS)) * (1 - np.eye(TENDONS))))
+        return cls(tuple(floats(row) for row in random.uniform(0, 0.06, (ROD_TENDONS, ROD_TENDONS)) * (1 - np.eye(ROD_TENDONS))))
 
     def read(self, tension: Array, share: Array) -> Array:
         return tension + tension @ np.array(self.shares).T

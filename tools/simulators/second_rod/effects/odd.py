@@ -9,13 +9,13 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from tools.simulators.second_rod.day import GRAVITY, Day, Trial
+from tools.simulators.second_rod.day import STANDARD_GRAVITY, Day, Trial
 from tools.simulators.second_rod.effects.effect import Array, Effect, Markers, floats, sign
 from tools.simulators.second_rod.effects.tendon import BOTH
 from tools.simulators.second_rod.fields import Jet
 from tools.simulators.second_rod.fields import Magnet as Repeller
 from tools.simulators.second_rod.loom import Loom as Sliders
-from tools.simulators.second_rod.robot import LENGTH, Robot
+from tools.simulators.second_rod.robot import ROD_LENGTH, Robot
 from tools.simulators.second_rod.rod import INTERVALS
 
 
@@ -128,7 +128,7 @@ class Stalks(Effect):
 
     def seen(self, markers: Markers, trial: Trial, day: Day) -> Array:
         across = markers.gravity - (markers.axes @ markers.gravity)[:, :, None] * markers.axes
-        reached = np.array(self.sags)[:, None] * across / GRAVITY
+        reached = np.array(self.sags)[:, None] * across / STANDARD_GRAVITY
         offset = reached.copy()
         for row, step in enumerate(np.diff(trial.times), 1):
             offset[row] = reached[row] + (offset[row - 1] - reached[row]) * np.exp(-step / self.delay)
@@ -187,7 +187,7 @@ class Vibration(Effect):
         strength = np.clip(0.5 + 0.8 * np.sin(2 * np.pi * fine / period + phases[0]), 0, 1)
         tone = strength * np.sin(2 * np.pi * self.tone * fine + phases[1])
         moved = moved + PUMP * np.outer(tone, [np.cos(self.angle), np.sin(self.angle)])
-        mode = (day.robot.disk_positions / LENGTH) ** 2
+        mode = (day.robot.disk_positions / ROD_LENGTH) ** 2
         out = markers.positions.copy()
         out[:, :, :2] += self.scale * mode[None, :, None] * CubicSpline(fine, moved)(trial.times)[:, None, :]
         return out

@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from tools.simulators.second_rod.contact import POST, WALL, obstacle
-from tools.simulators.second_rod.day import GRAVITY, Day, Trial
+from tools.simulators.second_rod.contact import POST_OBSTACLE, WALL_OBSTACLE, obstacle
+from tools.simulators.second_rod.day import STANDARD_GRAVITY, Day, Trial
 from tools.simulators.second_rod.effects.effect import Array, Effect, Markers, any_three, floats, rotation, sign
 from tools.simulators.second_rod.effects.tendon import BOTH
 from tools.simulators.second_rod.robot import Robot
@@ -28,7 +28,7 @@ class Tilt(Effect):
     @classmethod
     def draw(cls, random: np.random.Generator, day: Day) -> Self:
         """About an axis across the declared gravity: about gravity itself nothing would turn."""
-        down = day.gravities[day.mount] / GRAVITY
+        down = day.gravities[day.mount] / STANDARD_GRAVITY
         axis = np.cross(down, random.normal(size=3))
         return cls(3.0, floats(axis / np.linalg.norm(axis)))
 
@@ -78,7 +78,7 @@ class Wall(Effect):
         cos, sin = np.cos(self.angle), np.sin(self.angle)
         point = np.array([self.distance * cos, self.distance * sin, WALL_HEIGHT])
         normal = -np.array([cos * np.cos(self.lean), sin * np.cos(self.lean), np.sin(self.lean)])
-        return replace(robot, obstacle=obstacle(WALL, point, normal))
+        return replace(robot, obstacle=obstacle(WALL_OBSTACLE, point, normal))
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Post(Effect):
         cos, sin = np.cos(self.angle), np.sin(self.angle)
         point = np.array([self.distance * cos, self.distance * sin, self.height])
         along = np.array([-sin * np.cos(self.slant), cos * np.cos(self.slant), np.sin(self.slant)])
-        return replace(robot, obstacle=obstacle(POST, point, along, self.radius))
+        return replace(robot, obstacle=obstacle(POST_OBSTACLE, point, along, self.radius))
 
 
 @dataclass(frozen=True)

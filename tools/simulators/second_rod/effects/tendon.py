@@ -10,7 +10,7 @@ import numpy as np
 from tools.simulators.second_rod.day import Day, Drive
 from tools.simulators.second_rod.effects.effect import Effect, sign
 from tools.simulators.second_rod.robot import Robot
-from tools.simulators.second_rod.tendons import TENDONS
+from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 BOTH: frozenset[Drive] = frozenset({"tension", "displacement"})
 
@@ -47,7 +47,7 @@ class Routing(Effect):
 
     @classmethod
     def draw(cls, random: np.random.Generator, day: Day) -> Self:
-        return cls(int(random.integers(1, TENDONS + 1)), 4.0 * sign(random))
+        return cls(int(random.integers(1, ROD_TENDONS + 1)), 4.0 * sign(random))
 
     def built(self, robot: Robot, share: float) -> Robot:
         angles = robot.hole_angles.copy()

@@ -21,12 +21,12 @@ import numpy as np
 from twin.diagnosis.checks.suspicions import channels, clouds, description, frames, order, signs, trials, units
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
 from twin.diagnosis.split import blind
-from twin.diagnosis.thresholds import AS_GOOD
+from twin.diagnosis.thresholds import UNDECIDED_CHANGES_RATIO
 from twin.prediction.prepared import PreparedRecording
 from twin.prediction.twin import Twin
 
 Kind = Callable[[Case], Iterable[Suspicion]]
-SEEN: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
+SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs, channels.noise,
     signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
 )  # fmt: skip
@@ -37,7 +37,7 @@ LAST: tuple[Kind, ...] = (
     units.commands,
     description.parameters,
 )  # thousandfold loads: where nothing else explains, or the robot as described has no equilibrium
-UNREADABLE = tuple(units.KINDS.values())  # readings in a wrong unit say nothing of loads
+UNREADABLE = tuple(units.UNIT_SUSPICIONS.values())  # readings in a wrong unit say nothing of loads
 
 
 def suspicions(
@@ -49,7 +49,7 @@ def suspicions(
     inputs and conditions are looked at. Of changes that explain the same readings the likeliest are kept.
     """
     case = Case(blind(prepared, held_out), twin, nominal)
-    found = [s for kind in SEEN for s in kind(case)]
+    found = [s for kind in SEEN_IN_FILES for s in kind(case)]
 
     def explained() -> bool:
         return any(s.group == case.group for s in found)
@@ -64,7 +64,7 @@ def suspicions(
             found += tried([kind])
     if nominal is None and not explained():  # what has no equilibrium is sooner off by a thousand than turned or exchanged
         found += tried(TRIED)
-    return tuple(s for s in found if s.left <= AS_GOOD * min(o.left for o in found if o.group == s.group))
+    return tuple(s for s in found if s.left <= UNDECIDED_CHANGES_RATIO * min(o.left for o in found if o.group == s.group))
 
 
-__all__ = ["LAST", "SEEN", "TRIED", "Case", "Suspicion", "suspicions"]
+__all__ = ["LAST", "SEEN_IN_FILES", "TRIED", "Case", "Suspicion", "suspicions"]

@@ -13,7 +13,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.body import Loads
-from twin.diagnosis.thresholds import ALIVE, FITS, MOST, MOVED, SAMPLES
+from twin.diagnosis.thresholds import (
+    LEAST_MOTION_SHARE,
+    LEFT_BY_FILE_CHANGE,
+    SAMPLES_TO_TRY_COMMANDS,
+    TRIALS_TO_TRY_COMMANDS,
+    UNMISSABLE_MOTION,
+)
 from twin.foundation.errors import TwinError
 from twin.measurements import Channel
 from twin.measurements.channels import CHANNEL_KINDS
@@ -79,8 +85,8 @@ class Case:
         noise = np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in self.prepared.outputs])
         there = [np.isfinite(c) for c in y.T]
         spread, most = (np.array([np.std(c[t]) if t.any() else np.nan for c, t in zip(v.T, there, strict=True)]) for v in (y, p))
-        still = np.sqrt(np.maximum(spread**2 - noise**2, 0.0)) < MOVED * most
-        return np.flatnonzero(still & (most > ALIVE * noise)).tolist()
+        still = np.sqrt(np.maximum(spread**2 - noise**2, 0.0)) < LEAST_MOTION_SHARE * most
+        return np.flatnonzero(still & (most > UNMISSABLE_MOTION * noise)).tolist()
 
     def few(self) -> list[int]:
         """Of the fitted trials those that pull each tendon most and that carry most: enough to try a change on."""
@@ -88,11 +94,11 @@ class Case:
             return []
         pulled = np.array([np.abs(self.prepared.inputs[k].command).max(axis=0) for k in self.trials])
         heaviest = int(np.argmax([self.prepared.inputs[k].loads.payload for k in self.trials]))
-        return sorted({self.trials[i] for i in (*pulled.argmax(axis=0)[:MOST].tolist(), heaviest)})
+        return sorted({self.trials[i] for i in (*pulled.argmax(axis=0)[:TRIALS_TO_TRY_COMMANDS].tolist(), heaviest)})
 
     def thinned(self) -> Case:
         """The case with a few samples of each trial: what explains all of a file otherwise shows in these too."""
-        every = [max(1, -(-len(i.time) // SAMPLES)) for i in self.prepared.inputs]
+        every = [max(1, -(-len(i.time) // SAMPLES_TO_TRY_COMMANDS)) for i in self.prepared.inputs]
         inputs = tuple(
             replace(i, time=i.time[::s], clock=i.clock[::s], command=i.command[::s], temperature=i.temperature[::s],
                     loads=_thinned(i.loads, s))
@@ -140,7 +146,7 @@ class Case:
 
     def better(self, before: float, after: float, columns: Sequence[int]) -> float | None:
         """The share of the error left by a change to the file, where it takes most of it and little is left; else None."""
-        if not np.isfinite(after) or after >= FITS * min(before, self.motion(columns)):
+        if not np.isfinite(after) or after >= LEFT_BY_FILE_CHANGE * min(before, self.motion(columns)):
             return None
         return after / before if np.isfinite(before) else 0.5 * after / self.motion(columns)
 
@@ -160,7 +166,7 @@ def beginnings(prepared: PreparedRecording) -> PreparedRecording:
     looks for one row by row takes minutes to say so. Where a seen skin would stand is not asked of it."""
     inputs = tuple(
         replace(i, time=i.time[:1], clock=i.clock[:1], command=i.command[:1], temperature=i.temperature[:1],
-                loads=i.loads if len(i.loads.torque) == 1 else replace(i.loads, torque=i.loads.torque[:1]), seen=None)
+                loads=i.loads if len(i.loads.torque) == 1 else replace(i.loads, torque=i.loads.torque[:1]), clouds=None)
         for i in prepared.inputs
     )  # fmt: skip
     return replace(prepared, inputs=inputs, measured=tuple(y[:1] for y in prepared.measured))

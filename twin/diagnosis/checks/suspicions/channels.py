@@ -9,7 +9,15 @@ import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, called, rms
 from twin.diagnosis.checks.suspicions.units import others
-from twin.diagnosis.thresholds import ALIVE, DROWNED, EXPLAINED, MISSED, NOISY, QUIET, WORKABLE
+from twin.diagnosis.thresholds import (
+    HIDING_NOISE_RATIO,
+    LEFT_BY_PATTERN,
+    NOMINAL_MOTION_ERROR,
+    ROOM_TEMPERATURE_RANGE,
+    SUSPECT_NOISE_RATIO,
+    UNDERSTATED_NOISE_RATIO,
+    UNMISSABLE_MOTION,
+)
 from twin.foundation.units import unit_scale
 from twin.measurements import Channel
 from twin.prediction.prepared import ROOM_TEMPERATURE, Inputs
@@ -29,11 +37,11 @@ def inputs(case: Case) -> Iterator[Suspicion]:
         return
     command = np.concatenate([i.command for i in case.prepared.inputs])
     columns, few = case.columns(case.group), case.few()
-    still = np.ptp(command, axis=0) <= ALIVE * np.array([c.noise or 0.0 for c in case.prepared.drivers]) * np.abs(
+    still = np.ptp(command, axis=0) <= UNMISSABLE_MOTION * np.array([c.noise or 0.0 for c in case.prepared.drivers]) * np.abs(
         case.prepared.pull
     )
     left = [case.prepared.measured[k][:, columns] - case.predicted[k][:, columns] for k in case.trials]
-    if not rms(np.concatenate(left)) > EXPLAINED * case.motion(columns):
+    if not rms(np.concatenate(left)) > LEFT_BY_PATTERN * case.motion(columns):
         return
     for i in np.flatnonzero(still):
         top = float(np.abs(command).max())
@@ -52,7 +60,7 @@ def inputs(case: Case) -> Iterator[Suspicion]:
             share = np.divide((r * along).sum(axis=1), size, out=np.zeros(len(r)), where=size > 0.0)
             whole.append(r)
             rest.append(r - share[:, None] * along)
-        if rms(np.concatenate(rest)) < EXPLAINED * rms(np.concatenate(whole)):
+        if rms(np.concatenate(rest)) < LEFT_BY_PATTERN * rms(np.concatenate(whole)):
             name = case.prepared.drivers[i].name
             words = f"{name} never changes, and the robot moves as if it did"
             yield Suspicion("dead input", words, f"log {name} again, or leave out the trials in which it was pulled")
@@ -65,8 +73,10 @@ def noise(case: Case) -> Iterator[Suspicion]:
         if case.predicted is not None:
             read, shown = ([v[k][:, j] for k in case.trials] for v in (case.prepared.measured, case.predicted))
             left = [y - p for y, p in zip(read, shown, strict=True)]
-            least = min(_white(read), _white(left)) - MISSED * _white(shown)  # the robot's errors, where it moves from row to row
-            odd += _odd(o.channel, least, _scatter(left, 0.5), DROWNED * rms(np.concatenate(left)))
+            least = min(_white(read), _white(left)) - NOMINAL_MOTION_ERROR * _white(
+                shown
+            )  # the robot's errors, where it moves from row to row
+            odd += _odd(o.channel, least, _scatter(left, 0.5), HIDING_NOISE_RATIO * rms(np.concatenate(left)))
     for i, c in enumerate(case.prepared.drivers):
         read = [x.command[:, i] / case.prepared.pull[i] for x in case.prepared.inputs]
         odd += _odd(c, _white(read), _scatter(read, 0.25), float(np.ptp(np.concatenate(read))) or np.inf)
@@ -85,9 +95,9 @@ def _odd(channel: Channel, least: float, scatter: float, most: float) -> list[tu
     said = channel.noise
     if said is None:
         return []
-    if least > NOISY * said:
+    if least > UNDERSTATED_NOISE_RATIO * said:
         return [(channel, least)]
-    return [(channel, scatter)] if said > max(most, QUIET * scatter) else []
+    return [(channel, scatter)] if said > max(most, SUSPECT_NOISE_RATIO * scatter) else []
 
 
 def _white(columns: list[np.ndarray]) -> float:
@@ -108,7 +118,7 @@ def _scatter(columns: list[np.ndarray], quantile: float) -> float:
 
 def room(case: Case) -> Iterator[Suspicion]:
     """A room temperature at which nobody works."""
-    low, high = WORKABLE
+    low, high = ROOM_TEMPERATURE_RANGE
     recording = case.prepared.recording
     for channel in (c for c in recording.channels if c.kind == "ambient_temperature"):
         values = np.concatenate([t.values[channel.name] for t in recording.trials])

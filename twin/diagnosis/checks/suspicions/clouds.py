@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
-from twin.diagnosis.thresholds import ASTRAY, HUNDREDS, THICKER
+from twin.diagnosis.thresholds import CLOUD_DISTANCE_RATIO, CLOUD_WIDTH_RATIO, UNIT_MISTAKE_RATIO
 from twin.measurements import Clouds
 from twin.measurements.patches import N_BANDS, N_PATCHES
 
@@ -26,7 +26,7 @@ def clouds(case: Case) -> Iterator[Suspicion]:
         return
     size = float(np.median([np.linalg.norm(np.ptp(c.points, axis=0)) for c in seen.values()]))
     robot = float(case.twin.body().spec.compile().stat.extent)
-    if not 1.0 / HUNDREDS < size / robot < HUNDREDS:
+    if not 1.0 / UNIT_MISTAKE_RATIO < size / robot < UNIT_MISTAKE_RATIO:
         unit, factor = ("mm", 1e-3) if size > robot else ("km", 1e3)
         words = f"the clouds are {size:.3g} m across and the robot {robot:.2g} m"
         yield Suspicion(KIND, words, f"write `points` in metres: as they stand they would be {unit} (times {factor:g})")
@@ -37,7 +37,7 @@ def clouds(case: Case) -> Iterator[Suspicion]:
         return
     near = [_nearest(case.prepared.measured[k][:, columns], case.prepared.inputs[k].time, c) for k, c in seen.items()]
     off, spacing = (np.concatenate([n[part] for n in near]) for part in (0, 1))
-    if off.size and np.median(off) > ASTRAY * np.median(spacing):
+    if off.size and np.median(off) > CLOUD_DISTANCE_RATIO * np.median(spacing):
         words = (
             f"markers {names[0]} to {names[-1]} stand {1e3 * np.median(off):.1f} mm off the nearest of their clouds, whose points "
             f"are {1e3 * np.median(spacing):.1f} mm apart (medians)"
@@ -56,7 +56,7 @@ def _width(case: Case) -> Iterator[Suspicion]:
     if not there.any():
         return
     stands, described = float(np.median(seen[there])), float(np.median(shown[there]))
-    if not 1.0 / THICKER < stands / described < THICKER:
+    if not 1.0 / CLOUD_WIDTH_RATIO < stands / described < CLOUD_WIDTH_RATIO:
         words = f"near the base the clouds stand {1e3 * stands:.1f} mm off the axis, and the robot's skin {1e3 * described:.1f} mm"
         yield Suspicion(KIND, words, "give clouds in the base frame, of this robot, or leave out `cloud`")
 

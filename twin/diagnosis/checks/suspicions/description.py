@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
-from twin.diagnosis.thresholds import FITS
+from twin.diagnosis.thresholds import LEFT_BY_FILE_CHANGE
 
 
 def parameters(case: Case) -> Iterator[Suspicion]:
     """Where nothing moves as described: each parameter a thousand times larger, and smaller."""
     columns, few = case.columns(case.group), case.few()
     before = case.error(columns, case.as_is(), few)
-    if before < FITS * case.motion(columns):
+    if before < LEFT_BY_FILE_CHANGE * case.motion(columns):
         return
     found = []
     rows: dict[str, list] = {}

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, registration, rms
-from twin.diagnosis.thresholds import FAR_TURN, FITS, SHIFTED
+from twin.diagnosis.thresholds import LARGEST_CAMERA_SHIFT, LARGEST_CAMERA_TURN, LEFT_BY_FILE_CHANGE
 
 
 def frame(case: Case) -> Iterator[Suspicion]:
@@ -28,16 +28,16 @@ def frame(case: Case) -> Iterator[Suspicion]:
     flip = flip @ mirror
     mirrored = rms(y - p @ flip.T - moved)
     bar = min(before, case.motion(columns.ravel().tolist()))
-    if mirrored < FITS * min(bar, turned):
+    if mirrored < LEFT_BY_FILE_CHANGE * min(bar, turned):
         change = f"export the markers in the right-handed base frame: {_axes(flip)} (or check which tendon is which)"
         yield Suspicion("mirrored frame", f"the markers move as in a mirror: {_axes(flip)}", change, mirrored / before, "marker")
-    elif turned < FITS * bar:
+    elif turned < LEFT_BY_FILE_CHANGE * bar:
         angle, size = np.degrees(Rotation.from_matrix(turn).magnitude()), float(np.abs(p).max())
-        if angle > FAR_TURN:
+        if angle > LARGEST_CAMERA_TURN:
             words = f"the markers move as in a frame turned by {angle:.0f} degrees against the base frame: {_axes(turn)}"
             change = "export the markers in the base frame (z from base to tip, tendons counted from +x to +y)"
             yield Suspicion("turned frame", words, change, turned / before, "marker")
-        elif np.linalg.norm(shift) > SHIFTED * size:
+        elif np.linalg.norm(shift) > LARGEST_CAMERA_SHIFT * size:
             channel = case.prepared.outputs[columns[0, 0]].channel
             off = shift * channel.scale.denominator / channel.scale.numerator
             words = f"all markers are off by {np.round(off, 3).tolist()} {channel.unit}, from the base to the tip"

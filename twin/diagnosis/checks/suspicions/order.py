@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, rms
 from twin.diagnosis.checks.suspicions.units import best
-from twin.diagnosis.thresholds import FITS
+from twin.diagnosis.thresholds import LEFT_BY_FILE_CHANGE
 
 BUILT = ("sensor",)  # readings whose level and gain every built robot has its own of
 
@@ -20,7 +20,7 @@ def tendons(case: Case) -> Iterator[Suspicion]:
     """Two driving channels exchanged, or all of them counted from another one; not where the robot as described bends as measured,
     for one that bends another way is off by as much as it bends."""
     n, columns = case.prepared.n_tendon, case.columns(case.group)
-    if case.error(columns, case.as_is(), case.few()) < FITS * case.motion(columns):
+    if case.error(columns, case.as_is(), case.few()) < LEFT_BY_FILE_CHANGE * case.motion(columns):
         return
     pairs = [_swap(n, i, j) for i, j in itertools.combinations(range(n), 2)]
     ways = [*pairs, *(np.roll(np.arange(n), s) for s in range(1, n) if n > 2)]
@@ -65,7 +65,7 @@ def markers(case: Case) -> Iterator[Suspicion]:
         if not moved.size:
             continue
         before, after = (rms(cost[moved, x]) for x in (moved, of[moved]))
-        if after < FITS * before:
+        if after < LEFT_BY_FILE_CHANGE * before:
             change = ", ".join(f"the column{'s' if group == 'marker' else ''} {names[i]} as {names[of[i]]}" for i in moved)
             words = f"{', '.join(names[i] for i in moved)} each stand where another of them should"
             yield Suspicion(

@@ -10,7 +10,7 @@ import numpy as np
 from twin.body import Drive
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, called
 from twin.diagnosis.checks.suspicions.units import best
-from twin.diagnosis.thresholds import EARTH
+from twin.diagnosis.thresholds import GRAVITY_RANGE
 from twin.prediction.prepared import Inputs
 
 
@@ -50,7 +50,7 @@ def displacements(case: Case) -> Iterator[Suspicion]:
 def size(case: Case) -> Iterator[Suspicion]:
     """Gravity in g, or in another unit."""
     sizes = np.array([np.linalg.norm(i.loads.gravity) for i in case.prepared.inputs])
-    odd = sizes[(sizes > 0) & ((sizes < EARTH[0]) | (sizes > EARTH[1]))]
+    odd = sizes[(sizes > 0) & ((sizes < GRAVITY_RANGE[0]) | (sizes > GRAVITY_RANGE[1]))]
     if odd.size:
         words = f"gravity is {odd[0]:.4g} m/s^2 long, and on earth it is 9.78 to 9.83"
         yield Suspicion("gravity size", words, f"gravity in m/s^2, {9.81 / odd[0]:.4g} times as long (or [0, 0, 0] for none)")

@@ -8,7 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
-from twin.diagnosis.thresholds import ALIEN, CLEAR, COARSE, DAY_LONG, HASTY, OTHER_ROBOT, ROUNDING, SAME_NOISE, SESSION
+from twin.diagnosis.thresholds import (
+    CLEAR_CHI_SQUARE,
+    COPIED_TRIAL_DIFFERENCE,
+    LONGEST_SAMPLE_INTERVAL,
+    LONGEST_SESSION,
+    LONGEST_TRIAL,
+    MARKER_SPACING_CHANGE,
+    MARKER_SPACING_ERROR,
+    SHORTEST_TRIAL,
+    START_TIME_ROUNDING,
+)
 
 
 def duplicates(case: Case) -> Iterator[Suspicion]:
@@ -22,7 +32,7 @@ def duplicates(case: Case) -> Iterator[Suspicion]:
         if not known.any():
             continue
         off = np.nanmean(apart[:, known], axis=0)  # not the median: of a coarse reading half the rows may agree
-        if np.all(off <= SAME_NOISE * noise[known]):
+        if np.all(off <= COPIED_TRIAL_DIFFERENCE * noise[known]):
             one, other = (case.prepared.inputs[k].name for k in (a, b))
             words = f"{other} holds the readings of {one}, its noise included: the same numbers are no repeat"
             yield Suspicion("duplicate trial", words, f"remove the [[trial]] {other}, or export it again")
@@ -45,11 +55,11 @@ def robots(case: Case) -> Iterator[Suspicion]:
     if not ratio:
         return
     usual = float(np.median([r for r, _ in ratio.values()]))
-    if abs(usual - 1.0) > ALIEN and 1.0 / 3.0 < usual < 3.0:
+    if abs(usual - 1.0) > MARKER_SPACING_ERROR and 1.0 / 3.0 < usual < 3.0:
         words = f"the markers {names[0]} to {names[-1]} lie {100 * abs(usual - 1):.0f} % {_way(usual)} than robot.toml has them"
         yield Suspicion("another robot", words, "name the robot that was measured, or correct its lengths in robot.toml")
     for k, (r, error) in ratio.items():
-        if abs(r / usual - 1.0) > max(OTHER_ROBOT, np.sqrt(CLEAR) * error / usual):
+        if abs(r / usual - 1.0) > max(MARKER_SPACING_CHANGE, np.sqrt(CLEAR_CHI_SQUARE) * error / usual):
             name = case.prepared.inputs[k].name
             words = f"in {name} the markers lie {100 * abs(r / usual - 1):.0f} % {_way(r / usual)} than in the other trials"
             yield Suspicion("trial of another robot", words, f"remove the [[trial]] {name}: a set is of one robot in one unit")
@@ -90,15 +100,15 @@ def _overlaps(case: Case) -> list[tuple[Timed, Timed]]:
     """Trials that begin before the one before is over."""
     trials = case.prepared.recording.trials
     timed = sorted((t.start, float(t.time[-1] - t.time[0]), t.name) for t in trials if t.start is not None)
-    return [(a, b) for a, b in itertools.pairwise(timed) if a[0] + a[1] > b[0] + ROUNDING]
+    return [(a, b) for a, b in itertools.pairwise(timed) if a[0] + a[1] > b[0] + START_TIME_ROUNDING]
 
 
 def _slow(case: Case) -> bool:
     """Whether a clock beside the trials' own says that they are slow: every trial has a start, none before the one before is over,
-    and all is done within `SESSION`."""
+    and all is done within `LONGEST_SESSION`."""
     starts = [t.start for t in case.prepared.recording.trials]
     timed = [s for s in starts if s is not None]
-    return len(timed) == len(starts) > 1 and not _overlaps(case) and max(timed) - min(timed) < SESSION
+    return len(timed) == len(starts) > 1 and not _overlaps(case) and max(timed) - min(timed) < LONGEST_SESSION
 
 
 def times(case: Case) -> Iterator[Suspicion]:
@@ -107,10 +117,10 @@ def times(case: Case) -> Iterator[Suspicion]:
     step = float(np.median(np.concatenate([np.diff(i.time) for i in inputs])))
     total = sum(float(i.time[-1] - i.time[0]) for i in inputs)
     longest = max(float(i.time[-1] - i.time[0]) for i in inputs)
-    if step > COARSE and longest > DAY_LONG and not _slow(case):
+    if step > LONGEST_SAMPLE_INTERVAL and longest > LONGEST_TRIAL and not _slow(case):
         words = f"a reading every {step:.3g} s and a trial of {longest / 3600:.3g} hours"
         yield Suspicion("time unit", words, "divide the column time by 1000 if it is in ms: it is in seconds")
-    elif total / len(inputs) < HASTY:
+    elif total / len(inputs) < SHORTEST_TRIAL:
         words = f"a trial lasts {1e3 * total / len(inputs):.3g} ms, a reading every {1e3 * step:.3g} ms"
         yield Suspicion("time unit", words, "multiply the column time by 1000 if it is in thousands of seconds: it is in seconds")
 

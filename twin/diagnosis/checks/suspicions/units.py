@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, called, rms
-from twin.diagnosis.thresholds import FITS, HUNDREDS
+from twin.diagnosis.thresholds import LEFT_BY_FILE_CHANGE, UNIT_MISTAKE_RATIO
 from twin.foundation.units import unit_scale
 from twin.measurements import Channel
 from twin.prediction.prepared import Inputs
 
-OTHERS = {  # SI unit -> units that are mistaken for each other
+CONFUSABLE_UNITS = {  # SI unit -> units that are mistaken for each other
     "m": ("m", "cm", "mm", "um"), "N": ("N", "mN", "kN"), "rad": ("rad", "deg"), "K": ("K", "degC", "degF"), "A": ("A", "mA"),
     "V": ("V", "mV"), "ohm": ("ohm", "mohm", "kohm"), "N*m": ("N*m", "N*mm"),
 }  # fmt: skip
 LEVELS = ("ohm",)  # quantities that are never near zero, and of which a built robot has its own: their level tells a unit
-KINDS = {
+UNIT_SUSPICIONS = {
     "m": "length unit", "N": "force unit", "rad": "angle unit", "K": "temperature unit", "A": "current unit", "V": "voltage unit",
     "ohm": "resistance unit", "N*m": "torque unit",
 }  # fmt: skip
@@ -38,22 +38,22 @@ def outputs(case: Case) -> Iterator[Suspicion]:
             reread = _reread(case, columns, unit, other, si)
             after = reread.error(columns, nominal)
             left = reread.better(before, after, columns)
-            if left is None and si in LEVELS and after < FITS * before:
-                left = after / before if not 1.0 / HUNDREDS < _level(case, columns) < HUNDREDS else None
+            if left is None and si in LEVELS and after < LEFT_BY_FILE_CHANGE * before:
+                left = after / before if not 1.0 / UNIT_MISTAKE_RATIO < _level(case, columns) < UNIT_MISTAKE_RATIO else None
             if left is not None:
                 found.append((left, other))
         if found:
             left, other = min(found)
             read, shown = (_typical(case, columns, y, unit) for y in (case.prepared.measured, case.predicted or ()))
             words = f"{called(channels)} are some {read:.3g} {unit}, and the robot as described shows {shown:.3g} {unit}"
-            yield Suspicion(KINDS[si], words, f'unit = "{other}" instead of "{unit}" for {called(channels)}', left, group)
+            yield Suspicion(UNIT_SUSPICIONS[si], words, f'unit = "{other}" instead of "{unit}" for {called(channels)}', left, group)
 
 
 def commands(case: Case) -> Iterator[Suspicion]:
     """The same of what drives the robot: tensions, displacements, currents, angles. Larger ones are tried only where the robot as
     described moves too little, smaller ones where it moves too much or has no equilibrium, and none where it moves as measured."""
     columns, nominal = case.columns(case.group), case.as_is()
-    if case.error(columns, nominal) < FITS * case.motion(columns):
+    if case.error(columns, nominal) < LEFT_BY_FILE_CHANGE * case.motion(columns):
         return
     moves = rms(_centred(case, columns)) if nominal is not None else np.inf
     larger = moves < case.motion(columns)
@@ -73,7 +73,7 @@ def commands(case: Case) -> Iterator[Suspicion]:
         tried = [(o, lambda i, of=of, f=f: scaled(i, of, f)) for o, f in ratios.items() if (f > 1.0) == larger]
         words = f"with {called(channels)} of some {read:.3g} {unit} the robot as described would not move as measured"
         change = 'unit = "{}" ' + f'instead of "{unit}" for {called(channels)}'
-        yield from best(case, KINDS[si], words, change, tried)
+        yield from best(case, UNIT_SUSPICIONS[si], words, change, tried)
 
 
 def torques(case: Case) -> Iterator[Suspicion]:
@@ -83,7 +83,9 @@ def torques(case: Case) -> Iterator[Suspicion]:
         ratios = {o: _ratio(o, channel.unit, "N*m") for o in others(channel)}
         tried = [(o, lambda i, f=f: replace(i, loads=replace(i.loads, torque=f * i.loads.torque))) for o, f in ratios.items()]
         words = f"under {channel.name} in {channel.unit} the robot as described would not move as measured"
-        yield from best(case, KINDS["N*m"], words, 'unit = "{}" ' + f'instead of "{channel.unit}" for {channel.name}', tried)
+        yield from best(
+            case, UNIT_SUSPICIONS["N*m"], words, 'unit = "{}" ' + f'instead of "{channel.unit}" for {channel.name}', tried
+        )
 
 
 def payloads(case: Case) -> Iterator[Suspicion]:
@@ -102,7 +104,7 @@ def best(case: Case, kind: str, words: str, change: str, tried: list) -> Iterato
     """The best of the ways (name, change of inputs) in which a file may be meant otherwise, where one explains far more."""
     columns, few = case.columns(case.group), case.few()
     before, found = case.error(columns, case.as_is(), few), []
-    if case.floor(columns) >= FITS * before:
+    if case.floor(columns) >= LEFT_BY_FILE_CHANGE * before:
         return
     for name, meant in tried:
         left = case.better(before, case.error(columns, case.again(meant), few), columns)
@@ -116,7 +118,7 @@ def best(case: Case, kind: str, words: str, change: str, tried: list) -> Iterato
 def others(channel: Channel) -> list[str]:
     """Units that people mistake the channel's for."""
     own = channel.scale
-    return [u for u in OTHERS[channel.si_unit] if unit_scale(u, channel.si_unit) != own]
+    return [u for u in CONFUSABLE_UNITS[channel.si_unit] if unit_scale(u, channel.si_unit) != own]
 
 
 def _centred(case: Case, columns: list[int]) -> np.ndarray:

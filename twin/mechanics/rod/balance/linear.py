@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from twin.foundation.compiled import jit_internal
 
-BLOCK = 4  # pivots eliminated together, so that each remaining row is read once for four of them
+PIVOT_BLOCK = 4  # pivots eliminated together, so that each remaining row is read once for four of them
 
 
 @jit_internal
@@ -17,8 +17,8 @@ def factorise(A):
     for i in range(n):
         for j in range(i):
             A[i, j], A[j, i] = A[j, i], A[i, j]
-    for k in range(0, n, BLOCK):
-        end = min(k + BLOCK, n)
+    for k in range(0, n, PIVOT_BLOCK):
+        end = min(k + PIVOT_BLOCK, n)
         for p in range(k, end):
             if not A[p, p] > 0.0:
                 return False
@@ -28,7 +28,7 @@ def factorise(A):
                 last = end if i >= end else n
                 for j in range(p + 1, last):
                     A[i, j] -= A[i, p] * A[p, j]
-        if end - k == BLOCK:
+        if end - k == PIVOT_BLOCK:
             for i in range(end, n):
                 a, b, c, d = A[i, k], A[i, k + 1], A[i, k + 2], A[i, k + 3]
                 for j in range(end, n):
@@ -40,14 +40,14 @@ def factorise(A):
 def substitute(LU, b):
     """Replace b by A^-1 b, LU the factors of A': four unknowns at a time, then their share in all remaining rows."""
     n = b.size
-    whole = n - n % BLOCK
-    for k in range(0, whole, BLOCK):
+    whole = n - n % PIVOT_BLOCK
+    for k in range(0, whole, PIVOT_BLOCK):
         w = b[k] / LU[k, k]
         x = (b[k + 1] - LU[k, k + 1] * w) / LU[k + 1, k + 1]
         y = (b[k + 2] - LU[k, k + 2] * w - LU[k + 1, k + 2] * x) / LU[k + 2, k + 2]
         z = (b[k + 3] - LU[k, k + 3] * w - LU[k + 1, k + 3] * x - LU[k + 2, k + 3] * y) / LU[k + 3, k + 3]
         b[k], b[k + 1], b[k + 2], b[k + 3] = w, x, y, z
-        for i in range(k + BLOCK, n):
+        for i in range(k + PIVOT_BLOCK, n):
             b[i] -= LU[k, i] * w + LU[k + 1, i] * x + LU[k + 2, i] * y + LU[k + 3, i] * z
     for j in range(whole, n):
         b[j] /= LU[j, j]
@@ -56,7 +56,7 @@ def substitute(LU, b):
     for j in range(n - 1, whole - 1, -1):
         for i in range(j):
             b[i] -= LU[j, i] * b[j]
-    for k in range(whole - BLOCK, -1, -BLOCK):
+    for k in range(whole - PIVOT_BLOCK, -1, -PIVOT_BLOCK):
         z = b[k + 3]
         y = b[k + 2] - LU[k + 3, k + 2] * z
         x = b[k + 1] - LU[k + 3, k + 1] * z - LU[k + 2, k + 1] * y
