@@ -171,10 +171,10 @@ def test_off_is_the_plain_twin(law: type[Effect], two_trials: Recording) -> None
 @laws
 def test_unknown_parameters_and_broken_bounds_are_refused(law: type[Effect]) -> None:
     with pytest.raises(TwinError, match=rf"effect {law.id}.*available"):
-        law({"nonsense": 1.0})
+        law({"nonsense": 1.0}, 3)
     p, problems = law.all_parameters(3)[0], []
     with pytest.raises(TwinError, match=rf"effect {law.id}.*allowed"):
-        law({p.name: np.nan})
+        law({p.name: np.nan}, 3)
     # The bounds of a robot's size are those of files that name a robot.
     beyond = {"id": law.id, "parameters": {p.name: p.high + 1.0 + abs(p.high)}}
     assert read_effects([beyond], 3, Size(), problems) == []
