@@ -3,8 +3,6 @@
 python -m tools.reference
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from pydantic.fields import FieldInfo

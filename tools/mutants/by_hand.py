@@ -1,7 +1,5 @@
 """Changes that a suite of tests once did not see, by what they break."""
 
-from __future__ import annotations
-
 from tools.mutants.mutant import Mutant
 
 CHANGES = (  # (file, what a line holds, what it is to hold)

@@ -1,7 +1,5 @@
 """Properties of tendons between drive and body (friction, stretch, play), and the delayed strain of creep."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -10,8 +10,6 @@ tensions
 Nothing here steps a robot or reads more of it than its sensors.
 """
 
-from __future__ import annotations
-
 from twin.control.heating_guard import HeatingGuard
 from twin.control.pi_controller import PIController
 from twin.control.rbf_network import RBFNetwork

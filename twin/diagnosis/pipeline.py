@@ -4,8 +4,6 @@ look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> 
 then the seal is opened.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 

@@ -9,8 +9,6 @@ twins drawn from the uncertainty of a diagnosis validation.py            options
 frames by MuJoCo's renderer plants/                  robots stepped in time under commands, with their effects
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

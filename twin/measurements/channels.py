@@ -6,8 +6,6 @@
 Indices count from 1, base to tip, and are written without leading zeros.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

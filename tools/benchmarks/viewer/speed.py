@@ -5,8 +5,6 @@
 Figures belong to the machine and what else it does: report ratios and medians.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

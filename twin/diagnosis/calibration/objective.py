@@ -1,7 +1,5 @@
 """What every fit of a diagnosis minimises: the residual of the fitted trials made white by a noise found from the data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

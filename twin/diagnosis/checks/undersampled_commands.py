@@ -1,7 +1,5 @@
 """Commands that go far from one row to the next: when they do in between is not in the log, and what is late shows that."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

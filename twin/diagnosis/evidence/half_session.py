@@ -1,7 +1,5 @@
 """What a model would do on each half of the session, had it been fitted to the other: how it predicts farther than one trial."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 

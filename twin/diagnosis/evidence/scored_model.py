@@ -1,7 +1,5 @@
 """A fitted model, what the evidence says of it, and its refits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
