@@ -165,8 +165,7 @@ def felt_as_learned(shapes: Path, name: str) -> tuple[Any, Any, np.ndarray, Any,
     net, pick = lively(lesson), np.arange(CHAIN_LENGTH, CHAIN_LENGTH + 6)
     strain, displacement = data.strain[pick], 1e-3 * np.random.default_rng(0).normal(size=(len(pick), data.displacement.shape[1]))
     follows = np.arange(len(pick)) > 0
-    arrays = lesson.export_arrays(net) | {"error": np.zeros(2), "levels": np.ones((2, 1)), "widen": np.ones((2, 1))}
-    seen = law(Twin.of(robot), arrays).estimate_displacements(SensorReadings(strain, displacement, False, follows))  # type: ignore[attr-defined]
+    seen = law(Twin.of(robot), lesson.export_arrays(net)).folded(SensorReadings(strain, displacement, False, follows))  # type: ignore[attr-defined]
     past = history_features(strain, previous_strains(strain, follows, ROWS_BACK), displacement, False)
     x = past if name == "folding" else network_features(strain, displacement, False)
     return lesson, net, pick, torch.from_numpy(x.astype(np.float32)), seen

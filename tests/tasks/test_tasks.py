@@ -241,7 +241,9 @@ def test_alike_shapes_look_alike_on_another_built_hand() -> None:
     ]
     for k in range(3):
         rest = eyes[0].estimators[k].points.rest
-        one, other = (eye.points(each)[k] - rest @ t.T for eye, each, t in zip(eyes, z, (e.rotations[k] for e in eyes), strict=True))
+        one, other = (
+            eye.points(each)[k] - rest @ t.T for eye, each, t in zip(eyes, z, (e.rotations[k] for e in eyes), strict=True)
+        )
         c, s = np.cos(0.1), np.sin(0.1)
         expected = one @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         # the modes hold a turned shape but for what 24 of them leave, below 0.1 mm in the mean

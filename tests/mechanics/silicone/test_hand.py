@@ -245,7 +245,7 @@ def test_a_step_among_contacts_is_the_one_mujoco_solves() -> None:
     for limb in moving.bodies:
         U = np.triu(limb.effective_mass.upper, 1) + np.diag(1.0 / np.diag(limb.effective_mass.upper))
         inverse[np.ix_(limb.dof, limb.dof)] = np.linalg.inv(U.T @ U)
-        force = -limb.room.f + limb.force - limb.tension @ limb.room.pulled.pull
+        force = -limb.work.f + limb.force - limb.tension @ limb.work.tendons.pull
         data.qfrc_applied[limb.dof] = force - data.qfrc_spring[limb.dof]
     hard = 1.0 / h + damping + h * spring * impedance
     W = (J @ inverse @ J.T)[::3, ::3].diagonal()
