@@ -8,8 +8,8 @@ import numpy as np
 
 
 def main(steps: int = 40) -> float:
-    # %% `twin` takes a twin.toml, a report's folder or a robot's name.
-    env = gymnasium.make("twin/ContinuumReach-v0", twin="continuum")
+    # %% The part before the colon registers the environments; `twin` takes a twin.toml, a report's folder or a robot's name.
+    env = gymnasium.make("twin.env:twin/ContinuumReach-v0", twin="continuum")
     observation, info = env.reset(seed=1)
     print(f"{len(observation)} numbers observed; the goal is {1e3 * info['distance']:.0f} mm away")
 
