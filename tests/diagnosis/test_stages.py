@@ -26,7 +26,7 @@ from twin.diagnosis.evidence.discrepancy import COMPONENTS, Discrepancy
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.explain.words import components, mixed, since, structure, undecided, unlike, worst_channel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, TRIALS_NAMED, UNLIKELY_PARAMETER_DISTANCE
+from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, NAMED_ONE_BY_ONE, UNLIKELY_PARAMETER_DISTANCE
 from twin.effects import effect_class
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parameters import Parameter
@@ -123,8 +123,8 @@ def test_two_robots_and_what_does_not_hold_elsewhere_are_told_in_words(plan: Pre
         return mixed(plan, MixedRobots(tuple(range(other, len(names))), tuple(range(other)), 1.0))
 
     assert f"{len(names) - 2} the one, 2 the other ({names[0]}, {names[1]}), more than" in said(2)
-    assert f"({', '.join(names[:TRIALS_NAMED])}), more" in said(TRIALS_NAMED)
-    assert f"({', '.join(names[:TRIALS_NAMED])} and 1 more), more" in said(TRIALS_NAMED + 1)
+    assert f"({', '.join(names[:NAMED_ONE_BY_ONE])}), more" in said(NAMED_ONE_BY_ONE)
+    assert f"({', '.join(names[:NAMED_ONE_BY_ONE])} and 1 more), more" in said(NAMED_ONE_BY_ONE + 1)
     assert unlike(0.5, 0.1).startswith(
         " On trials left out of the fit in turn a smooth error of 0.50 sigma is left, on the others 0.10:"
     )

@@ -117,6 +117,7 @@ def diagnosis(verdict: str = "explained", of: Recording | None = None, **changes
         line=(2.0, 0.1),
         worst_channel="disk_8_x",
         description="A smooth part is left.",
+        caveats=(),
         identifiability=(
             Visibility("tendon_friction", 0.1, 0.1, 0.8, "backbone_creep", ("mu", 0.004, "1"), ()),
             Visibility("time_delay", 0.1, 0.3, 0.06, "actuator_lag", ("delay", 0.01, "s"), ("two rates of pull, ten times apart",)),

@@ -41,10 +41,10 @@ class Claim:
 
 @dataclass(frozen=True)
 class Errors:
-    """RMS on the sealed trials, SI, by group of outputs (points: Euclidean per point); confidence intervals over trials.
+    """RMS on the held-out trials, SI, by group of outputs (points: Euclidean per point); confidence intervals over trials.
 
-    `lost`: sealed trials that one of the three has no equilibrium for; they count for none. `spikes`: what was left out of the
-    others, in words.
+    `without_physics` is that of a polynomial of the inputs (`predict_by_polynomial`). `lost`: held-out trials that one of the three
+    has no equilibrium for; they count for none. `spikes`: what was left out of the others, in words.
     """
 
     nominal: dict[str, float]
@@ -53,8 +53,16 @@ class Errors:
     floor: dict[str, float]
     ci_calibrated: dict[str, tuple[float, float]]
     ci_after: dict[str, tuple[float, float]]
+    without_physics: dict[str, float] = field(default_factory=dict)
     lost: tuple[int, ...] = ()
     spikes: tuple[str, ...] = ()
+
+    @property
+    def improved(self) -> bool:
+        """Whether the effects lessen the error, all groups together, each over its noise floor; True where nothing tells."""
+        groups = [g for g, floor in self.floor.items() if floor > 0.0]
+        before, after = (sum((e[g] / self.floor[g]) ** 2 for g in groups) for e in (self.calibrated, self.after))
+        return not after >= before
 
 
 @dataclass(frozen=True)
@@ -92,6 +100,7 @@ class Diagnosis:
     line: tuple[float, float]  # z-score, Hz
     worst_channel: str
     description: str
+    caveats: tuple[str, ...]  # what stands against the verdict
     identifiability: tuple[Visibility, ...]
     ambiguous: tuple[tuple[str, ...], ...]
     experiment: Experiment | None

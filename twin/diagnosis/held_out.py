@@ -12,6 +12,7 @@ from twin.diagnosis.checks.spikes import without_spikes
 from twin.diagnosis.checks.zero_jumps import rezeroed
 from twin.diagnosis.conclusion import Conclusion
 from twin.diagnosis.diagnosis import Errors
+from twin.diagnosis.evidence.polynomial import predict_by_polynomial
 from twin.diagnosis.split import blind
 from twin.foundation.errors import SolveError
 from twin.prediction.evaluate import headline_group, rms, squared_errors
@@ -78,8 +79,17 @@ class HeldOut:
         ci = {s: {g: interval(squared_errors(self.prepared, raw[s], g), seed) for g in groups} for s in ("calibrated", "after")}
         return Errors(
             error["nominal"], error["calibrated"], error["after"], self._floor(kept, groups), ci["calibrated"], ci["after"],
-            tuple(lost), self.spikes,
+            self._without_physics(kept, groups), tuple(lost), self.spikes,
         )  # fmt: skip
+
+    def _without_physics(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
+        """RMS error by group of a polynomial of the inputs, fitted to the trials that each conclusion was fitted to."""
+        raw: dict[int, np.ndarray] = {}
+        for conclusion, trials in self.parts:
+            wanted = [k for k in trials if k in kept]
+            found = predict_by_polynomial(conclusion.context.prepared, conclusion.context.trials, wanted)
+            raw |= {k: self.prepared.measured[k] - y for k, y in zip(wanted, found, strict=True)}
+        return {g: rms(self.prepared, [raw[k] for k in kept], g) if kept else float("nan") for g in groups}
 
     def _floor(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
         """RMS error a perfect twin would still show, by group; NaN where no trial can be predicted. By the noise as it is once the

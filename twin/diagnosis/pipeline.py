@@ -18,7 +18,7 @@ from twin.diagnosis.checks.spikes import without_spikes
 from twin.diagnosis.checks.zero_jumps import jumps_of, without_zero_jumps
 from twin.diagnosis.checks.zero_jumps import words as jumped
 from twin.diagnosis.conclusion import Conclusion
-from twin.diagnosis.diagnosis import Claim, Diagnosis, Fold, Settings
+from twin.diagnosis.diagnosis import Claim, Diagnosis, Errors, Fold, Settings
 from twin.diagnosis.explain.describe import describe
 from twin.diagnosis.explain.next_experiment import Experiment, next_experiment
 from twin.diagnosis.fit_context import Progress, silent
@@ -30,9 +30,10 @@ from twin.diagnosis.search.search import search
 from twin.diagnosis.split import blind, split
 from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, ROWS_FOR_ZERO
 from twin.diagnosis.verdict.gate import gate
-from twin.diagnosis.verdict.judge import judge
+from twin.diagnosis.verdict.judge import judge, withdraw
 from twin.diagnosis.verdict.resolve_ties import resolve_ties
 from twin.diagnosis.verdict.systematic import with_systematic
+from twin.foundation.display_names import display_name
 from twin.foundation.errors import DataError
 from twin.foundation.threads import single_thread
 from twin.measurements import Recording
@@ -112,13 +113,34 @@ def _reported(
     parts: Sequence[tuple[Conclusion, Sequence[int]]],
     settings: Settings,
 ) -> Diagnosis:
-    """All that is said of `found`, the seal unopened; then the errors, by the conclusions that had not seen each trial."""
-    prepared, nominal = preview.prepared, preview.nominal
+    """What is said of `found`, with the errors on held-out trials by the conclusions that had not seen each.
+
+    Claims that do not lessen that error are withdrawn.
+    """
+    opened = HeldOut.of(preview.prepared, preview.nominal, parts)
+    errors = opened.errors(settings.seed)
+    if not found.judged.claims or errors.improved:
+        return _diagnosis(recording, preview, found, parts, settings, (opened, errors))
+    words = _withdrawal_words(found, errors)
+    found, parts = _withdrawn(found), [(_withdrawn(c), trials) for c, trials in parts]
+    opened = HeldOut.of(preview.prepared, preview.nominal, parts)
+    calibrated = _diagnosis(recording, preview, found, parts, settings, (opened, opened.errors(settings.seed)))
+    return replace(calibrated, caveats=(words, *calibrated.caveats))
+
+
+def _diagnosis(
+    recording: Recording,
+    preview: DataPreview,
+    found: Conclusion,
+    parts: Sequence[tuple[Conclusion, Sequence[int]]],
+    settings: Settings,
+    measured_by: tuple[HeldOut, Errors],
+) -> Diagnosis:
+    """Put together what a conclusion says and the errors on held-out trials."""
+    (opened, errors), prepared, nominal = measured_by, preview.prepared, preview.nominal
     context, judged, limits = found.context, found.judged, found.screening.limits
     final, base = judged.final, found.found.base
     said = describe(context, found.found, found.gated, judged, limits)
-    experiment = _experiment(found, settings)
-    opened = HeldOut.of(prepared, nominal, parts)
     measured = [y if k in context.trials else opened.prepared.measured[k] for k, y in enumerate(context.prepared.measured)]
     folds = tuple(Fold(trials[0], c.judged.verdict, tuple(x.effect for x in c.judged.claims)) for c, trials in parts)
     return Diagnosis(
@@ -138,7 +160,7 @@ def _reported(
         },
         unfixed=tuple(final.fit.unfixed()),
         correlation=final.fit.correlation(),
-        errors=opened.errors(settings.seed),
+        errors=errors,
         noise=context.objective.whitener.noise,
         structure_before=base.discrepancy.size,
         structure_after=final.discrepancy.size,
@@ -149,9 +171,10 @@ def _reported(
         line=judged.signs.line,
         worst_channel=said.worst_channel,
         description=said.words,
+        caveats=judged.signs.caveats,
         identifiability=found.screening.table,
         ambiguous=judged.ambiguous,
-        experiment=experiment,
+        experiment=_experiment(found, settings),
         recording=recording,
         prepared=replace(prepared, measured=tuple(measured)),
         fitted_trials=tuple(context.trials),
@@ -164,6 +187,23 @@ def _reported(
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.found.all),
         untried=tuple(context.budget.untried),
+    )
+
+
+def _withdrawn(found: Conclusion) -> Conclusion:
+    """The conclusion without its claims."""
+    return replace(found, judged=withdraw(found.context, found.found, found.judged)) if found.judged.claims else found
+
+
+def _withdrawal_words(found: Conclusion, errors: Errors) -> str:
+    """Why claims are withdrawn."""
+    group = headline_group(errors.after)
+    unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
+    names = " and ".join(display_name(c.effect) for c in found.judged.claims)
+    with_it, without = (f"{factor * e[group]:.3g} {unit}" for e in (errors.after, errors.calibrated))
+    return (
+        f"{names} explained the fitted trials and is not claimed: on held-out trials the twin with it ({with_it}) is no better "
+        f"than the calibrated one ({without})"
     )
 
 

@@ -146,6 +146,7 @@ def _of_group(d: Diagnosis, group: str) -> dict[str, Any]:
             "calibrated": [finite_or_none(x, factor) for x in e.ci_calibrated[group]],
             "after": [finite_or_none(x, factor) for x in e.ci_after[group]],
         },
+        "without_physics": finite_or_none(e.without_physics.get(group), factor),
         "noise_floor": finite_or_none(e.floor[group], factor),
     }
 

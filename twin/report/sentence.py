@@ -84,7 +84,27 @@ def describe_undetectable(diagnosis: Diagnosis) -> str | None:
 
 def sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict, its reasons and the error on held-out trials."""
-    return f"{describe_verdict(diagnosis)}{describe_untried(diagnosis)} {describe_errors(diagnosis)}"
+    d = diagnosis
+    return f"{describe_rival(d)}{describe_verdict(d)}{describe_caveats(d)}{describe_untried(d)} {describe_errors(d)}"
+
+
+def describe_rival(diagnosis: Diagnosis) -> str:
+    """Say first that a polynomial of the commands predicts the held-out trials as well; empty where the twin is better."""
+    d, group = diagnosis, headline_group(diagnosis)
+    rival, own = d.errors.without_physics.get(group, math.nan), d.errors.after[group]
+    if not rival <= own:
+        return ""
+    unit, factor = DISPLAY_UNITS[group]
+    decimals = max(2, decimals_for_digits([factor * rival], 2))
+    shown, twins = (f"{format_number(factor * x, decimals)} {unit}" for x in (rival, own))
+    return (
+        f"A polynomial of the commands, without physics, predicts the held-out trials no worse ({shown}) than this twin ({twins}). "
+    )
+
+
+def describe_caveats(diagnosis: Diagnosis) -> str:
+    """List what stands against the verdict."""
+    return "".join(f" But {words}." for words in diagnosis.caveats)
 
 
 def describe_untried(diagnosis: Diagnosis) -> str:

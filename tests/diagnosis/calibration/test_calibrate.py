@@ -88,8 +88,9 @@ def test_all_errors_together_are_as_large_as_claimed(case: tuple[int, Recording,
 def test_what_is_left_is_noise(case: tuple[int, Recording, Fit]) -> None:
     _, _, found = case
     z = found.z[found.z != 0]
-    # 15,000 whitened numbers: chance is 1.1 %; the chain's own error of 0.01 mm adds 0.2 %, and the noise estimate 2 %.
-    assert np.mean(z**2) == pytest.approx(1.0, abs=0.05)
+    # 15,000 whitened numbers: chance is 1.1 %; the chain's own error of 0.01 mm adds 0.2 %. The noise is estimated from the half
+    # day's few repeats, its variance to some 3 %: three standard errors of all that are 10 %.
+    assert np.mean(z**2) == pytest.approx(1.0, abs=0.1)
 
 
 def test_every_value_stays_within_its_bounds_and_gets_a_smaller_error(case: tuple[int, Recording, Fit]) -> None:

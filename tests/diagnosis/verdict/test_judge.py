@@ -106,6 +106,7 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         return SimpleNamespace(worse=lambda other: fit.effects in said["worse"], structure=0.07)
 
     monkeypatch.setattr(stage, "verdict_inputs", lambda *_: said["signs"])
+    monkeypatch.setattr(stage, "find_caveats", lambda *_: ())
     monkeypatch.setattr(stage, "mixed_robots", lambda *_: said["rigs"])
     monkeypatch.setattr(stage, "left_out", left_out)
     monkeypatch.setattr(stage, "fast_error", lambda study, found: said["quick"] if found.effects == BASE else 9.0)
@@ -254,6 +255,7 @@ def test_what_no_known_effect_does_is_strange(sign: str, size: float, strange: b
     monkeypatch.setattr(stage, "change", lambda *_: "here" if sign == "change" else None)
     monkeypatch.setattr(stage, "strained", lambda fit: ["mu at its bound"] if sign == "strained" else [])
     monkeypatch.setattr(stage, "halved", lambda *_: True)
+    monkeypatch.setattr(stage, "find_caveats", lambda *_: ())
     monkeypatch.setattr(stage, "fast_error", lambda study, found: 0.7 if found.effects == FRICTION else 9.0)
     monkeypatch.setattr(stage, "Spectrum", SimpleNamespace(of=lambda *_: SimpleNamespace(peak=lambda z: (3.0, 0.2))))
     bench = SimpleNamespace(measured=[np.zeros((4, 1))])

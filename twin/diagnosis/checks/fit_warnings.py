@@ -1,22 +1,43 @@
 """What a fit says against itself, in words."""
 
 from twin.diagnosis.calibration.fit import Fit
-from twin.diagnosis.thresholds import UNLIKELY_PARAMETER_DISTANCE
+from twin.diagnosis.thresholds import NAMED_ONE_BY_ONE, UNLIKELY_PARAMETER_DISTANCE
 
 
 def unlikely(found: Fit) -> list[str]:
-    """The robot's own parameters that were driven far from their description, in words."""
+    """The robot's own parameters that were driven far from their description, or to an end of their range, in words."""
     said = []
-    for free in found.model.free:
+    for free, ended in zip(found.model.free, found.at_bound(), strict=True):
         p = free.parameter
         value = found.model.twin.values.get(p.name, p.value)
-        if free.effect is None and p.std and abs(value - p.value) > UNLIKELY_PARAMETER_DISTANCE * p.std:
+        if free.effect is not None or not p.std:
+            continue
+        if ended:
+            said.append(
+                f"{p.name} came out at an end of its range ({value:.4g} {p.unit}, allowed {p.low:.4g} to {p.high:.4g}): the true "
+                "one may lie beyond it, and effects imitate the difference; widen the range in robot.toml if it may"
+            )
+        elif abs(value - p.value) > UNLIKELY_PARAMETER_DISTANCE * p.std:
             how = abs(value - p.value) / p.std
             said.append(
                 f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "
                 f"{p.value:.4g}): check it, or something else hides in it"
             )
     return said
+
+
+def far_from_description(found: Fit) -> str:
+    """All of them in one sentence, for the verdict; empty where there are none."""
+    names = [words.partition(" ")[0] for words in unlikely(found)]
+    if not names:
+        return ""
+    shown = ", ".join(names[:NAMED_ONE_BY_ONE]) + (
+        f" and {len(names) - NAMED_ONE_BY_ONE} more" if len(names) > NAMED_ONE_BY_ONE else ""
+    )
+    return (
+        f"of the robot's own numbers {shown} came out at an end of the range or {UNLIKELY_PARAMETER_DISTANCE:.0f} standard "
+        "deviations off the description (see the notices): it may be wrong there, and effects imitate what it lacks"
+    )
 
 
 def strained(found: Fit) -> list[str]:

@@ -6,6 +6,7 @@ pulled, and keeps more when released. Of pairs whose pull came first the mean of
 lag - drift: where both kinds are there, time and direction come apart; else creep, drift and friction look alike.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,13 +65,21 @@ class Loops:
         return sum(loop.pairs for loop in self.by_trial)
 
 
-def loops(prepared: PreparedRecording) -> Loops:
-    """Of the output that stands for the twin: of points the one that moves most."""
+def loops(prepared: PreparedRecording, predicted: Sequence[np.ndarray] | None = None) -> Loops:
+    """Of the output that stands for the twin: of points the one that moves most.
+
+    With `predicted` outputs (n_k, n_output) those of a twin, in the channel and along the direction of the measured ones, where
+    these are known.
+    """
     group = headline_group([o.group for o in prepared.outputs if o.group != "skin"] or ["skin"])  # clouds are too few to come back
     name, columns = _largest(prepared, group)
     top = np.max([np.abs(i.command).max(axis=0) for i in prepared.inputs], axis=0)
     top = np.where(top > 0.0, top, 1.0)
-    found = [_loop(k, i, i.command / top, prepared.measured[k][:, columns]) for k, i in enumerate(prepared.inputs)]
+    found = []
+    for k, i in enumerate(prepared.inputs):
+        y = prepared.measured[k][:, columns]
+        shown = y if predicted is None else np.where(np.isfinite(y), predicted[k][:, columns], np.nan)
+        found.append(_loop(k, i, i.command / top, shown, y))
     return Loops(group, name, tuple(loop for loop in found if loop is not None))
 
 
@@ -90,13 +99,14 @@ def _any(y: np.ndarray) -> bool:
     return bool(np.isfinite(y).all(axis=1).any())
 
 
-def _loop(trial: int, inputs: Inputs, u: np.ndarray, y: np.ndarray) -> Loop | None:
-    """Of commands u (n, n_tendon), in units of the largest, and one point's or channel's readings y (n, 1 to 3)."""
+def _loop(trial: int, inputs: Inputs, u: np.ndarray, y: np.ndarray, measured: np.ndarray) -> Loop | None:
+    """Of commands u (n, n_tendon), in units of the largest, and one point's or channel's positions y (n, 1 to 3); `measured` ones
+    give the direction."""
     if len(u) < 4 or not _any(y):
         return None
     first, then, share, pulling = crossings(inputs, u)
     later = y[then] + share[:, None] * (y[then + 1] - y[then])
-    d = ((later - y[first]) * np.where(pulling, 1.0, -1.0)[:, None]) @ _along(u, y)
+    d = ((later - y[first]) * np.where(pulling, 1.0, -1.0)[:, None]) @ _along(u, measured)
     known = np.isfinite(d)
     kinds = [d[known & pulling], d[known & ~pulling]]
     enough = [k for k in kinds if len(k) >= FEWEST_LOOP_CROSSINGS]

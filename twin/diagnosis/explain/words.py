@@ -12,7 +12,7 @@ from twin.diagnosis.checks.mixed_robots import MixedRobots
 from twin.diagnosis.evidence.discrepancy import COMPONENTS, IN_WORDS, Discrepancy
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.explain.error_location import place
-from twin.diagnosis.thresholds import HINT_SHARE, SHUFFLED_ORDERS, STEP_LEFTOVER_SHARE, TRIALS_NAMED
+from twin.diagnosis.thresholds import HINT_SHARE, NAMED_ONE_BY_ONE, SHUFFLED_ORDERS, STEP_LEFTOVER_SHARE
 from twin.foundation.display_names import display_name
 from twin.prediction.prepared import PreparedRecording
 
@@ -71,8 +71,8 @@ def since(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) -> 
 def mixed(prepared: PreparedRecording, rigs: MixedRobots) -> str:
     """Two rigs' data in one set, in words."""
     label = {t.name: t.label for t in prepared.recording.trials}
-    few = ", ".join(label[prepared.inputs[k].name] for k in rigs.other[:TRIALS_NAMED])
-    more = f" and {len(rigs.other) - TRIALS_NAMED} more" if len(rigs.other) > TRIALS_NAMED else ""
+    few = ", ".join(label[prepared.inputs[k].name] for k in rigs.other[:NAMED_ONE_BY_ONE])
+    more = f" and {len(rigs.other) - NAMED_ONE_BY_ONE} more" if len(rigs.other) > NAMED_ONE_BY_ONE else ""
     return (
         f" The trials want two different robots, {len(rigs.one)} the one, {len(rigs.other)} the other ({few}{more}), more than "
         "any known effect: are two rigs in this set, or was it rebuilt? Diagnose the two groups apart."

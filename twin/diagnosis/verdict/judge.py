@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnosis.checks.fit_warnings import strained
+from twin.diagnosis.checks.fit_warnings import far_from_description, strained
+from twin.diagnosis.checks.loops import loops
 from twin.diagnosis.checks.mixed_robots import MixedRobots, mixed_robots
 from twin.diagnosis.diagnosis import Claim
 from twin.diagnosis.evidence.discrepancy import Spectrum
@@ -25,10 +26,12 @@ from twin.diagnosis.thresholds import (
     LARGE_STRUCTURE_WITHOUT_EFFECT,
     LEAST_EVIDENCE,
     LEFTOVER_SHARE,
+    LOOP_SIGNIFICANCE,
     RUNNERS_UP_SHOWN,
     SCORE_TEMPERATURE,
 )
 from twin.diagnosis.verdict.gate import Gated
+from twin.prediction.evaluate import OUTPUT_GROUPS
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,8 @@ class VerdictInputs:
     left out, the last two but for what the description gets wrong of a pose (`Discrepancy.rest`); the strongest line left (z-score,
     Hz); what is left beside it all that is no noise either (`quick`, sigma).
 
-    `halved`: the effects take half of the error. `strange`: what is left sits at one place of the body, the calibrated error began
+    `caveats`: what keeps a day from being explained though little is left, in words (`find_caveats`). `halved`: the effects take
+    half of the error. `strange`: what is left sits at one place of the body, the calibrated error began
     at once, as that of no known effect does, or a law is at its limit (`strained`, in words).
     """
 
@@ -49,6 +53,14 @@ class VerdictInputs:
     halved: bool
     strange: bool
     strained: tuple[str, ...]
+    caveats: tuple[str, ...] = ()
+
+    def without_effects(self, context: FitContext, base: ScoredModel) -> "VerdictInputs":
+        """The same where no effect is in force."""
+        after, unseen = base.discrepancy.beyond(context.accuracy), left_out(context, base.fit).structure
+        return replace(
+            self, after=after, unseen=unseen, quick=fast_error(context, base), strained=(), caveats=find_caveats(context, base)
+        )
 
 
 @dataclass(frozen=True)
@@ -84,14 +96,7 @@ def judge(context: FitContext, found: Search, gated: Gated, limits: AcceptanceLi
         apart = None
     said = "unexplained" if apart else verdict(bool(added), signs, limits)
     if said in ("noise", "unexplained") and best is not base:
-        signs = replace(
-            signs,
-            after=base.discrepancy.beyond(context.accuracy),
-            unseen=left_out(context, base.fit).structure,
-            quick=fast_error(context, base),
-            strained=(),
-        )
-        best, added = base, ()
+        signs, best, added = signs.without_effects(context, base), base, ()
     claims = _claims(context, found, gated, best, added, signs, limits)
     small = {s.effect for s in gated.small}
     either = {e: probability(found, pair, small) for pair in ((d.effect, d.rival) for d in gated.settled) for e in pair}
@@ -115,7 +120,31 @@ def verdict_inputs(
     at_once = base.discrepancy.size > limits.left and change(prepared, trials, base.fit.z.reshape(rest.shape)) is not None
     line = Spectrum.of(prepared, trials).peak(best.fit.z.reshape(rest.shape) - best.discrepancy.mean)
     strange, half = bent or at_once or bool(at_limit), halved(context, base, best)
-    return VerdictInputs(base.discrepancy.size, after, beyond.structure, line, fast_error(context, best), half, strange, at_limit)
+    against = find_caveats(context, best)
+    return VerdictInputs(
+        base.discrepancy.size, after, beyond.structure, line, fast_error(context, best), half, strange, at_limit, against
+    )
+
+
+def find_caveats(context: FitContext, model: ScoredModel) -> tuple[str, ...]:
+    """What the fitted trials say against a model that leaves little.
+
+    Numbers of the robot that no built one is likely to have, and a loop of pull and release that the twin has not.
+    """
+    prepared, sigma = context.prepared, context.objective.whitener.noise.sigma
+    said = [words] if (words := far_from_description(model.fit)) else []
+    predicted = [np.full_like(y, np.nan) for y in prepared.measured]
+    for k, r in zip(context.trials, model.fit.evaluation.raw, strict=True):
+        predicted[k] = prepared.measured[k] - r
+    measured, own = loops(prepared), loops(prepared, predicted)
+    if measured.by_trial and own.by_trial:
+        off = abs(measured.lag - own.lag)
+        group = OUTPUT_GROUPS[measured.group]
+        noise = float(np.median([s for s, o in zip(sigma, prepared.outputs, strict=True) if o.group == measured.group]))
+        if off > max(LOOP_SIGNIFICANCE * measured.noise, LEFTOVER_SHARE * abs(measured.lag), noise):
+            loop, twins = (f"{round(group.factor * x, 2) + 0.0:.2f} {group.unit}" for x in (measured.lag, own.lag))
+            said.append(f"pull and release differ by {loop} at {measured.name} as measured and by {twins} in this twin")
+    return tuple(said)
 
 
 def out_of_sample(context: FitContext, best: ScoredModel, limits: AcceptanceLimits) -> LeftOut:
@@ -124,6 +153,16 @@ def out_of_sample(context: FitContext, best: ScoredModel, limits: AcceptanceLimi
     first = left_out(context, best.fit)
     much = max(LARGE_STRUCTURE, limits.left)
     return proven(context, best.fit, first) if best.discrepancy.size <= much < first.structure else first
+
+
+def withdraw(context: FitContext, found: Search, judged: Judgement) -> Judgement:
+    """Take the claims back: they are candidates, and the calibrated robot is left in force."""
+    signs = judged.signs.without_effects(context, found.base)
+    runners = (
+        *(replace(c, beside=tuple(o.effect for o in judged.claims if o is not c)) for c in judged.claims),
+        *judged.runners_up,
+    )
+    return replace(judged, verdict="unexplained", final=found.base, claims=(), runners_up=runners, signs=signs, doubtful=())
 
 
 def verdict(added: bool, signs: VerdictInputs, limits: AcceptanceLimits) -> str:
@@ -137,7 +176,7 @@ def verdict(added: bool, signs: VerdictInputs, limits: AcceptanceLimits) -> str:
             else "noise"
         )
     if not much and not (s.after > limits.slight and s.after > LEFTOVER_SHARE * s.before):
-        return "partly_explained" if s.strange else "explained"
+        return "partly_explained" if s.strange or s.caveats else "explained"
     return "partly_explained" if s.halved else "unexplained"
 
 

@@ -40,6 +40,9 @@ def error_rows(d: Diagnosis, group: str) -> list[dict[str, str]]:
         value, interval = _error_and_interval(d, stage, group)
         ends = "" if interval is None else " to ".join(format_number(x, decimals) for x in interval)
         out.append({"stage": STAGE_LABELS[stage], "error": format_number(value, decimals), "interval": ends})
+    if (value := d.errors.without_physics.get(group)) is not None:
+        plain = format_number(DISPLAY_UNITS[group][1] * value, decimals)
+        out.append({"stage": "polynomial, no physics", "error": plain, "interval": ""})
     return [*out, {"stage": "noise floor", "error": format_number(floor, decimals), "interval": ""}]
 
 
