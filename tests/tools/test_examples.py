@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -72,3 +74,15 @@ def test_the_tip_is_led_around_a_circle() -> None:
 def test_heated_springs_make_a_page(tmp_path: Path) -> None:
     heated_springs.main(tmp_path / "heat.html", seconds=60.0)
     assert "Tension against temperature (simulation" in (tmp_path / "heat.html").read_text(encoding="utf-8")
+
+
+def test_the_readme_s_example_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And imports nothing but the program."""
+    text = (Path(examples.__path__[0]).parents[1] / "README.md").read_text("utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert re.findall(r"^(?:import|from) (\S+)", code, re.MULTILINE) == ["twin"]
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["rougher"].effects[-1]["mu"] == 0.3
+    assert names["predicted"].source.startswith("simulation")

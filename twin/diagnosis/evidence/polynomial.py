@@ -37,8 +37,8 @@ def predict_by_polynomial(prepared: PreparedRecording, known: Sequence[int], wan
         best = np.argmin([_left_out_errors(products[form], ridge) for form, ridge in choices], axis=0)
         for c in np.unique(best):
             form, ridge = choices[c]
-            gram, moment = sum(p.gram for p in products[form]), sum(p.moment for p in products[form])
-            weights = _ridge(gram, moment[:, best == c], ridge)
+            whole = _together(products[form])
+            weights = _ridge(whole.gram, whole.moment[:, best == c], ridge)
             for y, k in zip(out, wanted, strict=True):
                 y[:, columns[best == c]] = forms[form][k] @ weights
     return out
@@ -58,11 +58,15 @@ def _products(X: np.ndarray, Y: np.ndarray) -> _Products:
     return _Products(X.T @ X, X.T @ Y, (Y**2).sum(axis=0))
 
 
+def _together(products: Sequence[_Products]) -> _Products:
+    return _Products(*(np.sum(parts, axis=0) for parts in zip(*products, strict=True)))
+
+
 def _left_out_errors(products: Sequence[_Products], ridge: float) -> np.ndarray:
     """Return the squared error (m,) of trials left out in turn."""
-    gram, moment, found = sum(p.gram for p in products), sum(p.moment for p in products), np.zeros(products[0].moment.shape[1])
+    whole, found = _together(products), np.zeros(products[0].moment.shape[1])
     for p in products:
-        w = _ridge(gram - p.gram, moment - p.moment, ridge)
+        w = _ridge(whole.gram - p.gram, whole.moment - p.moment, ridge)
         found += p.square - 2.0 * (w * p.moment).sum(axis=0) + np.einsum("pm,pq,qm->m", w, p.gram, w, optimize=True)
     return found
 
