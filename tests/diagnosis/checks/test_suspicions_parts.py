@@ -14,6 +14,7 @@ from tools.simulators.two_link import write_day
 from twin.diagnosis import Settings
 from twin.diagnosis.checks.preview import preview_data
 from twin.diagnosis.checks.suspicions.case import Case
+from twin.diagnosis.checks.suspicions.channels import lost_markers
 from twin.diagnosis.checks.suspicions.clouds import _nearest
 from twin.diagnosis.checks.suspicions.frames import _axes
 from twin.diagnosis.checks.suspicions.trials import times
@@ -103,3 +104,23 @@ def test_tendons_counted_from_another_one_are_a_mistake_in_their_order(by: int) 
     (said,) = (s for s in found if s.kind == "tendon order")
     for i in range(3):
         assert f"{names[(i + by) % 3]} as {names[i]}" in said.change
+
+
+@pytest.mark.parametrize(("rows", "told"), [((), False), ((3, 4, 5, 6), True), (range(200), False)])
+def test_a_marker_at_exactly_zero_in_some_rows_is_lost(rows: Any, told: bool) -> None:
+    """One at the base is there in all rows; a tracker that lost one writes zeros in some."""
+    recording = read(FRIDAY)
+    first, *others = recording.trials
+    values = dict(first.values)
+    for axis in "xyz":
+        column = np.array(values[f"disk_3_{axis}"])
+        column[[k for k in rows if k < len(column)]] = 0.0
+        values[f"disk_3_{axis}"] = column
+    kept = recording.with_values([values, *(t.values for t in others)], recording.source) if len(rows) < 100 else recording
+    prepared = prepare(kept, load("continuum"))
+    if len(rows) >= 100:  # all of them, in every trial
+        columns = [j for j, o in enumerate(prepared.outputs) if o.channel.name.startswith("disk_3_")]
+        still = tuple(np.where(np.isin(np.arange(y.shape[1]), columns), 0.0, y) for y in prepared.measured)
+        prepared = replace(prepared, measured=still)
+    found = list(lost_markers(Case(prepared, Twin.of("continuum"), None)))
+    assert [s.words.partition(":")[0] for s in found] == (["disk_3 in 4 rows"] if told else [])

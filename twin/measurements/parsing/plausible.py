@@ -11,6 +11,7 @@ from twin.measurements.recording import Trial
 
 _MIN_SAMPLES = 3
 MIN_TIME_STEP, MAX_TRIAL_TIME = 1e-6, 1e7  # s: a microsecond, faster than any robot here is logged; four months
+EPOCH_SECONDS = 1e8  # s since 1970: every clock of today reads more; larger by a power of 1000 in milli-, micro- or nanoseconds
 # How far below zero an input tension may read: sigmas of its noise, an offset of a load cell (N), or a share of the trial's largest
 # reading; the widest of these counts. An offset is data that the diagnosis can name (load_cell_bias); a pushing tendon is an error.
 MAX_SLACK_SIGMAS, _ZERO_OFFSET, _ZERO_OFFSET_SHARE = 5.0, 0.3, 0.05  # -, N, -
@@ -28,14 +29,20 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
     if len(back := np.flatnonzero(np.diff(time) <= 0)):
         at = int(back[0]) + 1
         order = f"{float(time[at])!r} after {float(time[at - 1])!r}"
-        raise DataError(f"{table.cell(at, 'time')}: {order}; time must strictly increase, sort or split the trial")
+        way_out = (
+            "sort or split the trial" if time[at] < time[at - 1] else "make one row of those with equal stamps, such as their mean"
+        )
+        raise DataError(f"{table.cell(at, 'time')}: {order}; time must strictly increase, {way_out}")
     steps = np.diff(time)
     if len(short := np.flatnonzero(steps < MIN_TIME_STEP)):
         step = f"a step of {float(steps[short[0]]):.3g} s; time is in seconds, and at least {MIN_TIME_STEP:g} s apart"
         raise DataError(f"{table.cell(int(short[0]) + 1, 'time')}: {step}")
     if len(time) and not abs(time[0]) + (time[-1] - time[0]) <= MAX_TRIAL_TIME:
+        last = float(time[-1])
+        divided = next((f"divide by {10.0**n:g} and " for n in (9, 6, 3) if last / 10.0**n > EPOCH_SECONDS), "")
         raise DataError(
-            f"{table.cell(len(time) - 1, 'time')}: {float(time[-1])!r} s; time is in seconds, and at most {MAX_TRIAL_TIME:g} s"
+            f"{table.cell(len(time) - 1, 'time')}: {last!r} s; time is in seconds since a start of your choice, and at most "
+            f"{MAX_TRIAL_TIME:g} s: {divided}subtract the first trial's first stamp, with `start` in [[trial]] for when each began"
         )
     for channel in channels:
         column = channel.scale.to_si(table.columns[channel.name])

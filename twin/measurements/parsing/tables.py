@@ -17,6 +17,7 @@ import pyarrow.parquet
 from twin.foundation.errors import DataError, short_repr
 from twin.foundation.files import MAX_LINE_BYTES, MAX_TABLE_NUMBERS, MAX_TRIAL_BYTES, check_file_size, read_utf8
 
+_DATE_PATTERN = re.compile(r"\d{4}-\d{2}-\d{2}|\d{1,2}:\d{2}")
 _NUMBER_PATTERN = re.compile(r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?)", re.IGNORECASE)
 _MISSING = ("", "nan", "+nan", "-nan")  # compared in lower case
 
@@ -108,6 +109,10 @@ def _cell_number(path: Path, row: int, name: str, cell: str) -> float:
     if text.lower() in _MISSING:
         return np.nan
     if not _NUMBER_PATTERN.fullmatch(text):
+        if name == "time" and _DATE_PATTERN.match(text):
+            raise DataError(
+                f"{path}, row {row}, column time: {short_repr(cell)} is a date; write the seconds since a start of your choice"
+            )
         raise DataError(
             f"{path}, row {row}, column {name}: {short_repr(cell)} is not a number; write one, or nothing if it is missing"
         )

@@ -7,7 +7,7 @@ signs.py      displacements, readings and gravity the other way round
 frames.py     markers mirrored, turned, shifted
 order.py      tendons and markers exchanged
 trials.py     duplicates, another robot, clocks, milliseconds
-channels.py   dead channels, declared noise, room temperature
+channels.py   dead channels, lost markers, declared noise, room temperature
 clouds.py     point clouds in another unit, or away from their markers
 description.py  robot.toml off by a thousand
 """
@@ -25,8 +25,8 @@ from twin.prediction.twin import Twin
 
 Kind = Callable[[Case], Iterable[Suspicion]]
 SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
-    trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs, channels.noise,
-    signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
+    trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs,
+    channels.lost_markers, channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, order.tendons, channels.inputs,
