@@ -199,7 +199,7 @@ BROKEN: dict[str, tuple[Break, list[str]]] = {
     "time infinite": (csv("0.3,300", "inf,300"), ["a.csv", "row 5", "column time", "infinite"]),
     "time repeats": (csv("0.2,200", "0.1,200"), ["a.csv", "row 4", "column time", "0.1 after 0.1", "one row of those with equal"]),
     "time since 1970": (csv("0.3,", "1726041640.5,"), ["a.csv", "row 5", "subtract the first trial's first stamp"]),
-    "nanoseconds": (csv("0.3,", "1726041640500000000,"), ["a.csv", "row 5", "divide by 1e+09 and subtract"]),
+    "nanoseconds since 1970": (csv("0.3,", "1726041640500000000,"), ["a.csv", "row 5", "divide by 1e+09 and subtract"]),
     "a date": (csv("0.2,200", "2024-09-11T08:00:00+00:00,200"), ["a.csv", "row 4", "is a date", "write the seconds"]),
     "a nan of its own": (csv("0.1,100,1.2", "0.1,100,nan(1)"), ["a.csv", "row 3", "column tip_x", "'nan(1)'"]),
     "nanoseconds": (csv("0.1,100", "1e-9,100"), ["a.csv", "row 3", "column time", "1e-09 s", "seconds"]),
