@@ -346,7 +346,7 @@ def test_of_few_trials_each_is_sealed_in_turn_and_all_are_diagnosed() -> None:
     d = diagnose(recording, Twin.of(ROBOT), Settings(jobs=2), said.append)
     assert d.held_out_trials == d.fitted_trials == (0, 1, 2)
     assert [f.trial for f in d.folds] == [0, 1, 2]
-    assert any("3 trials, each sealed in turn and the others diagnosed, 2 of 3" in words for words in said)
+    assert any("3 trials, each held out in turn, 2 of 3" in words for words in said)
     assert d.claims[0].effect == "tendon_friction"
     assert d.claims[0].parameters["mu"].value == pytest.approx(0.25, abs=0.05 * 0.25)
     # What was measured in one trial moves the error there only through the fits to it: its own error comes from the others alone.

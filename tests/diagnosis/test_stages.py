@@ -122,12 +122,10 @@ def test_two_robots_and_what_does_not_hold_elsewhere_are_told_in_words(plan: Pre
     def said(other: int) -> str:
         return mixed(plan, MixedRobots(tuple(range(other, len(names))), tuple(range(other)), 1.0))
 
-    assert f"{len(names) - 2} the one, 2 the other ({names[0]}, {names[1]}), more than" in said(2)
-    assert f"({', '.join(names[:NAMED_ONE_BY_ONE])}), more" in said(NAMED_ONE_BY_ONE)
-    assert f"({', '.join(names[:NAMED_ONE_BY_ONE])} and 1 more), more" in said(NAMED_ONE_BY_ONE + 1)
-    assert unlike(0.5, 0.1).startswith(
-        " On trials left out of the fit in turn a smooth error of 0.50 sigma is left, on the others 0.10:"
-    )
+    assert f"{len(names) - 2} the one, 2 the other ({names[0]}, {names[1]}), better than" in said(2)
+    assert f"({', '.join(names[:NAMED_ONE_BY_ONE])}), better" in said(NAMED_ONE_BY_ONE)
+    assert f"({', '.join(names[:NAMED_ONE_BY_ONE])} and 1 more), better" in said(NAMED_ONE_BY_ONE + 1)
+    assert unlike(0.5, 0.1).startswith(" On left-out trials a smooth error of 0.50 sigma is left, on fitted ones 0.10:")
     assert undecided("base_tilt", "tip_payload").startswith(" Base tilt or tip payload would explain more")
 
 
@@ -161,7 +159,9 @@ def test_a_parameter_far_from_its_description_is_doubted_and_an_effects_own_is_n
 
 def test_a_law_that_may_go_either_way_and_ended_at_an_end_is_doubted() -> None:
     said = strained(fitted(10.0, effect="base_tilt", ended=True))
-    assert said == ["base tilt: stiffness came out at the end of its range (10 N/m); this law is bent to what it does not describe"]
+    assert said == [
+        "base tilt: stiffness came out at the end of its range (10 N/m); this effect is fitted to something it does not describe"
+    ]
     for other in (
         fitted(10.0, effect="base_tilt"), fitted(10.0, ended=True), fitted(10.0, effect="base_tilt", ended=True, low=0.0),
     ):  # fmt: skip
@@ -316,7 +316,7 @@ def test_the_noise_is_read_from_a_first_rough_fit(plan: PreparedRecording, monke
 def test_a_length_below_zero_is_paid_out_and_felt_as_any(plan: PreparedRecording) -> None:
     paid_out = tuple(replace(i, drives=(Drive.DISPLACEMENT,) * 3, command=i.command - 5.0) for i in plan.inputs[:2])
     bench = replace(plan, inputs=paid_out, measured=plan.measured[:2])
-    assert np.all(objective._felt(bench, 0) == 1.0)
+    assert np.all(objective._taut_share(bench, 0) == 1.0)
     np.testing.assert_array_equal(objective._unslackened(bench).inputs[1].command, paid_out[1].command)
 
 
@@ -344,7 +344,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(
         assert found.prepared.notices == (*day.notices, f"{day.inputs[1].name}: unstable start, its shape is one of several")
         assert found.suspicions == ("odd",)
         assert found.loops.by_trial == tuple(loop for loop in loops(day).by_trial if loop.trial not in found.held_out)
-    assert told == ["nominal prediction", "what the files may mean otherwise"] * 2
+    assert told == ["nominal prediction", "possible mistakes in the files"] * 2
 
 
 def test_without_an_equilibrium_what_looks_wrong_is_said_with_it(plan: PreparedRecording, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -399,7 +399,7 @@ def test_fewer_than_six_trials_are_each_sealed_in_turn_and_share_the_time(
     found, parts, settings = few_trials.reported[0]
     assert (found, settings.budget) == ("without []", 60.0)
     assert parts == [(f"without [{k}]", [k]) for k in range(5)]
-    assert few_trials.told[1] == "5 trials, each sealed in turn and the others diagnosed, 2 of 5: at work"
+    assert few_trials.told[1] == "5 trials, each held out in turn, 2 of 5: at work"
     assert few_trials.told[-1] == "all 5 trials: at work"
     assert [looked.suspicions for looked in few_trials.heard] == [("odd",)]
     few_trials.run(None)

@@ -1,11 +1,11 @@
-"""Time for a search: when it is up nothing more is tried, and what was not is said."""
+"""The time limit of a search, and what it left untried."""
 
 import math
 import time
 
 
 class Budget:
-    """Seconds from now in which sets of effects are tried; without end where none are given."""
+    """A time limit in seconds from now for trying sets of effects; no limit where none is given."""
 
     def __init__(self, seconds: float | None = None) -> None:
         self.seconds = math.inf if seconds is None else seconds
@@ -13,7 +13,7 @@ class Budget:
         self.untried: list[str] = []
 
     def allows(self, what: str) -> bool:
-        """Whether there is time left to try this; where not it is noted."""
+        """Return whether time is left to try `what`; note it as untried otherwise."""
         if time.monotonic() < self._end:
             return True
         if what not in self.untried:
@@ -21,7 +21,7 @@ class Budget:
         return False
 
     def words(self) -> tuple[str, ...]:
-        """What a reader should know: nothing where all was tried."""
+        """Return a notice of what was not tried; empty where everything was."""
         if not self.untried:
             return ()
         untried = ", ".join(self.untried)

@@ -1,4 +1,4 @@
-"""What a diagnosis concludes before the sealed trials are opened."""
+"""The conclusion of a diagnosis before the held-out trials are used."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from twin.prediction.twin import Twin
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What each stage handed on."""
+    """The results of all stages."""
 
     context: FitContext
     screening: Screening
@@ -26,27 +26,32 @@ class Conclusion:
 
     @property
     def base(self) -> Twin:
-        """The calibrated robot, no effect added."""
+        """The calibrated robot, without added effects."""
         return self.found.base.fit.model.twin
 
     @property
     def final(self) -> Twin:
-        """The twin the verdict leaves in force."""
+        """The twin that the verdict leaves in force."""
         return self.judged.final.fit.model.twin
 
     def noise(self) -> Noise:
-        """The noise of the fitted trials under the final twin; that of the objective where a command beside theirs has no
-        equilibrium."""
+        """Estimate the noise of the fitted trials under the final twin.
+
+        Return the objective's noise where a neighbouring command has no equilibrium.
+        """
         try:
             return noise_under(self.context.objective, self.judged.final.fit.evaluation)
         except SolveError:
             return self.context.objective.whitener.noise
 
     def without(self, effect: str) -> Twin:
-        """The final twin less one effect, everything else fitted again; itself where the effect is not claimed."""
+        """Return the final twin less one effect, with everything else fitted again.
+
+        Return the final twin itself where the effect is not claimed.
+        """
         claimed = any(c.effect == effect for c in self.judged.claims)
         return self.gated.without[effect].fit.model.twin if claimed else self.final
 
     def weighed(self, effects: tuple[str, ...]) -> Twin | None:
-        """The twin of a set of effects that the search weighed."""
+        """Return the twin of a candidate with these effects that the search has fitted; None where there is none."""
         return next((w.fit.model.twin for w in self.found.all if w.effects == tuple(sorted(effects))), None)

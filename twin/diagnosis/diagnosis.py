@@ -1,4 +1,4 @@
-"""What a diagnosis finds: the types that reports are made from."""
+"""The result of a diagnosis: the types that reports are made from."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,8 +19,11 @@ from twin.prediction.twin import Twin
 
 @dataclass(frozen=True)
 class Settings:
-    """How a diagnosis is run: seed of the split and of the no-effect sets, worker threads, and for how long (s) sets of effects are
-    tried; with an end to that the answer depends on the machine."""
+    """The settings of a diagnosis.
+
+    `seed`: of the split and of the simulated sets without effects. `jobs`: worker threads. `budget`: time limit (s) for trying sets
+    of effects; with a limit the answer depends on the speed of the machine.
+    """
 
     seed: int = 0
     jobs: int = 2
@@ -29,7 +32,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class Claim:
-    """An effect in force (or a runner-up): parameters, the sealed trials' error without it (or with it), its probability."""
+    """A claimed effect or a runner-up, with its parameters and its probability.
+
+    `error` is the RMS error on held-out trials: without the effect for a claim, with it for a runner-up.
+    """
 
     effect: str
     parameters: dict[str, FittedValue]
@@ -41,10 +47,11 @@ class Claim:
 
 @dataclass(frozen=True)
 class Errors:
-    """RMS on the held-out trials, SI, by group of outputs (points: Euclidean per point); confidence intervals over trials.
+    """RMS errors on the held-out trials, SI, by group of outputs (points: Euclidean per point).
 
-    `without_physics` is that of a polynomial of the inputs (`predict_by_polynomial`). `lost`: held-out trials that one of the three
-    has no equilibrium for; they count for none. `spikes`: what was left out of the others, in words.
+    `ci_*`: confidence intervals over trials. `without_physics`: error of a polynomial of the inputs (`predict_by_polynomial`).
+    `lost`: held-out trials for which one of the three twins has no equilibrium; they are left out of every error. `spikes`: samples
+    left out of the other trials, in words.
     """
 
     nominal: dict[str, float]
@@ -59,7 +66,10 @@ class Errors:
 
     @property
     def improved(self) -> bool:
-        """Whether the effects lessen the error, all groups together, each over its noise floor; True where nothing tells."""
+        """Whether the effects reduce the error, summed over groups in units of the noise floor.
+
+        True where the errors cannot be compared.
+        """
         groups = [g for g, floor in self.floor.items() if floor > 0.0]
         before, after = (sum((e[g] / self.floor[g]) ** 2 for g in groups) for e in (self.calibrated, self.after))
         return not after >= before
@@ -67,7 +77,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Fold:
-    """One trial sealed, the others diagnosed: what was concluded without it."""
+    """The conclusion from all trials but one, which was held out."""
 
     trial: int
     verdict: str
@@ -76,7 +86,10 @@ class Fold:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """Everything a report shows. Residuals are measured - predicted (n_k, n_output) SI, by stage, all trials in clock order."""
+    """Everything that a report shows.
+
+    Residuals are measured - predicted (n_k, n_output) SI, by stage, all trials in clock order.
+    """
 
     verdict: str
     twin: Twin
@@ -84,47 +97,46 @@ class Diagnosis:
     claims: tuple[Claim, ...]
     runners_up: tuple[Claim, ...]
     below_materiality: tuple[Claim, ...]
-    parameters: dict[
-        str, FittedValue
-    ]  # the robot's own, and as "effect.parameter" what was uncertain of effects it is known to have
+    # The robot's own; as "effect.parameter" the uncertain ones of effects that the robot is known to have.
+    parameters: dict[str, FittedValue]
     unfixed: tuple[str, ...]
-    correlation: tuple[tuple[str, ...], np.ndarray]  # of the errors of what was fitted, by its labels
+    correlation: tuple[tuple[str, ...], np.ndarray]  # of the errors of the fitted parameters, with their labels
     errors: Errors
     noise: Noise
     structure_before: float  # sigma
     structure_after: float
-    structure_unseen: float  # after, on trials left out of the fit in turn
+    structure_unseen: float  # after, on left-out trials
     limits: AcceptanceLimits
     structure: dict[str, float]  # component -> RMS in sigmas, after
     strongest: tuple[tuple[str, float], ...]
     line: tuple[float, float]  # z-score, Hz
     worst_channel: str
     description: str
-    caveats: tuple[str, ...]  # what stands against the verdict
+    caveats: tuple[str, ...]  # reasons to doubt the verdict
     identifiability: tuple[Visibility, ...]
     ambiguous: tuple[tuple[str, ...], ...]
     experiment: Experiment | None
     recording: Recording  # as it was read
-    prepared: PreparedRecording  # of it, what was diagnosed
+    prepared: PreparedRecording  # as diagnosed
     fitted_trials: tuple[int, ...]
-    held_out_trials: tuple[int, ...]  # all, where each was sealed in turn
-    folds: tuple[Fold, ...]  # () where one part of the trials was sealed once
+    held_out_trials: tuple[int, ...]  # all of them where each was held out in turn
+    folds: tuple[Fold, ...]  # () where one part of the trials was held out once
     loops: Loops
-    suspicions: tuple[Suspicion, ...]  # said before anything was fitted; no number depends on them
+    suspicions: tuple[Suspicion, ...]  # raised before any fit; no number depends on them
     predictions: dict[str, list[np.ndarray]]
     notices: tuple[str, ...]
     settings: Settings
     scores: tuple[tuple[tuple[str, ...], float], ...] = field(default=())
-    untried: tuple[str, ...] = ()  # sets of effects for which the budget left no time
+    untried: tuple[str, ...] = ()  # sets of effects that the time limit left untried
 
     def summary(self) -> str:
-        """Return the verdict in one plain sentence, as the report has it."""
+        """Return the verdict in one plain sentence, as in the report."""
         from twin import report
 
         return report.sentence(self)
 
     def save(self, folder: Path | str) -> None:
-        """Write `folder`/report.html, report.json and twin.toml, all or none. Raises DataError where it cannot."""
+        """Write `folder`/report.html, report.json and twin.toml, all or none. Raise DataError where that fails."""
         from twin import report
 
         report.write(self, folder, report.provenance(self.recording, self.settings, "Diagnosis.save"))

@@ -1,4 +1,4 @@
-"""What every stage works on: the fitted trials, what they are compared by, and whom to tell how far things are."""
+"""The fit context: what every stage works on, how candidates are compared, and where progress is reported."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,14 +19,14 @@ Progress = Callable[[str], None]
 
 
 def silent(words: str) -> None:
-    """Nobody is told."""
+    """Report no progress."""
 
 
 @dataclass(frozen=True)
 class FitContext:
-    """White residuals of the fitted trials, and named effects against "some smooth error" on them.
+    """The objective of the fitted trials, and the evidence of named effects against an unnamed smooth error.
 
-    The bench holds every trial's inputs, for a body that remembers, and the fitted trials' measurements alone.
+    The prepared recording holds every trial's inputs, for a body with memory, but the measurements of the fitted trials only.
     """
 
     objective: Objective
@@ -35,33 +35,36 @@ class FitContext:
     budget: Budget = field(default_factory=Budget)
 
     def unwhitened(self, fit: Fit) -> np.ndarray:
-        """The residual in sigmas of its sensors, not made white (n,); zero where nothing was measured."""
+        """Return the residual in sigmas of its sensors, not whitened (n,); zero where nothing was measured."""
         return np.concatenate([np.nan_to_num(r / self.objective.whitener.noise.sigma).ravel() for r in fit.evaluation.raw])
 
     def blocked_input_noise(self, fit: Fit) -> float:
-        """What the fitted trials' |z|^2 lacks of the readings' noise (`Whitener.heard`): the law averages it away (`passed`), or
-        lets tendons fall slack, or so near it that noise is cut off there (`SLACK_READING`)."""
+        """Return the input noise, in |z|^2 of the fitted trials, that the fitted effects keep from the robot.
+
+        An effect blocks input noise by averaging it (`transmitted_noise`), by making a tendon slack, or by bringing its tension so
+        near to zero that the noise is clipped (`SLACK_READING`).
+        """
         traces, whitener, prepared = fit.evaluation.traces, self.objective.whitener, self.prepared
         drive = whitener.noise.drive
         near = np.where(prepared.driven_by(Drive.TENSION), SLACK_READING * drive, 0.0)
-        lacking = 0.0
-        for k, heard in zip(self.trials, whitener.input_noise_energy, strict=True):
+        blocked = 0.0
+        for k, energy in zip(self.trials, whitener.input_noise_energy, strict=True):
             true = traces[k].true
-            felt = np.where(
+            transmitted = np.where(
                 true.tension <= near, 0.0, transmitted_noise(fit.model.twin, prepared.inputs[k], drive, true.antagonists)
             )
-            lacking += float((heard * (1.0 - felt)).sum())
-        return lacking
+            blocked += float((energy * (1.0 - transmitted)).sum())
+        return blocked
 
     def fall_by_group(self, before: Fit, after: Fit) -> np.ndarray:
-        """(n_group,) by how much |z|^2 is less after, in each group of outputs in the order in which they come."""
+        """Return the fall of |z|^2 from `before` to `after` (n_group,), by group of outputs in their order."""
         of = [o.group for o in self.prepared.outputs]
         z = (before.z**2 - after.z**2).reshape(-1, len(of)).sum(axis=0)
         return np.array([z[[o == g for o in of]].sum() for g in dict.fromkeys(of)])
 
     @property
     def accuracy(self) -> np.ndarray:
-        """What the robot's description is good for (m,), sigmas of each output that it is declared for; zero for the others."""
+        """The declared accuracy of the description (m,), in sigmas of each output; zero where none is declared."""
         robot, outputs = self.prepared.robot, self.prepared.outputs
         stated = np.array([robot.accuracy if OUTPUT_GROUPS[o.group].has_declared_accuracy else 0.0 for o in outputs])
         values = {p.name: p.value for p in robot.parameters}
@@ -72,7 +75,10 @@ class FitContext:
 
     @property
     def excused(self) -> np.ndarray:
-        """(n_group,) of |z|^2 that what the description gets wrong can take of each group; without end where none is declared."""
+        """The share of |z|^2 (n_group,) that errors of the description may explain in each group.
+
+        Infinite where no accuracy is declared.
+        """
         of = np.array([o.group for o in self.prepared.outputs])
         each_output = self.evidence.present.sum(axis=0) * self.accuracy**2
         return np.array([total if (total := each_output[of == g].sum()) > 0.0 else np.inf for g in dict.fromkeys(of)])

@@ -1,4 +1,4 @@
-"""Stage `seal`: the sealed trials, opened once when everything else is written, and their errors, whatever they say."""
+"""Stage `held_out`: predict the held-out trials, once everything else is decided, and report the errors whatever they are."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Pick = Callable[[Conclusion], Twin | None]
 
 @dataclass(frozen=True)
 class HeldOut:
-    """The sealed trials with what was measured on them, and the twins that had to predict them unseen."""
+    """The held-out trials with their measurements, and the twins that predict them without having been fitted to them."""
 
     prepared: PreparedRecording
     nominal: Sequence[np.ndarray]  # (n_k, n_output) a trial, as described
@@ -36,7 +36,10 @@ class HeldOut:
     def of(
         prepared: PreparedRecording, nominal: Sequence[np.ndarray], parts: Sequence[tuple[Conclusion, Sequence[int]]]
     ) -> HeldOut:
-        """Lone marker samples are left out here as they were of the fitted trials, by the sealed trials' own scatter."""
+        """Collect the held-out trials of all parts, without single marker spikes.
+
+        Spikes are found as in the fitted trials, by the scatter of the held-out trials themselves.
+        """
         shown = {k for _, trials in parts for k in trials}
         whole, words = without_spikes(blind(prepared, [k for k in range(len(prepared.inputs)) if k not in shown]), nominal)
         return HeldOut(whole, nominal, parts, tuple(words))
@@ -46,7 +49,10 @@ class HeldOut:
         return sorted(k for _, trials in self.parts for k in trials)
 
     def predictions(self, pick: Pick) -> dict[int, np.ndarray]:
-        """(n_k, n_output) SI a sealed trial, by the twin picked of each conclusion; NaN where it has no equilibrium."""
+        """Return outputs (n_k, n_output) SI of each held-out trial, by the twin that `pick` selects of its conclusion.
+
+        NaN where that twin has no equilibrium.
+        """
         out: dict[int, np.ndarray] = {}
         for conclusion, trials in self.parts:
             twin = pick(conclusion)
@@ -54,7 +60,7 @@ class HeldOut:
         return out
 
     def error(self, pick: Pick) -> float:
-        """RMS in SI of the headline's outputs; NaN where some trial cannot be predicted."""
+        """Return the RMS error of the headline outputs, SI; NaN where some trial cannot be predicted."""
         at = self.predictions(pick)
         if any(np.isnan(y).all() for y in at.values()):
             return float("nan")
@@ -62,13 +68,19 @@ class HeldOut:
         return rms(self.prepared, [self.prepared.measured[k] - at[k] for k in self.trials], headline_group(groups))
 
     def rezeroed(self, group: str) -> tuple[float, float]:
-        """RMS in SI of one group of outputs by the twins left in force: as it is, and with each trial's zero taken anew."""
+        """Return the RMS error (SI) of one group of outputs by the final twins, twice.
+
+        First as predicted, then with each trial's zero taken from its own first rows.
+        """
         at = self.predictions(lambda c: c.final)
         raw = [self.prepared.measured[k] - at[k] for k in self.trials]
         return rms(self.prepared, raw, group), rms(self.prepared, [rezeroed(self.prepared, group, r) for r in raw], group)
 
     def errors(self, seed: int) -> Errors:
-        """As described, calibrated and with the effects, on the sealed trials that each of the three has an equilibrium for."""
+        """Return the errors of the described, the calibrated and the final twin.
+
+        Held-out trials for which one of the three has no equilibrium are left out.
+        """
         calibrated, after = (self.predictions(p) for p in (lambda c: c.base, lambda c: c.final))
         stages = {"nominal": dict(enumerate(self.nominal)), "calibrated": calibrated, "after": after}
         lost = [k for k in self.trials if any(np.isnan(at[k]).all() for at in stages.values())]
@@ -83,7 +95,7 @@ class HeldOut:
         )  # fmt: skip
 
     def _without_physics(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
-        """RMS error by group of a polynomial of the inputs, fitted to the trials that each conclusion was fitted to."""
+        """Return the RMS error by group of a polynomial of the inputs, fitted to the trials of each conclusion."""
         raw: dict[int, np.ndarray] = {}
         for conclusion, trials in self.parts:
             wanted = [k for k in trials if k in kept]
@@ -92,8 +104,10 @@ class HeldOut:
         return {g: rms(self.prepared, [raw[k] for k in kept], g) if kept else float("nan") for g in groups}
 
     def _floor(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
-        """RMS error a perfect twin would still show, by group; NaN where no trial can be predicted. By the noise as it is once the
-        effects are known: what they change between repeated trials would raise it else."""
+        """Return the RMS error that a perfect twin would still show, by group; NaN where no trial can be predicted.
+
+        The noise is estimated under the final twin: what its effects change between repeated trials is no noise.
+        """
         squared: dict[str, list[float]] = {g: [] for g in groups}
         for conclusion, trials in self.parts:
             noise = conclusion.noise()
@@ -102,14 +116,14 @@ class HeldOut:
                 try:
                     G = sensitivity(self.prepared, [k], conclusion.final, at)
                 except SolveError:
-                    continue  # a neighbouring command has no equilibrium: this trial says nothing of the floor
+                    continue  # a neighbouring command has no equilibrium: this trial gives no floor
                 for g, value in noise.floor(self.prepared, G).items():
                     squared[g].append(value**2)
         return {g: float(np.sqrt(np.mean(s))) if s else float("nan") for g, s in squared.items()}
 
 
 def predicted(twin: Twin | None, prepared: PreparedRecording, trials: Sequence[int]) -> list[np.ndarray]:
-    """(n_k, n_output) SI a trial; NaN for one without an equilibrium, and where there is no twin."""
+    """Return outputs (n_k, n_output) SI of each trial; NaN for trials without an equilibrium, and where there is no twin."""
     if twin is None or not trials:
         return [np.full_like(prepared.measured[k], np.nan) for k in trials]
     try:
@@ -121,7 +135,10 @@ def predicted(twin: Twin | None, prepared: PreparedRecording, trials: Sequence[i
 
 
 def interval(squares: Sequence[np.ndarray], seed: int) -> tuple[float, float]:
-    """95 % bootstrap interval of an RMS, over whole trials and blocks of ten samples within them, since neighbours are alike."""
+    """Return the 95 % bootstrap interval of an RMS.
+
+    Whole trials are split into blocks of ten samples, since neighbouring samples are correlated, and the blocks are resampled.
+    """
     blocks = [b for s in squares for b in np.array_split(s, max(1, len(s) // 10)) if len(b)]
     if not blocks:
         return float("nan"), float("nan")

@@ -1,7 +1,7 @@
-"""The main job: from a recording to what the twin lacks, how sure that is, and the error before and after on sealed trials.
+"""The diagnosis: find what the twin lacks, how sure that is, and the error before and after on held-out trials.
 
-look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> systematic -> describe, all on the fitted trials;
-then the seal is opened.
+preview -> calibrate -> screen -> search -> choose -> lag_or_delay -> gate -> resolve_ties -> judge -> systematic -> describe, all
+on the fitted trials; then the errors on the held-out trials.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -45,7 +45,7 @@ OnPreview = Callable[[DataPreview], None]
 
 
 def ignore_preview(preview: DataPreview) -> None:
-    """Nobody listens; all of it stands in the diagnosis."""
+    """Ignore the preview; the diagnosis contains all of it."""
 
 
 def diagnose(
@@ -55,23 +55,25 @@ def diagnose(
     progress: Progress = silent,
     on_preview: OnPreview = ignore_preview,
 ) -> Diagnosis:
-    """Diagnose a recording against a twin, by default the robot it names, as described.
+    """Diagnose a recording against a twin, by default the robot that the recording names, as described.
 
-    About a quarter of the trials is held out; of fewer than `FEWEST_TRIALS_FOR_HELD_OUT` trials each in turn, the claims coming
-    from all of them. `on_preview` is called before anything is fitted, with what the files may mean otherwise and with loops; no
-    number depends on it. Raises TwinError for data that cannot be used.
+    About a quarter of the trials is held out. With fewer than `FEWEST_TRIALS_FOR_HELD_OUT` trials each is held out in turn, and the
+    claims come from a fit to all of them. `on_preview` is called before any fit, with suspected mistakes in the files and with
+    loops; no number depends on it. Raise TwinError for data that cannot be used.
     """
     settings, twin = settings or Settings(), twin or Twin.of_recording(recording)
     prepared = prepare(recording, twin.robot)
     if len(prepared.inputs) < 2:
-        raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one sealed")
+        raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one to hold out")
     with single_thread():
         preview = preview_data(prepared, twin, settings, progress)
         on_preview(preview)
-        return _sealed(recording, preview, twin, settings, progress)
+        return _held_out_diagnosis(recording, preview, twin, settings, progress)
 
 
-def _sealed(recording: Recording, preview: DataPreview, twin: Twin, settings: Settings, progress: Progress) -> Diagnosis:
+def _held_out_diagnosis(
+    recording: Recording, preview: DataPreview, twin: Twin, settings: Settings, progress: Progress
+) -> Diagnosis:
     n = len(preview.prepared.inputs)
     prepared, nominal = preview.prepared, preview.nominal
     if n >= FEWEST_TRIALS_FOR_HELD_OUT:
@@ -80,10 +82,10 @@ def _sealed(recording: Recording, preview: DataPreview, twin: Twin, settings: Se
     parts, share = [], replace(settings, budget=settings.budget and settings.budget / (n + 1))
     for k in range(n):
 
-        def told(words: str, k: int = k) -> None:
-            progress(f"{n} trials, each sealed in turn and the others diagnosed, {k + 1} of {n}: {words}")
+        def report_fold(words: str, k: int = k) -> None:
+            progress(f"{n} trials, each held out in turn, {k + 1} of {n}: {words}")
 
-        parts.append((conclude(prepared, twin, [k], nominal, share, told), [k]))
+        parts.append((conclude(prepared, twin, [k], nominal, share, report_fold), [k]))
     found = conclude(prepared, twin, [], nominal, share, lambda words: progress(f"all {n} trials: {words}"))
     return _reported(recording, preview, found, parts, settings)
 
@@ -96,7 +98,7 @@ def conclude(
     settings: Settings,
     progress: Progress,
 ) -> Conclusion:
-    """Everything a diagnosis decides, without what was measured on the sealed trials."""
+    """Run all stages without the measurements of the held-out trials."""
     context, base, notes = calibrate(prepared, twin, held_out, nominal, settings, progress)
     screening = screen(context, base, settings.seed)
     found = choose(context, search(context, base, screening.patterns, screening.limits), screening.limits)
@@ -113,18 +115,18 @@ def _reported(
     parts: Sequence[tuple[Conclusion, Sequence[int]]],
     settings: Settings,
 ) -> Diagnosis:
-    """What is said of `found`, with the errors on held-out trials by the conclusions that had not seen each.
+    """Assemble the diagnosis; each held-out trial is predicted by a conclusion that was not fitted to it.
 
-    Claims that do not lessen that error are withdrawn.
+    Claims that do not reduce the error on held-out trials are withdrawn.
     """
-    opened = HeldOut.of(preview.prepared, preview.nominal, parts)
-    errors = opened.errors(settings.seed)
+    held_out = HeldOut.of(preview.prepared, preview.nominal, parts)
+    errors = held_out.errors(settings.seed)
     if not found.judged.claims or errors.improved:
-        return _diagnosis(recording, preview, found, parts, settings, (opened, errors))
+        return _diagnosis(recording, preview, found, parts, settings, (held_out, errors))
     words = _withdrawal_words(found, errors)
     found, parts = _withdrawn(found), [(_withdrawn(c), trials) for c, trials in parts]
-    opened = HeldOut.of(preview.prepared, preview.nominal, parts)
-    calibrated = _diagnosis(recording, preview, found, parts, settings, (opened, opened.errors(settings.seed)))
+    held_out = HeldOut.of(preview.prepared, preview.nominal, parts)
+    calibrated = _diagnosis(recording, preview, found, parts, settings, (held_out, held_out.errors(settings.seed)))
     return replace(calibrated, caveats=(words, *calibrated.caveats))
 
 
@@ -136,20 +138,20 @@ def _diagnosis(
     settings: Settings,
     measured_by: tuple[HeldOut, Errors],
 ) -> Diagnosis:
-    """Put together what a conclusion says and the errors on held-out trials."""
-    (opened, errors), prepared, nominal = measured_by, preview.prepared, preview.nominal
+    """Assemble a diagnosis from a conclusion and the errors on held-out trials."""
+    (held_out, errors), prepared, nominal = measured_by, preview.prepared, preview.nominal
     context, judged, limits = found.context, found.judged, found.screening.limits
     final, base = judged.final, found.found.base
-    said = describe(context, found.found, found.gated, judged, limits)
-    measured = [y if k in context.trials else opened.prepared.measured[k] for k, y in enumerate(context.prepared.measured)]
+    left = describe(context, found.found, found.gated, judged, limits)
+    measured = [y if k in context.trials else held_out.prepared.measured[k] for k, y in enumerate(context.prepared.measured)]
     folds = tuple(Fold(trials[0], c.judged.verdict, tuple(x.effect for x in c.judged.claims)) for c, trials in parts)
     return Diagnosis(
         verdict=judged.verdict,
         twin=without_zero_jumps(found.final),
         calibrated=without_zero_jumps(found.base),
-        claims=tuple(replace(c, error=opened.error(lambda x, e=c.effect: x.without(e))) for c in judged.claims),
+        claims=tuple(replace(c, error=held_out.error(lambda x, e=c.effect: x.without(e))) for c in judged.claims),
         runners_up=tuple(
-            replace(c, error=opened.error(lambda x, s=(c.effect, *c.beside): x.weighed(s))) for c in judged.runners_up
+            replace(c, error=held_out.error(lambda x, s=(c.effect, *c.beside): x.weighed(s))) for c in judged.runners_up
         ),
         below_materiality=tuple(
             Claim(s.effect, s.fitted.fit.fitted(s.effect), float("nan"), 0.0, s.contribution) for s in found.gated.small
@@ -166,11 +168,11 @@ def _diagnosis(
         structure_after=final.discrepancy.size,
         structure_unseen=judged.signs.unseen,
         limits=limits,
-        structure=said.components,
-        strongest=said.strongest,
+        structure=left.components,
+        strongest=left.strongest,
         line=judged.signs.line,
-        worst_channel=said.worst_channel,
-        description=said.words,
+        worst_channel=left.worst_channel,
+        description=left.words,
         caveats=judged.signs.caveats,
         identifiability=found.screening.table,
         ambiguous=judged.ambiguous,
@@ -178,12 +180,12 @@ def _diagnosis(
         recording=recording,
         prepared=replace(prepared, measured=tuple(measured)),
         fitted_trials=tuple(context.trials),
-        held_out_trials=tuple(opened.trials),
+        held_out_trials=tuple(held_out.trials),
         folds=folds if len(parts) > 1 else (),
         loops=loops(context.prepared),
         suspicions=preview.suspicions,
-        predictions=_predictions(prepared, found, opened, nominal),
-        notices=(*prepared.notices, *found.notices, *jumped(prepared, final.fit), *_anew(found, opened), *said.notices),
+        predictions=_predictions(prepared, found, held_out, nominal),
+        notices=(*prepared.notices, *found.notices, *jumped(prepared, final.fit), *_rezeroed(found, held_out), *left.notices),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.found.all),
         untried=tuple(context.budget.untried),
@@ -191,12 +193,12 @@ def _diagnosis(
 
 
 def _withdrawn(found: Conclusion) -> Conclusion:
-    """The conclusion without its claims."""
+    """Return the conclusion without its claims."""
     return replace(found, judged=withdraw(found.context, found.found, found.judged)) if found.judged.claims else found
 
 
 def _withdrawal_words(found: Conclusion, errors: Errors) -> str:
-    """Why claims are withdrawn."""
+    """Return why claims are withdrawn."""
     group = headline_group(errors.after)
     unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
     names = " and ".join(display_name(c.effect) for c in found.judged.claims)
@@ -207,23 +209,22 @@ def _withdrawal_words(found: Conclusion, errors: Errors) -> str:
     )
 
 
-def _anew(found: Conclusion, opened: HeldOut) -> Iterator[str]:
-    """Where zeros jump, the sealed trials' error with those that were fitted, and with each trial's own."""
+def _rezeroed(found: Conclusion, held_out: HeldOut) -> Iterator[str]:
+    """Yield, for zeros that jump, the held-out error with the fitted zeros and with each trial's own."""
     for group in dict.fromkeys(j.group for j in jumps_of(found.final)):
         unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
-        fitted, own = (factor * e for e in opened.rezeroed(group))
+        fitted, own = (factor * e for e in held_out.rezeroed(group))
         yield (
-            f"held-out trials, {OUTPUT_GROUPS[group].kind}: {fitted:.3g} {unit} with the zeros that were fitted, "
-            f"{own:.3g} {unit} where each "
-            f"trial's is taken from its own first {ROWS_FOR_ZERO} rows; the first counts"
+            f"held-out trials, {OUTPUT_GROUPS[group].kind}: {fitted:.3g} {unit} with the fitted zeros, "
+            f"{own:.3g} {unit} with each trial's zero from its own first {ROWS_FOR_ZERO} rows; the first counts"
         )
 
 
 def _experiment(found: Conclusion, settings: Settings) -> Experiment | None:
-    """What would settle a doubt, where there is one."""
+    """Return the experiment that would separate ambiguous candidates; None where nothing is ambiguous."""
     judged, context = found.judged, found.context
-    doubt = judged.ambiguous or (judged.verdict != "noise" and judged.runners_up)
-    if not doubt or judged.between is None:
+    ambiguous = judged.ambiguous or (judged.verdict != "noise" and judged.runners_up)
+    if not ambiguous or judged.between is None:
         return None
     context.progress("next experiment")
     a, b = judged.between
@@ -231,12 +232,12 @@ def _experiment(found: Conclusion, settings: Settings) -> Experiment | None:
 
 
 def _predictions(
-    prepared: PreparedRecording, found: Conclusion, opened: HeldOut, nominal: Sequence[np.ndarray]
+    prepared: PreparedRecording, found: Conclusion, held_out: HeldOut, nominal: Sequence[np.ndarray]
 ) -> dict[str, list[np.ndarray]]:
-    """By stage, every trial by the twin that had to predict it."""
+    """Return every trial's prediction by stage; held-out trials by a twin that was not fitted to them."""
     out = {"nominal": list(nominal)}
     for name, pick in (("calibrated", lambda c: c.base), ("after", lambda c: c.final)):
-        unseen = opened.predictions(pick)
+        unseen = held_out.predictions(pick)
         open_ = [k for k in range(len(prepared.inputs)) if k not in unseen]
         seen = dict(zip(open_, predicted(pick(found), prepared, open_), strict=True))
         out[name] = [(unseen | seen)[k] for k in range(len(prepared.inputs))]
@@ -244,16 +245,19 @@ def _predictions(
 
 
 def calibrate_twin(recording: Recording, twin: Twin | None = None, settings: Settings | None = None) -> Twin:
-    """Return the twin with the robot's own uncertain parameters fitted to the recording; no effect is sought.
+    """Return the twin with the robot's own uncertain parameters fitted to the recording, without a search for effects.
 
-    By default the robot that the recording names. About a quarter of the trials is held out of the fit. Raises as `diagnose`.
+    The default is the robot that the recording names. About a quarter of the trials is held out of the fit. Raises as `diagnose`.
     """
     fitted, _, _ = calibrated_fit(recording, twin or Twin.of_recording(recording), settings)
     return fitted.model.twin
 
 
 def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None = None) -> tuple[Fit, str, tuple[str, ...]]:
-    """The robot's own uncertain parameters fitted, no effect sought; the RMS error on sealed trials in words; and notices."""
+    """Fit the robot's own uncertain parameters, without a search for effects.
+
+    Return the fit, the RMS error on held-out trials in words, and notices.
+    """
     settings = settings or Settings()
     prepared = prepare(recording, twin.robot)
     every = list(range(len(prepared.inputs)))
@@ -262,8 +266,8 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     seen, alone = without_spikes(blind(prepared, held_out), nominal)
     start, objective, _ = objective_of(seen, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
-    opened, _ = without_spikes(blind(prepared, fitted), nominal)
-    raw = [opened.measured[k] - y for k, y in zip(held_out, predicted(found.model.twin, prepared, held_out), strict=True)]
+    unseen, _ = without_spikes(blind(prepared, fitted), nominal)
+    raw = [unseen.measured[k] - y for k, y in zip(held_out, predicted(found.model.twin, prepared, held_out), strict=True)]
     group = headline_group(o.group for o in prepared.outputs)
     unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
     return found, f"{factor * rms(prepared, raw, group):.3f} {unit}", (*prepared.notices, *alone)

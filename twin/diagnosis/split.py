@@ -1,4 +1,4 @@
-"""Which trials are sealed: about a quarter, by what was done in them and the seed, never by what was measured."""
+"""The split into fitted and held-out trials, by the inputs and the seed, never by what was measured."""
 
 from collections import Counter
 from collections.abc import Hashable, Iterator, Sequence
@@ -15,10 +15,11 @@ LOAD_CONDITIONS = ("payload", "mount", "force")
 
 
 def split(prepared: PreparedRecording, seed: int) -> tuple[list[int], list[int]]:
-    """(fitted, sealed) trials, both in order of the clock.
+    """Return the (fitted, held-out) trials, both in clock order.
 
-    What only one of the trials still open shows (a payload, a mount, a kind of motion, an end of a range) is sealed last, and so
-    are repeats, which the noise is read from. A load that nobody sees any more is worse than a repeat less.
+    About a quarter is held out. A trial is held out last if it alone among the fitted ones shows a condition (a payload, a mount, a
+    kind of motion, an end of a range) or repeats another, since repeats show the noise. Losing a load counts more than losing a
+    repeat.
     """
     n = len(prepared.inputs)
     shown = list(_conditions(prepared))
@@ -33,13 +34,13 @@ def split(prepared: PreparedRecording, seed: int) -> tuple[list[int], list[int]]
 
 
 def blind(prepared: PreparedRecording, trials: Sequence[int]) -> PreparedRecording:
-    """The bench with nothing measured on these trials; their inputs stay, which a body remembers."""
+    """Return the prepared recording without the measurements of these trials; their inputs stay, for a body with memory."""
     measured = [np.full_like(y, np.nan) if k in trials else y for k, y in enumerate(prepared.measured)]
     return replace(prepared, measured=tuple(measured))
 
 
 def _conditions(prepared: PreparedRecording) -> Iterator[set[tuple[Hashable, ...]]]:
-    """What each trial shows, by its inputs and conditions alone."""
+    """Yield the conditions that each trial shows, by its inputs and loads only."""
     tops = np.array([np.abs(i.command).max(axis=0) for i in prepared.inputs])
     ranges = {
         "command": tops,

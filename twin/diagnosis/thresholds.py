@@ -1,7 +1,7 @@
-"""Every threshold that decides what a diagnosis says: value, unit, reason, and the evidence it came from.
+"""The thresholds that decide a diagnosis: value, unit, reason, and the evidence for each.
 
-Evidence is a command that reproduces it, a derivation, or "judgement" where it is no more than that. A judgement holds because the
-benchmark's table (`python -m tools.benchmarks.diagnosis.attribution`) holds with it; it was not searched for.
+Evidence is a command that reproduces it, a derivation, or "judgement". A judgement was not optimised; the benchmark's results
+(`python -m tools.benchmarks.diagnosis.attribution`) hold with it.
 """
 
 from dataclasses import dataclass
@@ -41,29 +41,29 @@ HELD_OUT_SHARE = _row("HELD_OUT_SHARE", 0.25, "of the trials",
     "held out: enough to report an error by, few enough to leave the fit its conditions",
     "judgement: of 17 trials 4, whose RMS scatters by some 2 % where marker noise alone is left")
 FEWEST_TRIALS_FOR_HELD_OUT = _row("FEWEST_TRIALS_FOR_HELD_OUT", 6, "trials",
-    "with fewer, one or two held-out trials say little and the fit needs all: each is held out in turn",
+    "with fewer, one or two held-out trials show little and the fit needs all: each is held out in turn",
     "derivation: the RMS of m alike trials scatters by 1 / sqrt(2 m) of its spread from trial to trial; m = 1 below six")
 RANGE_END_SHARE = _row("RANGE_END_SHARE", 0.1, "of a range",
-    "a trial that is the only one this close to an end of a commanded range is needed to show that end", "judgement")
+    "of a commanded range: the only trial this close to one of its ends is kept for the fit", "judgement")
 SAME_RATE_RATIO = _row("SAME_RATE_RATIO", 10.0**0.5, "ratio",
     "pulls whose rates differ by more are different motions to a body that relaxes",
     "derivation: half of the decade that two rates should span (TWO_RATES_RATIO)")
 
-# ---- suspicions: what a file may mean otherwise ------------------------------------------------------------------------------
+# ---- suspicions: possible mistakes in a file ---------------------------------------------------------------------------------
 
 LEFT_BY_FILE_CHANGE = _row("LEFT_BY_FILE_CHANGE", 0.5, "of the error, and of the motion",
     "a change to the file that leaves more explains nothing; a robot as described leaves a fifth of the motion of one as built",
     SUSPICIONS_TEST)
 UNDECIDED_CHANGES_RATIO = _row("UNDECIDED_CHANGES_RATIO", 2.0, "ratio",
-    "of the errors that two changes to the file leave: closer ones cannot be decided by the data alone", "judgement")
+    "of the errors that two changes to the file leave: closer ones cannot be separated by the data", "judgement")
 TRIALS_TO_TRY_COMMANDS = _row("TRIALS_TO_TRY_COMMANDS", 5, "trials",
-    "that pull each tendon, on which a change to the commands is tried", "judgement")
+    "per tendon that pull it, on which a change to the commands is tried", "judgement")
 SAMPLES_TO_TRY_COMMANDS = _row("SAMPLES_TO_TRY_COMMANDS", 60, "1",
     "of each trial, on which a change to the commands is tried: a misread file shows in all of them", "judgement")
 LARGEST_CAMERA_TURN = _row("LARGEST_CAMERA_TURN", 20.0, "deg",
-    "a camera that was not aligned is off by less, which is an effect; a larger turn is a mistake", "judgement")
+    "the error of a camera that was not aligned, which is an effect; a larger turn is a mistake", "judgement")
 LARGEST_CAMERA_SHIFT = _row("LARGEST_CAMERA_SHIFT", 0.05, "of the robot's reach",
-    "a camera's origin, where it is known at all, is known better than that", "judgement")
+    "a camera's origin is known better than that, or not at all", "judgement")
 GRAVITY_RANGE = (
     _row("LEAST_GRAVITY", 9.7, "m/s^2", "9.78 at the equator", "derivation: less 0.8 %, for rounding to 9.8 and 9.7"),
     _row("MOST_GRAVITY", 9.9, "m/s^2", "9.83 at the poles", "derivation: and 0.7 % more"),
@@ -89,21 +89,21 @@ SHORTEST_TRIAL = _row("SHORTEST_TRIAL", 0.2, "s", "no tendon-driven robot is mov
 UNIT_MISTAKE_RATIO = _row("UNIT_MISTAKE_RATIO", 30.0, "ratio", "between this and its inverse no unit is off by a thousand",
     "derivation: the root of 1000")
 CLOUD_DISTANCE_RATIO = _row("CLOUD_DISTANCE_RATIO", 2.0, "ratio",
-    "of the markers' distance from their point cloud to the distance between its points: 0.9 on good days",
+    "of the markers' distance from their point cloud to the distance between its points: 0.9 on good sets",
     "python -m tools.benchmarks.diagnosis.mistakes SET (a finger's)")
 CLOUD_WIDTH_RATIO = _row("CLOUD_WIDTH_RATIO", 1.25, "ratio",
-    "of the body's width near its base, seen to described: 0.996 to 1.000 on ten finite element days",
+    "of the body's width near its base, seen to described: 0.996 to 1.000 on ten finite element sets",
     "python -m tools.benchmarks.diagnosis.mistakes SET (a finger's without markers)")
 LEAST_MOTION_SHARE = _row("LEAST_MOTION_SHARE", 0.025, "of the motion described",
-    "less, beside noise, counts as standing still: half the weakest gain that is called one", "derivation: 0.05 / 2")
+    "less, beside noise, counts as no motion: half the weakest gain that counts as one", "derivation: 0.05 / 2")
 UNMISSABLE_MOTION = _row("UNMISSABLE_MOTION", 10.0, "standard deviations of noise", "a motion so large cannot be missed",
     "derivation: 10 sigma")
-LEFT_BY_PATTERN = _row("LEFT_BY_PATTERN", 0.5, "of an error", "as LEFT_BY_FILE_CHANGE, of what one pattern leaves",
+LEFT_BY_PATTERN = _row("LEFT_BY_PATTERN", 0.5, "of an error", "as LEFT_BY_FILE_CHANGE, for one pattern",
     "judgement: as LEFT_BY_FILE_CHANGE")
 UNDERSTATED_NOISE_RATIO = _row("UNDERSTATED_NOISE_RATIO", 30.0, "ratio",
-    "of scatter to declared noise: heavy tails and an error of the model make a factor of three", SUSPICIONS_TEST)
+    "of scatter to declared noise: heavy tails and model errors explain a factor of three", SUSPICIONS_TEST)
 NOMINAL_MOTION_ERROR = _row("NOMINAL_MOTION_ERROR", 0.2, "of the motion",
-    "by which a robot as described is wrong about one as built, as in LEFT_BY_FILE_CHANGE", SUSPICIONS_TEST)
+    "the error of a robot as described about one as built, as in LEFT_BY_FILE_CHANGE", SUSPICIONS_TEST)
 SUSPECT_NOISE_RATIO = _row("SUSPECT_NOISE_RATIO", 30.0, "ratio",
     "of declared noise to scatter: a slow error may be ten times the scatter", "judgement")
 HIDING_NOISE_RATIO = _row("HIDING_NOISE_RATIO", 10.0, "ratio", "of declared noise to all that the description leaves",
@@ -120,9 +120,9 @@ SPIKE_WINDOW = _row("SPIKE_WINDOW", 7, "rows", "a spike lasts three rows at most
 SPIKE_SIZE = _row("SPIKE_SIZE", 8.0, "typical departures", "Student noise of 5 degrees goes so far once in 7,000 samples",
     SPIKES_TEST)
 SHARED_MOTION_SHARE = _row("SHARED_MOTION_SHARE", 0.25, "of its part of a motion",
-    "another marker that moves less, or another way, was not moved by the body", SPIKES_TEST)
+    "another marker that moves less, or in another direction, was not moved by the body", SPIKES_TEST)
 MOST_SPIKES_SHARE = _row("MOST_SPIKES_SHARE", 0.05, "of a marker's samples",
-    "more than that are no accidents but a fault of the marker", "judgement")
+    "more than that are a fault of the marker, not accidents", "judgement")
 
 # ---- loops -------------------------------------------------------------------------------------------------------------------
 
@@ -138,33 +138,33 @@ MOVING_RATE_SHARE = _row("MOVING_RATE_SHARE", 0.05, "of the fastest rate of a tr
 
 # ---- no-effect sets of the user's own design ---------------------------------------------------------------------------------
 
-NO_EFFECT_DRAWS = _row("NO_EFFECT_DRAWS", 24, "sets", "a Gumbel law fitted by two moments needs few",
+NO_EFFECT_DRAWS = _row("NO_EFFECT_DRAWS", 24, "sets", "a Gumbel distribution fitted by two moments needs few",
     "derivation: mean + 3.14 std of 24 draws has a standard error of some 0.75 std")
 GUMBEL_99_QUANTILE = _row("GUMBEL_99_QUANTILE", 3.137, "standard deviations",
-    "the 99 % quantile of a Gumbel law above its mean", "derivation: -sqrt(6) / pi (0.5772 + ln(-ln 0.99))")
+    "the 99 % quantile of a Gumbel distribution above its mean", "derivation: -sqrt(6) / pi (0.5772 + ln(-ln 0.99))")
 LEAST_EVIDENCE = _row("LEAST_EVIDENCE", 12.0, "2 ln odds",
-    "evidence an effect must bring after k log n: odds of e^6, safe over two dozen candidates",
+    "evidence that an effect must have after k log n: odds of e^6, safe over two dozen candidates",
     "derivation: 24 candidates at odds e^-6 are wrong once in 17 sets of noise before the gates")
 LEAST_CONTRIBUTION = _row("LEAST_CONTRIBUTION", 0.13, "sigma",
-    "an effect that moves the prediction by less is not claimed, whatever the statistics say: on 495 bench days 3 of 361 right "
+    "an effect that moves the prediction by less is not claimed, whatever the statistics say: on 495 simulated sets 3 of 361 right "
     "claims were smaller, and 13 of 72 wrong ones", "tools/evidence/diagnosis.md; " + ATTRIBUTION_BENCHMARK)
 STRUCTURE_AS_BUILT = _row("STRUCTURE_AS_BUILT", 0.12, "sigma",
-    "robots as built leave 0.08 at most of smooth error that no parameter spans", ATTRIBUTION_BENCHMARK)
+    "robots as built leave at most 0.08 of smooth error that no parameter explains", ATTRIBUTION_BENCHMARK)
 LARGEST_SPECTRAL_LINE = _row("LARGEST_SPECTRAL_LINE", 30.0, "z-score",
     "of a spectral line in the residual, where an effect was fitted that could leave one", ATTRIBUTION_BENCHMARK)
 FAINT_LINE_SHARE = _row("FAINT_LINE_SHARE", 1.0 / 3.0, "of a line's limit",
-    "where no effect was fitted that could leave a line; the largest of 40 no-effect days was half of that", ATTRIBUTION_BENCHMARK)
+    "where no effect was fitted that could leave a line; of 40 sets without effect the largest was half", ATTRIBUTION_BENCHMARK)
 
 # ---- evidence ----------------------------------------------------------------------------------------------------------------
 
 READING_STEP = _row("READING_STEP", 2.0, "readings' noise",
-    "by which a reading is changed to see its influence: larger than rounding, smaller than a bend", "judgement")
+    "by which a reading is changed to find its influence: larger than rounding, small against nonlinearity", "judgement")
 SHORT_MEMORY, MIDDLE_MEMORY, LONG_MEMORY = (
     _row(f"MEMORY_{n}", tau, "s", "of a relaxation that may be left in the error, a factor of four apart", "judgement")
     for n, tau in enumerate((2.0, 8.0, 30.0))
 )
 MEMORY_TIMES = (SHORT_MEMORY, MIDDLE_MEMORY, LONG_MEMORY)
-FIXED_POINT_ROUNDS = _row("FIXED_POINT_ROUNDS", 60, "steps", "of a fixed point that does not settle before", "judgement")
+FIXED_POINT_ROUNDS = _row("FIXED_POINT_ROUNDS", 60, "steps", "of a fixed-point iteration, unless it converges before", "judgement")
 SETTLED_VARIANCE_CHANGE = _row("SETTLED_VARIANCE_CHANGE", 0.05, "of a variance",
     "a variance that changes by less changes a size by 2.5 %", "derivation: half of it")
 NEGLIGIBLE_VARIANCE = _row("NEGLIGIBLE_VARIANCE", 1e-5, "sigma^2", "a component that small, 0.003 sigma, no longer matters",
@@ -183,25 +183,25 @@ WHITER_MODEL_LEAVES = _row("WHITER_MODEL_LEAVES", 0.5, "of what the best by evid
     "a model that leaves less is carried too: half of an error is no smooth part of it", "judgement: as LEFT_BY_EFFECTS")
 LARGEST_SCORE_GAP = _row("LARGEST_SCORE_GAP", 400.0, "2 ln odds", "a model further behind the best never led after another effect",
     "judgement")
-MOST_EFFECTS = _row("MOST_EFFECTS", 3, "effects", "at once; four together are hardly ever told apart", "judgement")
+MOST_EFFECTS = _row("MOST_EFFECTS", 3, "effects", "at once; four together can hardly ever be separated", "judgement")
 LEFT_FOR_THIRD_EFFECT = _row("LEFT_FOR_THIRD_EFFECT", 2.0 / 3.0, "of the base's |z|^2 above the noise",
     "no third effect is sought where the best two leave more",
-    "derivation: of three right ones, found the largest first, the third takes a third at most where they do not bend alike")
+    "derivation: of three right ones, found the largest first, the third explains at most a third where they do not bend alike")
 LAW_FORM_SHARE = _row("LAW_FORM_SHARE", 0.15, "of the largest contribution",
-    "a smaller effect may be what the large one's law gets wrong", ATTRIBUTION_BENCHMARK)
+    "a smaller effect may be an error of the large one's equation", ATTRIBUTION_BENCHMARK)
 HOPELESS_COST_RATIO = _row("HOPELESS_COST_RATIO", 2.0, "times the least cost",
-    "a fit that could at best end there is not finished; evidence forgives a smooth error, which is less than the best leaves",
+    "a fit that could at best end there is stopped; the smooth error that evidence does not penalise is smaller",
     "judgement")
-PROMISED_SHARE = _row("PROMISED_SHARE", 0.25, "of what an effect must bring, in evidence and in size",
+PROMISED_SHARE = _row("PROMISED_SHARE", 0.25, "of what an effect must have, in evidence and in size",
     "that a first-order pattern must promise to be worth a refit",
     "derivation: a pattern right to half in size promises a quarter in square")
 REUSED_PROMISE_SHARE = _row("REUSED_PROMISE_SHARE", 0.25, "of what a pattern must promise",
-    "that a pattern of the base must promise beside other effects to be computed anew there",
-    "judgement: of some 96 that then promised enough, on 14 days, one had promised less (0.04 for 2.6, beside a best of 75)")
+    "that a pattern of the base must promise beside other effects to be computed again there",
+    "judgement: of some 96 that then promised enough, on 14 sets, one had promised less (0.04 for 2.6, beside a best of 75)")
 REFIT_TOLERANCE = _row("REFIT_TOLERANCE", 2e-4, "of the cost",
     "by which the last step of a refit falls; what is left is second order in it", "judgement")
 REFIT_SCORE_TOLERANCE = _row("REFIT_SCORE_TOLERANCE", 3.0, "2 ln odds",
-    "the same for few readings: a quarter of what an effect must bring; REFIT_TOLERANCE is more from 15,000 readings on",
+    "the same for few readings: a quarter of what an effect must have; REFIT_TOLERANCE is more from 15,000 readings on",
     "judgement: as REFIT_TOLERANCE")
 
 # ---- choose and gate ---------------------------------------------------------------------------------------------------------
@@ -209,11 +209,11 @@ REFIT_SCORE_TOLERANCE = _row("REFIT_SCORE_TOLERANCE", 3.0, "2 ln odds",
 LEFT_BY_EFFECTS = _row("LEFT_BY_EFFECTS", 0.5, "of the structure, or of the squared error left out",
     "effects that leave more do not explain it", ATTRIBUTION_BENCHMARK)
 FIRST_ORDER_LIMIT = _row("FIRST_ORDER_LIMIT", 2.0, "times its square",
-    "of a left-out trial's error after a step to first order: beyond it the others are fitted again without the trial",
-    "judgement: leaving out one of the trials that an effect explains adds per cents")
+    "of a left-out trial's error after a first-order step: beyond it the others are fitted again without the trial",
+    "judgement: leaving out one of the trials that an effect explains adds some per cent")
 WORSE_ERROR_RATIO = _row("WORSE_ERROR_RATIO", 1.005, "ratio",
-    "of the headline's error on trials left out; refitting alone moves it by some thousandth, as it does where an effect shows "
-    "elsewhere", "python -m pytest tests/diagnosis/search/test_choose.py")
+    "of the headline's error on left-out trials; refitting alone changes it by some 0.001, also where an effect shows elsewhere",
+    "python -m pytest tests/diagnosis/search/test_choose.py")
 FEWEST_TRIALS_TO_HALVE = _row("FEWEST_TRIALS_TO_HALVE", 4, "trials", "with fewer, half of the session is hardly more than a trial",
     "derivation: two and two")
 HALF_SESSION_TOLERANCE = _row("HALF_SESSION_TOLERANCE", 1e-3, "of the cost",
@@ -222,10 +222,10 @@ HALF_SESSION_TOLERANCE = _row("HALF_SESSION_TOLERANCE", 1e-3, "of the cost",
 SETS_FITTED_TO_HALVES = _row("SETS_FITTED_TO_HALVES", 4, "sets",
     "that are fitted to halves of the session: those with the least first-order error on trials left out",
     "judgement: as CANDIDATES_REFITTED")
-LEFT_BY_EACH_EFFECT = _row("LEFT_BY_EACH_EFFECT", 0.75, "of the squared error on trials left out",
-    "each effect of a set that is chosen for what it predicts must take half of what the set must",
+LEFT_BY_EACH_EFFECT = _row("LEFT_BY_EACH_EFFECT", 0.75, "of the squared error on left-out trials",
+    "each effect of a set chosen for its predictions must remove half of what the set must",
     "derivation: half of LEFT_BY_EFFECTS")
-PARTS_OF_ONE_TRIAL = _row("PARTS_OF_ONE_TRIAL", 4, "parts", "where one trial alone is fitted, it is left out by quarters",
+PARTS_OF_ONE_TRIAL = _row("PARTS_OF_ONE_TRIAL", 4, "parts", "a single fitted trial is left out by quarters",
     "judgement")
 
 # ---- lag or delay ------------------------------------------------------------------------------------------------------------
@@ -235,57 +235,57 @@ MOMENTS_PER_ROW = _row("MOMENTS_PER_ROW", 4, "moments a row", "of a command betw
 LEAST_COMMAND_NOISE = _row("LEAST_COMMAND_NOISE", 1e-4, "of a command's range",
     "the least noise of a reading that a spline is asked to follow", "judgement: four digits are logged")
 LEAST_SPLINE_COMPLIANCE = _row("LEAST_SPLINE_COMPLIANCE", 1e-6, "noise^2 / row^3",
-    "the least that a spline gives way: 6e-4 of the noise within a row", "derivation: sqrt(q / 3), of a step of one row")
+    "the least compliance of a spline: 6e-4 of the noise within a row", "derivation: sqrt(q / 3), of a step of one row")
 NEIGHBOUR_WEIGHT = _row("NEIGHBOUR_WEIGHT", 0.25, "of a neighbour's looseness",
-    "an interval's own, from one sample a tendon, is known to 60 %; with a larger share corners blur",
-    "judgement: on simulated days with a lag or a delay")
+    "an interval's own looseness, from one sample a tendon, is known to 60 %; a larger share blurs corners",
+    "judgement: on simulated sets with a lag or a delay")
 SPLINE_ROUNDS = _row("SPLINE_ROUNDS", 10, "rounds",
-    "of expectation maximisation; after 20 splines are too stiff: outputs were met worse on 7 of 8 days",
-    "judgement: on simulated days with a lag or a delay, without NEIGHBOUR_WEIGHT")
+    "of expectation maximisation; after 20 splines are too stiff: outputs were predicted worse on 7 of 8 sets",
+    "judgement: on simulated sets with a lag or a delay, without NEIGHBOUR_WEIGHT")
 STUDENT_DEGREES = _row("STUDENT_DEGREES", 4.0, "degrees of freedom",
-    "of Student's t: a corner of a command that no spline sees is an outlier, not a law", "judgement")
+    "of Student's t: a corner of a command that no spline follows is an outlier, not an effect", "judgement")
 LAG_OR_DELAY_ROWS = _row("LAG_OR_DELAY_ROWS", 4000, "rows",
-    "of the trials that move fastest, which tell a lag from a delay best", "judgement: seconds")
+    "of the trials that move fastest, which separate a lag from a delay best", "judgement: seconds")
 
 # ---- noise of the inputs -----------------------------------------------------------------------------------------------------
 
-PROBED_ROWS = _row("PROBED_ROWS", 4, "rows", "between readings that are changed together to see what an effect lets through",
+PROBED_ROWS = _row("PROBED_ROWS", 4, "rows", "between readings that are changed together to find what an effect transmits",
     "derivation: as many as a monotone cubic between rows weighs")
 DRIVE_END_RATIO = _row("DRIVE_END_RATIO", 0.5, "ratio",
     "to the largest response to a lasting change: a drive at the end of its range responds less", "judgement: half")
 FRICTION_NOISE_DRAWS = _row("FRICTION_NOISE_DRAWS", 12, "draws", "of noise under which friction is simulated again",
-    "judgement: +- 7 where 81 of |z|^2 are owed")
+    "judgement: +- 7 where the correction is 81 of |z|^2")
 
 # ---- judge -------------------------------------------------------------------------------------------------------------------
 
-LEFTOVER_SHARE = _row("LEFTOVER_SHARE", 0.15, "of the structure before", "less left over is what a right law's form leaves",
-    ATTRIBUTION_BENCHMARK)
+LEFTOVER_SHARE = _row("LEFTOVER_SHARE", 0.15, "of the structure before",
+    "less left over may be an error of a right effect's equation", ATTRIBUTION_BENCHMARK)
 LARGE_STRUCTURE = _row("LARGE_STRUCTURE", 0.45, "sigma", "structure that counts whatever was there before", ATTRIBUTION_BENCHMARK)
 LARGE_STRUCTURE_WITHOUT_EFFECT = _row("LARGE_STRUCTURE_WITHOUT_EFFECT", 0.3, "sigma",
     "structure that counts where no effect was found: a base model may be off by less", ATTRIBUTION_BENCHMARK)
-EVEN_CHANCE = _row("EVEN_CHANCE", 0.5, "probability", "of a name where an effect of its set is at its limit",
+EVEN_CHANCE = _row("EVEN_CHANCE", 0.5, "probability", "of a claim where an effect of its set is at its limit",
     "judgement: as likely as not")
 SCORE_TEMPERATURE = _row("SCORE_TEMPERATURE", 20.0, "score a factor e",
-    "the likelihood takes an effect's law for exact, which makes raw odds absurd; calibrated so that claims at 0.9 are right nine "
-    "times of ten", ATTRIBUTION_BENCHMARK)
+    "the likelihood takes an effect's equation for exact, which makes raw odds far too large; calibrated so that claims at 0.9 are "
+    "right nine times of ten", ATTRIBUTION_BENCHMARK)
 STRUCTURE_WORTH_A_WORD = _row("STRUCTURE_WORTH_A_WORD", 0.05, "sigma",
     "of smooth error that the description's own accuracy explains; less is not reported", "judgement")
-RUNNERS_UP_SHOWN = _row("RUNNERS_UP_SHOWN", 6, "effects", "runners-up a reader looks at", "judgement")
+RUNNERS_UP_SHOWN = _row("RUNNERS_UP_SHOWN", 6, "effects", "runners-up in a report", "judgement")
 
 # ---- trials of two robots ----------------------------------------------------------------------------------------------------
 
-GROUPING_ROUNDS = _row("GROUPING_ROUNDS", 20, "rounds", "of moving trials between two groups; it settles in a few", "judgement")
-FEWEST_TRIALS_IN_GROUP = _row("FEWEST_TRIALS_IN_GROUP", 2, "trials", "one alone is odd itself, not another robot",
+GROUPING_ROUNDS = _row("GROUPING_ROUNDS", 20, "rounds", "of moving trials between two groups; it converges in a few", "judgement")
+FEWEST_TRIALS_IN_GROUP = _row("FEWEST_TRIALS_IN_GROUP", 2, "trials", "a single trial is an outlier, not another robot",
     "derivation: its own mean")
 SECOND_ROBOT_GAIN = _row("SECOND_ROBOT_GAIN", 0.2, "sigma", "by which a second robot must lower what one robot leaves",
     "python -m pytest tests/diagnosis/checks/test_mixed_robots.py")
 
-# ---- what the data can tell --------------------------------------------------------------------------------------------------
+# ---- what the data can show --------------------------------------------------------------------------------------------------
 
 CLEAR_CHI_SQUARE = _row("CLEAR_CHI_SQUARE", 25.0, "squared standard errors",
-    "seen, told apart or separated: five standard errors", "derivation: 5^2")
+    "seen or separated: five standard errors", "derivation: 5^2")
 INVISIBLE_PATTERN_SHARE = _row("INVISIBLE_PATTERN_SHARE", 1e-6, "of a pattern",
-    "what rounding leaves of it when the robot's own parameters imitate all of it",
+    "the rounding error left when the robot's own parameters imitate all of it",
     "derivation: the square of 1e-3, the relative error of a finite difference")
 SAMPLES_TO_SHOW_RATE = _row("SAMPLES_TO_SHOW_RATE", 8, "samples",
     "of a pull that show its rate: a jump between two levels has none", "judgement")
@@ -293,7 +293,7 @@ SHORTEST_HOLD = _row("SHORTEST_HOLD", 20.0, "s", "without motion that count as a
 TWO_RATES_RATIO = _row("TWO_RATES_RATIO", 10.0, "ratio", "of the fastest to the slowest pull that counts as two rates",
     "judgement: a decade")
 LEAST_TEMPERATURE_SPREAD = _row("LEAST_TEMPERATURE_SPREAD", 2.0, "K",
-    "of spread in the room: a softening of 0.5 %/K then moves the tip by 1 %", "derivation: 2 K x 0.5 %/K")
+    "of the room's temperature: a softening of 0.5 %/K then moves the tip by 1 %", "derivation: 2 K x 0.5 %/K")
 PULLED_TENDON_SHARE = _row("PULLED_TENDON_SHARE", 0.2, "of the largest command", "a tendon that moves by less was not pulled",
     "judgement")
 STILL_COMMAND_SHARE = _row("STILL_COMMAND_SHARE", 0.02, "of the largest command",
@@ -303,7 +303,7 @@ COMMAND_STEP_SHARE = _row("COMMAND_STEP_SHARE", 0.3, "of a command's range",
     "within one row: a motion takes ten rows or more, a step one or two", "judgement")
 ERROR_AFTER_STEP_RATIO = _row("ERROR_AFTER_STEP_RATIO", 1.5, "ratio",
     "of the error after steps of the command to that elsewhere: 1 where it is noise, to 5 % from 200 rows",
-    "judgement: on three simulated days with a lag or a delay")
+    "judgement: on three simulated sets with a lag or a delay")
 UNLIKELY_PARAMETER_DISTANCE = _row("UNLIKELY_PARAMETER_DISTANCE", 3.0, "standard deviations",
     "from its description, beyond which a parameter is unlikely", "derivation: 0.3 % of healthy ones are")
 
@@ -312,11 +312,11 @@ UNLIKELY_PARAMETER_DISTANCE = _row("UNLIKELY_PARAMETER_DISTANCE", 3.0, "standard
 OVERSTATED_NOISE_RATIO = _row("OVERSTATED_NOISE_RATIO", 3.0, "ratio",
     "of declared noise to the scatter of rows: a camera's noise is declared to a factor of two", "judgement")
 LASTING_DIFFERENCE = _row("LASTING_DIFFERENCE", 1.0, "of the noise",
-    "by which repeats differ throughout; load cells that read elsewhere next time make 0.6 on a bench day without effect (90000)",
+    "by which repeats differ throughout; drift of load cells between them makes 0.6 on a simulated set without effect",
     "judgement")
-RIVAL_SHARE = _row("RIVAL_SHARE", 0.8, "of the largest share", "within trials; effects that take as much are not told apart",
+RIVAL_SHARE = _row("RIVAL_SHARE", 0.8, "of the largest share", "within trials; effects that explain as much cannot be separated",
     "judgement")
-LONG_PAUSE = _row("LONG_PAUSE", 3600.0, "s", "between two trials, after which a robot was left alone or set up anew", "judgement")
+LONG_PAUSE = _row("LONG_PAUSE", 3600.0, "s", "between two trials, after which a robot was left alone or set up again", "judgement")
 
 # ---- words -------------------------------------------------------------------------------------------------------------------
 
@@ -334,28 +334,28 @@ STEP_LEFTOVER_SHARE = _row("STEP_LEFTOVER_SHARE", 0.2, "of the trials' scatter",
     "derivation: a line of slope one less its best step keeps 1/4 of its variance")
 NAMED_ONE_BY_ONE = _row("NAMED_ONE_BY_ONE", 6, "trials or numbers", "named before the rest is counted", "judgement")
 TIP_FORCE_SHARE = _row("TIP_FORCE_SHARE", 0.5, "of what is left",
-    "that a force on the tip must take to be named as a possible cause", "judgement: as LEFT_BY_EFFECTS")
+    "that a force on the tip must explain to be named as a possible cause", "judgement: as LEFT_BY_EFFECTS")
 PROBE_FORCE = _row("PROBE_FORCE", 1e-3, "N", "a force that moves a robot to first order", "derivation: 2 % of the weight of 5.6 g")
-HINT_SHARE = _row("HINT_SHARE", 0.1, "of the error left out", "a known effect must take off to be worth a hint", "judgement")
+HINT_SHARE = _row("HINT_SHARE", 0.1, "of the error left out", "that a known effect must remove to be worth a hint", "judgement")
 
 # ---- the next experiment -----------------------------------------------------------------------------------------------------
 
-MOST_REPEATS = _row("MOST_REPEATS", 50, "runs", "more than that is no advice", "judgement")
-HEAVIEST_PAYLOAD = _row("HEAVIEST_PAYLOAD", 0.03, "kg", "nobody is asked to hang more on a robot than that", "judgement")
-LEAST_PAYLOAD = _row("LEAST_PAYLOAD", 0.01, "kg", "a payload that bends a bench-sized robot", "judgement")
+MOST_REPEATS = _row("MOST_REPEATS", 50, "runs", "a trial that needs more is not recommended", "judgement")
+HEAVIEST_PAYLOAD = _row("HEAVIEST_PAYLOAD", 0.03, "kg", "the heaviest payload that is recommended", "judgement")
+LEAST_PAYLOAD = _row("LEAST_PAYLOAD", 0.01, "kg", "a payload that bends a small robot", "judgement")
 HELD_COMMAND_SHARE = _row("HELD_COMMAND_SHARE", 0.75, "of the largest command",
     "a step that is held, within what was already commanded", "judgement")
 
 # ---- zeros that jump ---------------------------------------------------------------------------------------------------------
 
-TRIALS_AROUND_JUMP = _row("TRIALS_AROUND_JUMP", 8, "trials", "before and after a jump that are compared; more of them wander",
-    "judgement")
+TRIALS_AROUND_JUMP = _row("TRIALS_AROUND_JUMP", 8, "trials",
+    "before and after a jump that are compared; over more of them the mean drifts", "judgement")
 LEAST_JUMP = _row("LEAST_JUMP", 0.5, "sigma", "a smaller jump changes no claim", "judgement: as LARGE_STRUCTURE")
 RIGID_MOTION_SHARE = _row("RIGID_MOTION_SHARE", 0.9, "of a step's square",
     "what a moved camera does to eight markers in a row, of which a turn about the base takes 0.79 at most where it is shifted",
     "derivation: (sum z)^2 / (8 sum z^2), z = 1..8")
-MOST_JUMPS = _row("MOST_JUMPS", 4, "jumps", "more of them in a session: nothing there has a zero", "judgement")
-ROWS_FOR_ZERO = _row("ROWS_FOR_ZERO", 5, "rows", "of a trial from which its zero is taken anew, to compare", "judgement")
+MOST_JUMPS = _row("MOST_JUMPS", 4, "jumps", "with more of them in a session they are not jumps of a zero", "judgement")
+ROWS_FOR_ZERO = _row("ROWS_FOR_ZERO", 5, "rows", "of a trial, from which its own zero is taken for comparison", "judgement")
 SIGNIFICANT_STANDARD_ERRORS = _row("SIGNIFICANT_STANDARD_ERRORS", 3.0, "standard errors",
     "of several angles those that jumped by more are named", "judgement")
 # fmt: on

@@ -35,7 +35,7 @@ def left_after(ratio: float) -> np.ndarray:
 def test_what_is_left_after_leaps_is_said_with_how_often_and_how_long() -> None:
     (words,) = said(STEPS, left_after(2.0))
     assert words.startswith("actuator lag: 6 times a command goes more than 30 % of its range within one row of 0.5 s")
-    assert "2.0 times what is left elsewhere" in words
+    assert "2.0 times that elsewhere" in words
     assert "log commands as often" in words
     (words,) = said(STEPS, left_after(2.0), "time_delay")
     assert words.startswith("time delay")

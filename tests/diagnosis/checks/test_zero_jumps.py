@@ -356,13 +356,13 @@ def test_a_jump_is_said_with_its_size_its_time_and_the_trials_beside_it() -> Non
     assert f"within {name[4]}, {within.since - begin[4]:.1f} s from its start" in inside
     joints = Jump("angle", end[3], begin[4], (0, 1))
     (sure,) = said(day, joints, np.deg2rad(2.0), 2e-3)  # 35 and 2 standard errors
-    assert "the zero jumped of joint_1_angle by 2.00 deg, between" in sure
+    assert "the zero jumped: joint_1_angle by 2.00 deg, between" in sure
     (neither,) = said(day, joints, 1e-3, 2e-3)
     assert "joint_1_angle by 0.06 deg, joint_2_angle by 0.11 deg" in neither
     tip = replace(day, outputs=tuple(o for o in day.outputs if o.index == 7))
-    assert "one point does not tell" in said(tip, Jump("marker", end[3], begin[4]), *np.zeros(6))[0]
+    assert "one point cannot show which" in said(tip, Jump("marker", end[3], begin[4]), *np.zeros(6))[0]
     _, lost = said(day, Jump("marker", end[3], begin[6]), *np.zeros(6))
-    assert lost.startswith(f"{name[4]}, {name[5]}: run between the two")
+    assert lost.startswith(f"{name[4]}, {name[5]}: run between these two rows")
 
 
 def test_a_trials_zero_is_taken_anew_from_its_first_rows() -> None:

@@ -83,6 +83,6 @@ def test_a_joints_zero_that_jumps_is_named_and_kept_out_of_effects_and_of_the_tw
     ]
     found = diagnose(replace(recording, trials=tuple(moved)), Twin.of("two_link"), Settings(jobs=1))
     assert found.verdict == "noise"
-    assert any("the zero jumped of joint_1_angle by 2.0" in n for n in found.notices)
+    assert any("the zero jumped: joint_1_angle by 2.0" in n for n in found.notices)
     assert not jumps_of(found.twin)
     assert found.errors.after["angle"] < 1.2 * found.errors.floor["angle"], "sealed trials are predicted with the zero they have"

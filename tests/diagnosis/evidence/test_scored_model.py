@@ -143,7 +143,7 @@ def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.Monke
             assert creep[name] == table[name].value + (0.0 if name in creep.inactive_when_off else table[name].step)
         own = [i for i, f in enumerate(member.fit.model.free) if f.effect is None]
         np.testing.assert_array_equal(how["J"], member.fit.J[:, own])
-    assert said == 2 * [f"fuller law of {CREEP}"]
+    assert said == 2 * [f"extended equation of {CREEP}"]
 
 
 def test_a_fuller_law_is_fitted_from_each_start_and_the_best_fit_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,7 +164,7 @@ def test_a_fuller_law_is_not_tried_twice_nor_beyond_the_time_nor_without_its_par
     assert with_extended_law(study(), full, 12.0) is full
     late = study(Budget(-1.0))
     assert with_extended_law(late, plain, 12.0) is plain
-    assert late.budget.untried == [f"the fuller law of {CREEP}"]
+    assert late.budget.untried == [f"the extended equation of {CREEP}"]
     monkeypatch.setattr(catalogue()[CREEP], "extended_needs", frozenset({"wings"}))
     assert with_extended_law(study(), plain, 12.0) is plain
     assert len(fits.asked) == 1

@@ -165,7 +165,7 @@ def test_a_bend_at_one_place_is_found_there(plan: PreparedRecording, at: int) ->
 
 def test_a_bend_at_the_base_is_the_clamp(plan: PreparedRecording) -> None:
     said = describe_location(plan, *bent(plan, (0, 0.01)))
-    assert said == " The fitted robot is off from its base on, as a whole: look at the clamp and the camera."
+    assert said == " The fitted robot is off from its base on, as a whole: check the clamp and the camera."
 
 
 def test_of_two_bends_the_larger_is_the_place_if_its_jumps_have_twice_the_square(plan: PreparedRecording) -> None:
@@ -243,6 +243,6 @@ def test_a_wave_is_taken_out_of_noise_whatever_its_phase(plan: PreparedRecording
 
 
 def test_the_nearest_effect_is_a_hint_only_where_it_helps() -> None:
-    said = " Of the known effects base tilt with contact comes nearest, but takes only 30 % off the error on trials left out."
+    said = " Of the known effects base tilt with contact comes nearest, but explains only 30 % of the error on left-out trials."
     assert nearest(("base_tilt", "contact"), 0.3) == said
     assert nearest(("base_tilt",), 0.05) == nearest(("base_tilt",), float("nan")) == ""

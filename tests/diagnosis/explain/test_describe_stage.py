@@ -101,7 +101,7 @@ def test_what_is_explained_leaves_noise_and_its_doubts(verdict: str, monkeypatch
     found = world.said()
     assert found.words == "What is left looks like noise (smooth part 0.70 sigma). a or b."
     world.beyond_accuracy = 0.2
-    own = "0.70 sigma, 0.20 beyond what the robot's description is good for"
+    own = "0.70 sigma, 0.20 beyond the description's accuracy"
     assert world.said().words == f"What is left looks like noise (smooth part {own}). a or b."
     assert found.notices == ("unlikely", "repeats", "leaps of [3]", "far")
     assert (found.strongest, found.worst_channel) == ((("T1", 0.5), ("T2", 0.1)), "worst of (2, 2)")

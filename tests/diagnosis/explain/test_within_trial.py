@@ -55,11 +55,11 @@ def test_what_happens_within_trials_is_named_under_what_lasts_through_them(effec
     assert study.objective.whitener.noise.source == DECLARED
     (said,) = repeatability(study, found)
     if effect is None:
-        assert "as much as rows scatter by" in said
+        assert "no more than rows scatter by" in said
     elif effect == "magnet":
-        assert "of which no effect known here takes half" in said
+        assert "of which no known effect explains half" in said
     else:
-        assert f"of whose square {effect.replace('_', ' ')} takes" in said
+        assert f"of whose square {effect.replace('_', ' ')} explains" in said
 
 
 def test_what_lasts_through_a_trial_changes_nothing() -> None:
@@ -146,16 +146,16 @@ def test_of_a_law_for_every_tendon_those_that_would_go_the_other_way_stay_off() 
 @pytest.mark.parametrize(
     ("size", "shares", "said"),
     [
-        (1.04, (("tendon_friction", 0.9),), "as much as rows scatter by"),
-        (1.05, (("tendon_friction", 0.49),), "of which no effect known here takes half"),
-        (1.05, (), "of which no effect known here takes half"),
+        (1.04, (("tendon_friction", 0.9),), "no more than rows scatter by"),
+        (1.05, (("tendon_friction", 0.49),), "of which no known effect explains half"),
+        (1.05, (), "of which no known effect explains half"),
         (
             1.05, (("tendon_friction", 0.51), ("contact", 0.40)),
-            "of whose square tendon friction takes 51 % on trials left out in turn",
+            "of whose square tendon friction explains 51 % on left-out trials",
         ),
         (
             2.0, (("tendon_friction", 0.6), ("contact", 0.49)),
-            "of whose square tendon friction takes 60 % on trials left out in turn; told apart by nothing here: contact 49 %",
+            "of whose square tendon friction explains 60 % on left-out trials; these data cannot separate it from contact 49 %",
         ),
     ],
 )  # fmt: skip

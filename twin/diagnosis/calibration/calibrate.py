@@ -1,4 +1,4 @@
-"""Stage `calibrate`: the noise of the fitted trials, and the robot's own uncertain parameters fitted to them."""
+"""Stage `calibrate`: estimate the noise of the fitted trials and fit the robot's own uncertain parameters to them."""
 
 from collections.abc import Sequence
 
@@ -29,9 +29,10 @@ def calibrate(
     settings: Settings,
     progress: Progress,
 ) -> tuple[FitContext, ScoredModel, list[str]]:
-    """The study of all trials but the `sealed` ones, the calibrated robot, and what had to be assumed or left out, in words.
+    """Return the fit context of the fitted trials, the calibrated robot, and assumptions and omissions in words.
 
-    `nominal` (n_k, n_output) is the uncalibrated prediction. From here on what was measured on sealed trials is not there.
+    `nominal` (n_k, n_output) is the prediction before calibration. From here on the measurements of the `held_out` trials are
+    absent.
     """
     budget = Budget(settings.budget)
     fitted = [k for k in range(len(prepared.inputs)) if k not in held_out]
@@ -44,8 +45,10 @@ def calibrate(
 
 
 def _with_jumps(context: FitContext, base: Fit) -> Fit:
-    """The calibrated robot, fitted again beside the zeros that jump, one after the other; where there are more than `MOST_JUMPS`,
-    they are no zeros and none is taken."""
+    """Return the calibrated robot, fitted again with each zero that jumps, one after the other.
+
+    With more than `MOST_JUMPS` of them they are no jumps of a zero, and none is fitted.
+    """
     jumps: list[Jump] = []
     found = base
     while (jump := next_jump(context, found, jumps)) is not None:
@@ -55,7 +58,7 @@ def _with_jumps(context: FitContext, base: Fit) -> Fit:
         more = sorted([*jumps, jump], key=lambda j: j.since)
         try:
             fitted = fit(context.objective, with_zero_jumps(base.model, more), near=base.evaluation, refresh=True)
-        except SolveError:  # a robot bent by a jump that is none: a neighbour of it has no equilibrium
+        except SolveError:  # a false jump bent the robot: a neighbouring one has no equilibrium
             break
         if not stands(context, fitted, jump) or may_be_clamp(context, found, fitted, jump):
             break

@@ -1,8 +1,8 @@
-"""The robot's own uncertain parameters, and those of effects in force, fitted to the trials set aside for fitting.
+"""The fit of the robot's own uncertain parameters, and those of effects in force, to the fitted trials.
 
-Minimises  sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2  over x, the parameters in units of their `step`, within bounds:
-Gauss-Newton on derivatives by finite differences. A difference costs a fraction of a prediction, because a
-changed twin is solved from the equilibria and tangents of the unchanged one.
+Minimise sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2 over x, the parameters in units of their `step`, within bounds, by
+Gauss-Newton steps on finite-difference derivatives. A difference costs a fraction of a prediction, because a changed twin is solved
+from the equilibria and tangents of the unchanged one.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from twin.robots import Robot
 
 DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
-AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end of it, it stands there
+AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
 MOST_FIT_STEPS = 12  # at most, of a fit
-TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
-# Of an effect's amplitude: what two codes of one law make of it. On 69 days of `tools.benchmarks.diagnosis.attribution` they were
-# off by 0.5 to 2 % where noise and the trials' disagreement gave errors of 0.2 to 0.7 %.
+TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
+# Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
+# `tools.benchmarks.diagnosis.attribution` it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
 LAW_ACCURACY = 0.02
 UNFIXED_SPREAD_SHARE = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
 
@@ -43,7 +43,7 @@ Unsolved = Literal["raise", "zeros"]
 
 @dataclass(frozen=True)
 class Free:
-    """One parameter a fit may move: of the robot (`effect` None) or of an effect."""
+    """One free parameter of a fit: of the robot (`effect` None) or of an effect."""
 
     effect: str | None
     parameter: Parameter
@@ -55,14 +55,14 @@ class Free:
 
 @dataclass(frozen=True)
 class Model:
-    """A twin and which of its parameters are free."""
+    """A twin and its free parameters."""
 
     twin: Twin
     free: tuple[Free, ...]
 
     @staticmethod
     def base(robot: Robot, twin: Twin | None = None) -> Model:
-        """The robot as described with its nuisance parameters free, and what is uncertain of the effects it is known to have."""
+        """Return the robot as described, with its nuisance parameters and the uncertain ones of its known effects free."""
         twin = twin or Twin.of(robot)
         known = {e.id for e in twin.effects}
         free = (*(Free(None, p) for p in robot.nuisance), *(Free(e, p) for e, p in robot.uncertain if e in known))
@@ -74,11 +74,11 @@ class Model:
         return next(e for e in self.twin.effects if e.id == free.effect)[free.parameter.name]
 
     def vector(self) -> np.ndarray:
-        """Free parameters (n_free,) in units of their steps."""
+        """Return the free parameters (n_free,) in units of their steps."""
         return np.array([self.value(f) / f.parameter.step for f in self.free])
 
     def at(self, x: np.ndarray) -> Model:
-        """The same model with its free parameters at x (in steps)."""
+        """Return the same model with its free parameters at x (in steps)."""
         values = dict(self.twin.values)
         effects: dict[str, dict[str, float]] = {e.id: dict(e.values) for e in self.twin.effects}
         for f, v in zip(self.free, x, strict=True):
@@ -88,7 +88,7 @@ class Model:
         return Model(replace(self.twin, values=values, effects=built), self.free)
 
     def with_effect(self, identifier: str, values: Mapping[str, float], names: Sequence[str], n_tendon: int) -> Model:
-        """This model plus an effect, its named parameters free."""
+        """Return this model with one effect more, its named parameters free."""
         law = effect_class(identifier)
         table = {p.name: p for p in scaled_parameters(law, n_tendon, self.twin.robot.size)}
         effects = (*self.twin.effects, scaled_effect(law, values, n_tendon, self.twin.robot.size))
@@ -110,14 +110,14 @@ class Evaluation:
 
 
 class Objective:
-    """Residuals and derivatives of models on the listed trials of a bench, white under `whitener`."""
+    """The residuals, whitened by `whitener`, and derivatives of models on the listed trials of a prepared recording."""
 
     def __init__(self, prepared: PreparedRecording, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
         self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
 
     def of(self, which: Sequence[int]) -> Objective:
-        """The same of some of its trials alone, by their positions."""
+        """Return the objective of some of its trials, given by their positions."""
         return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
 
     def predict(
@@ -133,12 +133,14 @@ class Objective:
         return found
 
     def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
-        """The evaluation of a model whose |z|^2 is `most` at most, else None, without a look at the trials that are left then."""
+        """Return the evaluation of a model whose |z|^2 is `most` at most, else None.
+
+        The prediction ends with the trial that exceeds `most`.
+        """
         at, traces = {k: i for i, k in enumerate(self.trials)}, {}
         raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
-        n = (
-            1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))
-        )  # a body that creeps remembers the trials before
+        # A body that creeps has a memory of the trials before.
+        n = 1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))
         shares = [self.trials[i::n] for i in range(n)]
         total = np.zeros(n)
 
@@ -156,7 +158,10 @@ class Objective:
         return None if total.sum() > most else Evaluation(model, dict(sorted(traces.items())), raw, np.concatenate(z))
 
     def cut_off(self, twin: Twin) -> np.ndarray:
-        """Its square is what the laws cut off of the readings' noise near slack (`Whitener.cut_off`), flat (n_row n_tendon,)."""
+        """Return the root of the input noise that effects clip near zero tension, flat (n_row n_tendon,).
+
+        Its square is `Whitener.clipped_input_noise`.
+        """
         pulled, cut = self.prepared.driven_by(Drive.TENSION), []
         for i, k in enumerate(self.trials):
             tension = np.where(pulled, twin.effect_chain.command(self.prepared.inputs[k].signals).tension, np.inf)
@@ -169,8 +174,11 @@ class Objective:
     def columns(
         self, at: Evaluation, models: Sequence[tuple[Model, float]], *, once: bool = False, unsolved: Unsolved = "raise"
     ) -> np.ndarray:
-        """White change of the residual per unit, (n, n_model), for neighbouring models and the size of their difference;
-        with `once` to first order in it. What has no equilibrium raises SolveError, or has a column of `"zeros"`."""
+        """Return the whitened change of the residual per unit (n, n_model), for neighbouring models and the difference of each.
+
+        `once` solves to first order in the difference. A model without an equilibrium raises SolveError, or has a column of zeros
+        with `unsolved` "zeros".
+        """
 
         def column(model: Model, size: float) -> np.ndarray:
             if _same_simulation(at.model.twin, model.twin):
@@ -190,7 +198,7 @@ class Objective:
         return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
-        """dz/dx (n, len(which)) for the listed free parameters, x in steps."""
+        """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
         x = at.model.vector()
         neighbours = []
         for i in which:
@@ -203,7 +211,7 @@ class Objective:
 
 
 def _same_simulation(a: Twin, b: Twin) -> bool:
-    """Whether two twins differ in what sensors report of outputs only, so that one simulation serves both."""
+    """Return whether two twins differ only in what sensors report, so that one simulation serves both."""
 
     def acting(t: Twin) -> list[Effect]:
         return [e for e in t.effects if e.acts_on_robot]
@@ -213,8 +221,11 @@ def _same_simulation(a: Twin, b: Twin) -> bool:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model. `J` (n, n_free) whitened derivatives at the solution, x in steps; `cost` = |z|^2 + prior terms; `systematic`
-    (n_free,) SI what effects that the model lacks may have put into its parameters, where that was asked."""
+    """A fitted model.
+
+    `J` (n, n_free): whitened derivatives at the solution, x in steps. `cost` = |z|^2 + prior terms. `systematic` (n_free,) SI:
+    possible errors of the parameters from effects that the model lacks, where estimated.
+    """
 
     evaluation: Evaluation
     J: np.ndarray
@@ -230,12 +241,14 @@ class Fit:
         return self.evaluation.z
 
     def information(self) -> np.ndarray:
-        """Posterior information (n_free, n_free) in steps: J'J plus that of the priors."""
+        """Return the posterior information (n_free, n_free) in steps: J'J plus that of the priors."""
         return self.J.T @ self.J + np.diag(prior_weight(self.model) ** 2)
 
     def std(self) -> np.ndarray:
-        """Standard errors (n_free,) in SI: by the noise, or by how far trials disagree, whichever is more. A law that is not
-        quite the robot's errs alike all through a trial, and from trial to trial otherwise."""
+        """Return standard errors (n_free,) in SI: by the noise, or by the disagreement of trials, whichever is larger.
+
+        An equation that is slightly wrong errs alike throughout a trial and differently from trial to trial.
+        """
         noise, free = self._by_noise(), ~self.at_bound()
         step = np.array([f.parameter.step for f in self.model.free])
         J, each = self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
@@ -245,27 +258,32 @@ class Fit:
         return noise
 
     def _by_noise(self) -> np.ndarray:
-        """(n_free,) in SI, widened where the residual is larger than the noise it was divided by."""
+        """Return standard errors (n_free,) in SI by the noise, enlarged where the residual exceeds that noise."""
         inflation = max(1.0, float(self.z @ self.z) / max(self.z.size - len(self.model.free), 1))
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information())), 0.0) * inflation)
         return spread * np.array([f.parameter.step for f in self.model.free])
 
     def correlation(self) -> tuple[tuple[str, ...], np.ndarray]:
-        """Labels of the free parameters that the data or priors tell, and how their errors go together, (p, p): the inverse
-        information, scaled to a unit diagonal."""
-        covariance, told = np.linalg.pinv(self.information()), ~unidentifiable(self.information())
+        """Return the labels of the free parameters that data or priors determine, and the correlation (p, p) of their errors.
+
+        The correlation is the inverse information, scaled to a unit diagonal.
+        """
+        covariance, identified = np.linalg.pinv(self.information()), ~unidentifiable(self.information())
         size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-        labels = tuple(f.label for f, t in zip(self.model.free, told, strict=True) if t)
-        return labels, (covariance / np.outer(size, size))[np.ix_(told, told)]
+        labels = tuple(f.label for f, t in zip(self.model.free, identified, strict=True) if t)
+        return labels, (covariance / np.outer(size, size))[np.ix_(identified, identified)]
 
     def effective_parameters(self) -> float:
-        """How many parameters the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
+        """Return the number of parameters that the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
         data = self.J.T @ self.J
         return float(np.trace(solve(self.information(), data)))
 
     def fitted(self, effect: str | None) -> dict[str, FittedValue]:
-        """Values and standard errors of the robot's (None) or an effect's free parameters; no error where nothing tells. Amplitudes
-        of effects are no better known than the form of a law, `LAW_ACCURACY`, which no data of one robot tell."""
+        """Return the values and standard errors of the free parameters of the robot (None) or of an effect.
+
+        A parameter that nothing determines has no standard error. An amplitude is known no better than its equation,
+        `LAW_ACCURACY`, which no data of one robot reveal.
+        """
         blind = unidentifiable(self.information())
         spread = self.std() if self.systematic is None else np.hypot(self.std(), self.systematic)
         return {
@@ -275,8 +293,11 @@ class Fit:
         }
 
     def _form(self, free: Free) -> float:
-        """What the form of a law is good for, of its amplitude (SI), which is counted from OFF or from zero, whichever is less (a
-        limit that is never reached is OFF); nothing of where and when it acts, or of the robot's own."""
+        """Return the error (SI) of an amplitude from the form of its effect's equation; zero for other parameters.
+
+        The amplitude counts from OFF or from zero, whichever is nearer: a limit that is never reached is OFF. Parameters that say
+        where and when an effect acts, and the robot's own, have no such error.
+        """
         law = next((e for e in self.model.twin.effects if e.id == free.effect), None)
         if law is None or free.parameter.name in law.inactive_when_off:
             return 0.0
@@ -284,13 +305,15 @@ class Fit:
         return LAW_ACCURACY * min(abs(value - free.parameter.value), abs(value))
 
     def at_bound(self) -> np.ndarray:
-        """Which free parameters (n_free,) stand at an end of their range."""
+        """Return which free parameters (n_free,) are at an end of their range."""
         at = [(self.model.value(f), f.parameter) for f in self.model.free]
         return np.array([min(x - p.low, p.high - x) < AT_BOUND_SHARE * (p.high - p.low) for x, p in at], bool)
 
     def unfixed(self) -> list[str]:
-        """Labels of the parameters the data do not fix: their standard error stays near their prior's, or nothing tells them, or
-        not from each other."""
+        """Return the labels of the parameters that the data do not fix.
+
+        Their standard error stays near their prior's, or nothing determines them, or nothing separates them from each other.
+        """
         out = []
         for f, s, b in zip(self.model.free, self._by_noise(), unidentifiable(self.information()), strict=True):
             if b or (f.parameter.std is not None and s > UNFIXED_SPREAD_SHARE * f.parameter.std):
@@ -299,20 +322,23 @@ class Fit:
 
 
 def prior_weight(model: Model) -> np.ndarray:
-    """1 / std in steps, zero where nothing is believed beforehand."""
+    """Return 1 / std (n_free,) in steps, zero where there is no prior."""
     return np.array([0.0 if f.parameter.std is None else f.parameter.step / f.parameter.std for f in model.free])
 
 
 def prior_pull(model: Model) -> np.ndarray:
-    """Half the gradient (n_free,) of the priors' terms, per step."""
+    """Return half the gradient (n_free,) of the prior terms, per step."""
     prior = np.array([f.parameter.value / f.parameter.step for f in model.free])
     return prior_weight(model) ** 2 * (model.vector() - prior)
 
 
 @dataclass(frozen=True)
 class StopRule:
-    """When a fit ends before its last step: where a step falls by less than `tolerance` of its cost or by less than `worth`, and
-    where it would not `beat` a cost though all further steps fell by as much as its last."""
+    """The rule that ends a fit before its last step.
+
+    A fit ends where a step reduces its cost by less than `tolerance` of it or by less than `worth`, and where it would not `beat` a
+    cost even if all further steps gained as much as the last.
+    """
 
     tolerance: float = 1e-5
     worth: float = 0.0
@@ -328,9 +354,9 @@ def fit(
 ) -> Fit:  # fmt: skip
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
-    Derivatives for the robot's own parameters, nearly linear, are taken once, or come as `J`, the whitened columns (n, m) of the
-    first m free parameters from a neighbouring fit; those for effects are taken anew at every step. `refresh` takes them all again
-    at the solution, for standard errors and screening. Raises SolveError where the model cannot be solved at its start.
+    Derivatives for the robot's own parameters, nearly linear, are computed once, or given as `J`, the whitened columns (n, m) of
+    the first m free parameters from a neighbouring fit. Those for effects are computed at every step. `refresh` computes all again
+    at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
@@ -348,15 +374,15 @@ def fit(
         better, whole, enough = None, damping, max(stop.tolerance * now, stop.worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, penalty.low - x, penalty.high - x)
-            foretold = -float(2.0 * g @ d + d @ H @ d)
-            if damping > whole and foretold < enough:  # a step that failed is not shortened until it is worth nothing
+            predicted_fall = -float(2.0 * g @ d + d @ H @ d)
+            if damping > whole and predicted_fall < enough:  # a failed step is shortened while it still gains enough
                 break
             better = _improved(objective, at, x + d, now - penalty.besides(x + d))
             damping *= 1.0 if better else 10.0
         if better is None:
             break
         fall, at, now = now - penalty.cost(better), better, penalty.cost(better)
-        if fall > TRUSTED_FALL_SHARE * foretold:
+        if fall > TRUSTED_FALL_SHARE * predicted_fall:
             damping = max(0.1 * damping, 1e-6)
         if fall < enough or now - left * fall > stop.beat:
             break
@@ -367,8 +393,11 @@ def fit(
 
 @dataclass(frozen=True)
 class _Penalty:
-    """What is fitted besides |z|^2, of free parameters x (n_free,) in steps: the priors' terms and, of laws of load cells
-    (`silencing`, positions), the noise that they cut off near slack: else they lean to where tendons at rest fall silent."""
+    """The terms of the cost besides |z|^2, of free parameters x (n_free,) in steps.
+
+    The prior terms and, for load-cell effects (`silencing`, positions), the input noise that they clip near zero tension. Without
+    the latter the fit drifts to values that make resting tendons slack.
+    """
 
     objective: Objective
     model: Model
@@ -401,7 +430,7 @@ class _Penalty:
         return float(e.z @ e.z) + self.besides(e.model.vector())
 
     def normal_equations(self, x: np.ndarray, columns: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Half the cost's second derivatives (n_free, n_free) of Gauss and Newton, and half its slope (n_free,)."""
+        """Return half the Gauss-Newton Hessian (n_free, n_free) of the cost, and half its gradient (n_free,)."""
         cut = self.cut_off(x)
         D = np.zeros((cut.size, x.size))
         for i in self.silencing:
@@ -411,7 +440,7 @@ class _Penalty:
 
 
 def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """argmin 1/2 d'Hd + g'd within low <= d <= high."""
+    """Return argmin 1/2 d'Hd + g'd within low <= d <= high."""
     L = np.linalg.cholesky(H + 1e-12 * np.trace(H) * np.eye(len(g)))
     d = -solve(H, g)
     if np.all((d >= low) & (d <= high)):
@@ -421,7 +450,7 @@ def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarra
 
 
 def _improved(objective: Objective, at: Evaluation, x: np.ndarray, now: float) -> Evaluation | None:
-    """The evaluation at x if its |z|^2 is below `now`, else None; a model without equilibrium is not better."""
+    """Return the evaluation at x if its |z|^2 is below `now`, else None, as for a model without an equilibrium."""
     try:
         moved = objective.within(now, at.model.at(x), at.traces)
     except SolveError:

@@ -1,4 +1,4 @@
-"""What every fit of a diagnosis minimises: the residual of the fitted trials made white by a noise found from the data."""
+"""The objective of every fit: the residual of the fitted trials, whitened by a noise model that is estimated from the data."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ from twin.prediction.twin import Twin
 def objective_of(
     prepared: PreparedRecording, twin: Twin, fitted: list[int], settings: Settings
 ) -> tuple[Model, Objective, list[str]]:
-    """A first calibration under a guessed noise, and the objective every later fit uses."""
+    """Return a first calibration under a rough noise model, the objective of every later fit, and notices."""
     measured = [prepared.measured[k] for k in fitted]
     command = [prepared.inputs[k].command for k in fitted]
     rough = np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
@@ -32,35 +32,35 @@ def objective_of(
     start = fit(rough_fit, Model.base(twin.robot, twin), stop=StopRule(tolerance=1e-3))
     unmeasured = rough_fit.predict(start.model.twin, start.evaluation.traces)[1]
     taut = sensitivity(_unslackened(prepared), fitted, start.model.twin, unmeasured, start.evaluation.traces)
-    G = [g * _felt(prepared, k)[:, None, :] for g, k in zip(taut, fitted, strict=True)]
+    G = [g * _taut_share(prepared, k)[:, None, :] for g, k in zip(taut, fitted, strict=True)]
     noise, notes = estimate_noise(prepared, fitted, start.evaluation.raw, G)
     return start.model, Objective(prepared, fitted, Whitener(noise, measured, G, command, taut), settings.jobs), notes
 
 
 def _unslackened(prepared: PreparedRecording) -> PreparedRecording:
-    """With no reading of a tension below zero: every tendon answers to more of it."""
+    """Return the recording with no tension reading below zero, so that every tendon responds to more tension."""
     pulled = prepared.driven_by(Drive.TENSION)
     return replace(
         prepared, inputs=tuple(replace(i, command=np.where(pulled, np.maximum(i.command, 0.0), i.command)) for i in prepared.inputs)
     )
 
 
-def _felt(prepared: PreparedRecording, k: int) -> np.ndarray:
-    """(n_k, n_tendon) of a step in a reading, that of `sensitivity`, the share that makes a tendon pull: none far below zero."""
+def _taut_share(prepared: PreparedRecording, k: int) -> np.ndarray:
+    """Return the share (n_k, n_tendon) of `sensitivity`'s step that makes a tendon pull; zero far below zero tension."""
     below = np.clip(1.0 + prepared.inputs[k].command / (READING_STEP * prepared.reading), 0.0, 1.0)
     return np.where(prepared.driven_by(Drive.TENSION), below, 1.0)
 
 
 def noise_under(objective: Objective, found: Evaluation) -> Noise:
-    """The noise of the fitted trials, found anew under a model with its effects. Raises SolveError as `sensitivity`.
+    """Estimate the noise of the fitted trials again, under a model with its effects. Raise SolveError as `sensitivity`.
 
-    The first calibration knows no effect: what ages, or remembers, between two repeats of a trial is noise to it.
+    The first calibration has no effects, and takes ageing or memory between two repeats of a trial for noise.
     """
     return estimate_noise(objective.prepared, objective.trials, found.raw, sensitivity_at(objective, found))[0]
 
 
 def sensitivity_at(objective: Objective, found: Evaluation) -> list[np.ndarray]:
-    """`sensitivity` of a model that was evaluated."""
+    """Return the `sensitivity` of an evaluated model."""
     prepared, trials, twin = objective.prepared, objective.trials, found.model.twin
     predicted = [found.traces[k].outputs(twin, prepared) for k in trials]
     return sensitivity(prepared, trials, twin, predicted, found.traces)
@@ -73,22 +73,22 @@ def sensitivity(
     predicted: Sequence[np.ndarray],
     near: Mapping[int, Trace] | None = None,
 ) -> list[np.ndarray]:
-    """dy/du (n_k, n_output, n_tendon) SI: the prediction's answer to a constant change of each driving reading.
+    """Return dy/du (n_k, n_output, n_tendon) SI: the prediction's response to a constant change of each driving reading.
 
-    A spring averages the errors of its current over its time constant tau: of white ones from row to row, dt apart, it feels
-    sqrt(dt / (2 tau)) of a constant one.
+    A spring averages the errors of its current over its time constant tau. White errors from row to row, dt apart, have sqrt(dt /
+    (2 tau)) of the influence of a constant one.
     """
     out = [np.zeros((*y.shape, prepared.n_tendon)) for y in predicted]
-    felt = np.ones((len(out), prepared.n_tendon))
+    share_of_constant = np.ones((len(out), prepared.n_tendon))
     if Drive.CURRENT in prepared.drives:
         rows = np.array([[np.median(np.diff(prepared.inputs[k].time))] for k in trials])
         averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * thermal_time_constant(prepared.robot.springs(prepared.n_tendon)))))
-        felt = np.where(prepared.driven_by(Drive.CURRENT), averaged, felt)
+        share_of_constant = np.where(prepared.driven_by(Drive.CURRENT), averaged, share_of_constant)
     for t in range(prepared.n_tendon):
         step = READING_STEP * prepared.reading[t]
         push = step * np.eye(prepared.n_tendon)[t]
         moved = replace(prepared, inputs=tuple(replace(i, command=i.command + push) for i in prepared.inputs))
         traces = simulate(twin, moved, trials=trials, options=SolveOptions(near or {}))
-        for G, y, trace, share in zip(out, predicted, traces, felt[:, t], strict=True):
+        for G, y, trace, share in zip(out, predicted, traces, share_of_constant[:, t], strict=True):
             G[:, :, t] = share * (trace.outputs(twin, prepared) - y) / step
     return out

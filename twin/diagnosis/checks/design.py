@@ -1,4 +1,4 @@
-"""What an experiment lacks. An effect declares what it is hidden without (`Effect.hidden_without`)."""
+"""The shortcomings of an experiment's design. An effect declares what it is hidden without (`Effect.hidden_without`)."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def shortcomings(prepared: PreparedRecording) -> list[DataNeed]:
 
 
 def pulled(inputs: Inputs, top: float) -> list[int]:
-    """The tendons that move in a trial, by more than `PULLED_TENDON_SHARE` of the largest command `top`."""
+    """Return the tendons that move in a trial by more than `PULLED_TENDON_SHARE` of the largest command `top`."""
     return [int(t) for t in np.flatnonzero(np.ptp(inputs.command, axis=0) > PULLED_TENDON_SHARE * top)]
 
 
 def rates(inputs: Inputs, top: float) -> list[float]:
-    """How fast each tendon is pulled that moves: the median slope of its moving samples."""
+    """Return the rate at which each moving tendon is pulled: the median slope of its moving samples."""
     slope = np.abs(np.diff(inputs.command, axis=0)) / np.diff(inputs.time)[:, None]
     found = []
     for t in pulled(inputs, top):
@@ -62,7 +62,7 @@ def rates(inputs: Inputs, top: float) -> list[float]:
 
 
 def longest_rest(inputs: Inputs, top: float) -> float:
-    """The longest stretch (s) of a trial in which nothing moves."""
+    """Return the longest stretch (s) of a trial without motion."""
     still = np.abs(np.diff(inputs.command, axis=0)).max(axis=1) < STILL_COMMAND_SHARE * top
     best, since = 0.0, None
     for k, s in enumerate(still):
@@ -75,8 +75,10 @@ def longest_rest(inputs: Inputs, top: float) -> float:
 
 
 def _ordered(prepared: PreparedRecording) -> bool:
-    """Whether trials come in blocks, of one payload or of one tendon pulled most: fewer changes from trial to trial than half of
-    what chance would give."""
+    """Return whether trials come in blocks of one payload, or of one tendon that is pulled most.
+
+    They do if the label changes between neighbouring trials less than half as often as by chance.
+    """
     return _blocked([i.loads.payload for i in prepared.inputs]) or _blocked(
         [int(np.argmax(np.ptp(i.command, axis=0))) for i in prepared.inputs]
     )

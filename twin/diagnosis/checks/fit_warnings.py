@@ -1,33 +1,33 @@
-"""What a fit says against itself, in words."""
+"""Warnings about a fit, in words."""
 
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.thresholds import NAMED_ONE_BY_ONE, UNLIKELY_PARAMETER_DISTANCE
 
 
 def unlikely(found: Fit) -> list[str]:
-    """The robot's own parameters that were driven far from their description, or to an end of their range, in words."""
-    said = []
+    """Return, in words, the robot's own parameters that are far from their description or at an end of their range."""
+    warnings = []
     for free, ended in zip(found.model.free, found.at_bound(), strict=True):
         p = free.parameter
         value = found.model.twin.values.get(p.name, p.value)
         if free.effect is not None or not p.std:
             continue
         if ended:
-            said.append(
+            warnings.append(
                 f"{p.name} came out at an end of its range ({value:.4g} {p.unit}, allowed {p.low:.4g} to {p.high:.4g}): the true "
                 "one may lie beyond it, and effects imitate the difference; widen the range in robot.toml if it may"
             )
         elif abs(value - p.value) > UNLIKELY_PARAMETER_DISTANCE * p.std:
             how = abs(value - p.value) / p.std
-            said.append(
+            warnings.append(
                 f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "
-                f"{p.value:.4g}): check it, or something else hides in it"
+                f"{p.value:.4g}): check it; it may hide another error"
             )
-    return said
+    return warnings
 
 
 def far_from_description(found: Fit) -> str:
-    """All of them in one sentence, for the verdict; empty where there are none."""
+    """Return all of them in one sentence, for the verdict; empty where there are none."""
     names = [words.partition(" ")[0] for words in unlikely(found)]
     if not names:
         return ""
@@ -41,15 +41,17 @@ def far_from_description(found: Fit) -> str:
 
 
 def strained(found: Fit) -> list[str]:
-    """Effects whose parameter, one that may go either way, ended at an end of its range, or whose values nothing of that name has,
-    in words: another law is behind them."""
+    """Return, in words, effects with a signed parameter at an end of its range, or with implausible values.
+
+    Such an effect imitates another cause.
+    """
     reasons = ((e.id, e.why_implausible()) for e in found.model.twin.effects)
-    said = [f"{effect.replace('_', ' ')}: {why}" for effect, why in reasons if why]
+    warnings = [f"{effect.replace('_', ' ')}: {why}" for effect, why in reasons if why]
     for free, ended in zip(found.model.free, found.at_bound(), strict=True):
         p, value = free.parameter, found.model.value(free)
         if ended and free.effect is not None and p.low == -p.high:
-            said.append(
+            warnings.append(
                 f"{free.effect.replace('_', ' ')}: {p.name.replace('_', ' ')} came out at the end of its range "
-                f"({value:.3g}{'' if p.unit == '1' else ' ' + p.unit}); this law is bent to what it does not describe"
+                f"({value:.3g}{'' if p.unit == '1' else ' ' + p.unit}); this effect is fitted to something it does not describe"
             )
-    return said
+    return warnings

@@ -1,12 +1,12 @@
-"""What these data cannot tell, from the user's own design and before any effect is sought.
+"""What these data cannot determine, from the design and before any search for effects.
 
-Of an effect's first-order pattern c the robot's own parameters imitate a part; what is left, A = c'c less that part, is what it
-shows. The closest rival r imitates some of A again; the share that none can is its own:
+The robot's own parameters imitate a part of an effect's first-order pattern c. The rest, A = c'c less that part, is what the effect
+shows. The closest rival r imitates a part of A again; the share that no rival can imitate is unique to the effect:
 
     u = min_r tr(A_cc - A_cr A_rr^-1 A_rc) / tr A_cc
 
-An effect that leaves a sigmas (RMS over n samples) is seen at five standard errors if n a^2 >= 25, and told apart if n a^2 u >= 25;
-neither below what is material.
+An effect that leaves a sigmas (RMS over n samples) is seen at five standard errors if n a^2 >= 25, and separated from its rivals if
+n a^2 u >= 25. Neither limit is below the least size worth claiming.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,12 @@ from twin.effects import effect_class
 
 @dataclass(frozen=True)
 class Visibility:
-    """What the data could say of one effect, in one `form` where it has several.
+    """What the data can show of one effect, in one `form` where it has several.
 
-    `seen` and `apart` in sigmas (RMS, after the robot's own parameters are refitted; inf: never); `share` of its signature that its
-    closest `rival` cannot imitate; `smallest`: the value (SI, from OFF) of the parameter the data feel most that is told apart;
-    `lacking`: what the design lacks to see it.
+    `seen` and `apart` in sigmas: the least effect that is seen, and that is separated from its rivals (RMS, after the robot's own
+    parameters are refitted; inf: never). `share` of its pattern that its closest `rival` cannot imitate. `smallest`: the least
+    value (SI, from OFF) that is separated, of the parameter to which the data are most sensitive. `lacking`: what the design lacks
+    to show it.
     """
 
     effect: str
@@ -41,7 +42,10 @@ class Visibility:
 
 
 def identifiability(objective: Objective, base: Fit, known: Dictionary, material: float) -> list[Visibility]:
-    """One row an effect and form, those that are told apart most easily first; `material` sigmas is the least worth claiming."""
+    """Return one row an effect and form, those that are separated most easily first.
+
+    `material` (sigma) is the least size worth claiming.
+    """
     k = base.J.shape[1]
     X = np.concatenate([base.J, known.columns], axis=1)
     A = projected(X, X, base)[k:, k:]
@@ -67,7 +71,7 @@ def identifiability(objective: Objective, base: Fit, known: Dictionary, material
         share = max(0.0, shares.get(rival, 1.0))
         seen = max(material, float(np.sqrt(CLEAR_CHI_SQUARE / objective.n)))
         apart = max(material, float(np.sqrt(CLEAR_CHI_SQUARE / (objective.n * share)))) if share > 0 else np.inf
-        plainest = int(np.argmax(np.diag(A)[i]))  # the parameter the data feel most
+        plainest = int(np.argmax(np.diag(A)[i]))  # the parameter to which the data are most sensitive
         value = apart * float(np.sqrt(objective.n / A[i[plainest], i[plainest]]))
         smallest = (p.amplitudes[plainest], value, _unit(effect, p.amplitudes[plainest], objective))
         rows.append(Visibility(effect, seen, apart, share, rival, smallest, lacking, form))
@@ -79,7 +83,7 @@ def _unit(effect: str, name: str, objective: Objective) -> str:
 
 
 def _left(A: np.ndarray, i: np.ndarray, j: np.ndarray) -> float:
-    """tr(A_ii - A_ij A_jj^-1 A_ji): what of the patterns i the patterns j cannot imitate."""
+    """Return tr(A_ii - A_ij A_jj^-1 A_ji): the part of patterns i that patterns j cannot imitate."""
     inner = A[np.ix_(j, j)]
     cross = A[np.ix_(j, i)]
     solved = np.linalg.lstsq(inner + 1e-9 * max(np.trace(inner), 1e-12) * np.eye(len(j)), cross, rcond=None)[0]

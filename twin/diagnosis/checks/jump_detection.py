@@ -1,16 +1,18 @@
-"""Where a zero jumped: a step in time of the calibrated robot's error that is the same whatever the pose.
+"""Detection of zeros that jump: steps in time of the calibrated robot's error that do not depend on the pose.
 
-Residuals are taken in the metric of what they do within trials, C^(-1/2) r, C their covariance there: what the robot gets wrong
-bends, and hardly moves the markers near its base; a camera moves those too. Of trial k the mean in the pattern of a group's zero,
-one number an angle, six a camera, is S_k. Between trials k - 1 and k the a means before and the b means after differ by D, and
+Residuals are taken in the metric of their variation within trials, C^(-1/2) r, C their covariance there. A wrong robot model bends,
+and hardly moves the markers near its base; a moved camera moves those too. S_k is the mean of trial k projected on the pattern of a
+group's zero, one number an angle, six a camera. Between trials k - 1 and k the means of the a trials before and the b trials after
+differ by D, and
 
     T = a b / (a + b) |D|^2 / median_j |S_j+1 - S_j|^2,     a, b <= `TRIALS_AROUND_JUMP`
 
-is large where a zero jumped; friction, backlash or a wrong load scatter from trial to trial alike on both sides, creep, drift and
-warmth go on and on. A step counts where |D|^2 is more of the median square by which trials change along D than T is in any of
-`SHUFFLED_ORDERS` white series, where it leaves less than `STEP_LEFTOVER_SHARE` of the scatter around it and takes more than a line
-in time, and where all outputs together step as that zero would make them: a robot that changed bends, and moves more outputs than
-one. A turn about the base alone may be the robot's clamp and is left for the verdict; so is a step at which what was done in the
+is large where a zero jumped. Friction, backlash or a wrong load scatter alike on both sides; creep, drift and warming go on.
+
+A step counts under three conditions. |D|^2 over the median square by which trials change along D exceeds T of each of
+`SHUFFLED_ORDERS` white series. The step leaves less than `STEP_LEFTOVER_SHARE` of the scatter around it and explains more than a
+line in time. All outputs together step as that zero would make them: a robot that changed bends, and moves more outputs than one. A
+turn about the base alone may be the robot's clamp and is left to the verdict; so is a step at which the commands or loads of the
 trials changed too.
 """
 
@@ -37,13 +39,15 @@ from twin.prediction.prepared import Inputs
 
 
 def next_jump(context: FitContext, fit: Fit, taken: Sequence[Jump]) -> Jump | None:
-    """The clearest jump that a calibrated robot may leave in the fitted trials, beside those already `taken`; None where there is
-    none. A robot fitted without it is bent by it: whether it is one tells the fit with it (`stands`)."""
+    """Return the clearest jump that a calibrated robot leaves in the fitted trials, beside those already `taken`; None if none.
+
+    The robot was fitted without the jump and is bent by it. Whether it is a jump shows a fit with it (`stands`).
+    """
     return _clearest(context, fit, fit.evaluation.raw, taken, CLEAR_CHI_SQUARE)
 
 
 def stands(context: FitContext, fit: Fit, jump: Jump) -> bool:
-    """Whether a jump that was fitted is clear, put back into the residuals of that fit."""
+    """Return whether a fitted jump is clear when it is put back into the residuals of its fit."""
     twin, traces, prepared = fit.model.twin, fit.evaluation.traces, context.prepared
     rest = replace(twin, effects=tuple(without(e, jump) if isinstance(e, Zeros) else e for e in twin.effects))
     raw = [prepared.measured[k] - traces[k].outputs(rest, prepared) for k in context.trials]
@@ -52,9 +56,11 @@ def stands(context: FitContext, fit: Fit, jump: Jump) -> bool:
 
 
 def may_be_clamp(context: FitContext, before: Fit, after: Fit, jump: Jump) -> bool:
-    """Whether a turn about the base alone explains `RIGID_MOTION_SHARE` of what a fitted jump does: leaving out its shift would
-    cost, to second order in it, so little. A turn about the robot's axis hardly moves the means that jumps are looked for in; a fit
-    sees it."""
+    """Return whether a turn about the base alone explains `RIGID_MOTION_SHARE` of what a fitted jump does.
+
+    That is so if leaving out its shift would cost little, to second order in it. A turn about the robot's axis hardly moves the
+    means in which jumps are sought; a fit shows it.
+    """
     if len({o.index for o in context.prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) < 2 or jump.joints:
         return False
     n = jumps_of(after.model.twin).index(jump) + 1
@@ -64,7 +70,7 @@ def may_be_clamp(context: FitContext, before: Fit, after: Fit, jump: Jump) -> bo
     return float(shift @ np.linalg.solve(covariance, shift)) < (1.0 - RIGID_MOTION_SHARE) * (before.cost - after.cost)
 
 
-def _clearest(context: FitContext, fit: Fit, raw: Sequence[np.ndarray], taken: Sequence[Jump], bar: float) -> Jump | None:
+def _clearest(context: FitContext, fit: Fit, raw: Sequence[np.ndarray], taken: Sequence[Jump], limit: float) -> Jump | None:
     if len(raw) < 4:
         return None
     inputs = [context.prepared.inputs[k] for k in context.trials]
@@ -76,7 +82,7 @@ def _clearest(context: FitContext, fit: Fit, raw: Sequence[np.ndarray], taken: S
     found: list[tuple[float, Jump]] = []
     for group, zero, turn in _patterns(context, fit):
         B, clamp = _basis(metric @ zero), _basis(metric @ turn)
-        for k, a, b in _steps(M @ metric @ B, np.array([i.clock[0] for i in inputs]), bar):
+        for k, a, b in _steps(M @ metric @ B, np.array([i.clock[0] for i in inputs]), limit):
             before = M[k - a : k].mean(axis=0)
             D = M[k : k + b].mean(axis=0) - before
             moved = metric @ D
@@ -96,34 +102,39 @@ def _clearest(context: FitContext, fit: Fit, raw: Sequence[np.ndarray], taken: S
 
 
 def _conditions(inputs: Inputs) -> np.ndarray:
-    """What was done in a trial: mean commands and their pace, mean loads."""
+    """Return the conditions of a trial: mean commands and their rate, mean loads."""
     u, loads = inputs.command, inputs.loads
     pace = np.abs(np.diff(u, axis=0)).sum() / (inputs.time[-1] - inputs.time[0] + 1e-9)
     return np.array([*u.mean(axis=0), pace, loads.payload, np.mean(loads.torque), *loads.gravity, *loads.force])
 
 
 def _parted(done: np.ndarray, k: int) -> bool:
-    """Whether some condition (K, q) was one thing in all trials before the k-th and another in all others: then that may be it."""
+    """Return whether some condition (K, q) separates all trials before the k-th from all others.
+
+    Then that condition may be the cause.
+    """
     before, after = done[:k], done[k:]
     return bool(np.any((before.max(axis=0) < after.min(axis=0)) | (after.max(axis=0) < before.min(axis=0))))
 
 
 def _metric(off: Sequence[np.ndarray]) -> np.ndarray:
-    """C^(-1/2) (n_output, n_output), C = I + the covariance of residuals (n_k, n_output) in sigmas within trials."""
+    """Return C^(-1/2) (n_output, n_output), C = I + the covariance of residuals (n_k, n_output) in sigmas within trials."""
     x = np.nan_to_num(np.concatenate([r - _mean(r) for r in off]))
     eigen, V = np.linalg.eigh(np.eye(x.shape[1]) + x.T @ x / len(x))
     return V / np.sqrt(eigen) @ V.T
 
 
 def _mean(x: np.ndarray) -> np.ndarray:
-    """Of each column what is there; NaN where nothing is."""
+    """Return the mean of each column over what is there; NaN where nothing is."""
     known = np.isfinite(x)
     return np.where(known, x, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
 
 
 def _patterns(context: FitContext, fit: Fit) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Of each group with a zero: its name, what a jump does to all outputs (n_output, p), in sigmas, and those jumps (n_output, q)
-    that the robot's clamp may make."""
+    """Yield, for each group with a zero, its name, the pattern (n_output, p) of its jumps, and the clamp's (n_output, q).
+
+    Patterns are in sigmas of all outputs; the clamp's are those jumps that a moved clamp may make too.
+    """
     prepared, sigma = context.prepared, context.objective.whitener.noise.sigma
     angles = [c for c, o in enumerate(prepared.outputs) if o.group == ANGLE]
     if angles:
@@ -145,7 +156,7 @@ def _patterns(context: FitContext, fit: Fit) -> Iterator[tuple[str, np.ndarray, 
 
 
 def _basis(columns: np.ndarray) -> np.ndarray:
-    """Orthonormal, of what columns (n, p) span."""
+    """Return an orthonormal basis of the span of columns (n, p)."""
     if not columns.size:
         return columns
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)
@@ -153,8 +164,8 @@ def _basis(columns: np.ndarray) -> np.ndarray:
     return U[:, s > 1e-6 * s[0]]
 
 
-def _steps(S: np.ndarray, start: np.ndarray, bar: float) -> Iterator[tuple[int, int, int]]:
-    """Steps (k, a, b) of the series S (K, p) above the bar that are no drift, the clearest first."""
+def _steps(S: np.ndarray, start: np.ndarray, limit: float) -> Iterator[tuple[int, int, int]]:
+    """Yield steps (k, a, b) of the series S (K, p) above the limit that are no drift, the clearest first."""
     taken = _explained(S[None])[0]
     for flat in np.argsort(-taken, axis=None)[: np.count_nonzero(taken)]:
         k, a, b = (int(i) for i in np.unravel_index(flat, taken.shape))
@@ -162,14 +173,16 @@ def _steps(S: np.ndarray, start: np.ndarray, bar: float) -> Iterator[tuple[int, 
         part, t = S[k - a : k + b], start[k - a : k + b]
         part, t = part - part.mean(axis=0), t - t.mean()
         scatter, line = float((part**2).sum()), float(((t @ part) ** 2).sum() / max(float(t @ t), 1e-30))
-        clear = float(D @ D) ** 2 > bar * float(np.median((np.diff(S, axis=0) @ D) ** 2))
+        clear = float(D @ D) ** 2 > limit * float(np.median((np.diff(S, axis=0) @ D) ** 2))
         if clear and taken[k, a, b] > max((1.0 - STEP_LEFTOVER_SHARE) * scatter, line):
             yield k, a, b
 
 
 def _explained(S: np.ndarray) -> np.ndarray:
-    """a b / (a + b) |D|^2 (r, K, TRIALS_AROUND_JUMP + 1, TRIALS_AROUND_JUMP + 1) of series S (r, K, p); zero where there are no
-    such trials."""
+    """Return a b / (a + b) |D|^2 (r, K, TRIALS_AROUND_JUMP + 1, TRIALS_AROUND_JUMP + 1) of series S (r, K, p).
+
+    Zero where there are no such trials.
+    """
     r, K, _ = S.shape
     total = np.concatenate([np.zeros_like(S[:, :1]), np.cumsum(S, axis=1)], axis=1)
     out = np.zeros((r, K, TRIALS_AROUND_JUMP + 1, TRIALS_AROUND_JUMP + 1))
@@ -183,15 +196,17 @@ def _explained(S: np.ndarray) -> np.ndarray:
 
 @cache
 def _by_chance(K: int) -> float:
-    """The largest T of `SHUFFLED_ORDERS` white series of K numbers."""
+    """Return the largest T of `SHUFFLED_ORDERS` white series of K numbers."""
     S = np.random.default_rng(0).normal(size=(SHUFFLED_ORDERS, K, 1))
     scale = np.median((np.diff(S, axis=1) ** 2).sum(axis=2), axis=1)
     return float((_explained(S).reshape(SHUFFLED_ORDERS, -1).max(axis=1) / scale).max())
 
 
 def _located(context: FitContext, off: Sequence[np.ndarray], group: str, k: int, before: np.ndarray, D: np.ndarray) -> Jump:
-    """The row from which on the residual is nearer to what comes after: between two trials, unless a row within one of them is
-    clearly better."""
+    """Return the jump at the row from which the residual is nearer to the level after the step.
+
+    The jump is between two trials, unless a row within one of them fits clearly better.
+    """
     prepared, trials = context.prepared, context.trials
     near = [_along(off[j], before, D) for j in (k - 1, k)]
     s, border = np.concatenate(near), len(near[0])
@@ -204,6 +219,6 @@ def _located(context: FitContext, off: Sequence[np.ndarray], group: str, k: int,
 
 
 def _along(x: np.ndarray, before: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Of each row of residuals (n, n_output) how far along D it is, 0 before the step and 1 after it."""
+    """Return how far along D each row of residuals (n, n_output) is, 0 before the step and 1 after it."""
     known = np.isfinite(x)
     return np.where(known, x - before, 0.0) @ D / np.maximum(known @ D**2, 1e-30)

@@ -1,9 +1,9 @@
-"""Loops: what differs between pulling and releasing at the same commands, straight from the data, before any law is fitted.
+"""Loops: the difference between pulling and releasing at the same commands, from the data alone.
 
-Where a trial comes back over its own commands, against the direction of before, the measured output is compared with itself:
-d = (y_release - y_pull) . e, e the unit vector in which the pull moves it. Positive means that the robot lags: it reaches less when
-pulled, and keeps more when released. Of pairs whose pull came first the mean of d is lag + drift, of those whose release came first
-lag - drift: where both kinds are there, time and direction come apart; else creep, drift and friction look alike.
+Where a trial returns over its own commands in the opposite direction, the measured output is compared with itself: d = (y_release -
+y_pull) . e, e the unit vector in which the pull moves it. A positive d means that the robot lags: it moves less when pulled, and
+returns less when released. The mean of d is lag + drift over pairs whose pull came first, and lag - drift over pairs whose release
+came first. With both kinds, time and direction are separated; otherwise creep, drift and friction look alike.
 """
 
 from collections.abc import Sequence
@@ -19,8 +19,11 @@ from twin.prediction.prepared import Inputs, PreparedRecording
 
 @dataclass(frozen=True)
 class Loop:
-    """Of one trial: mean lag (SI), its standard error from the noise of neighbouring pairs, how many pairs, and the mean drift
-    from the earlier to the later reading where it can be told from the lag."""
+    """The loop of one trial.
+
+    Mean lag (SI), its standard error from the scatter of neighbouring pairs, the number of pairs, and the mean drift from the
+    earlier to the later reading where it can be separated from the lag.
+    """
 
     trial: int
     lag: float
@@ -35,7 +38,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Loops:
-    """Of all trials that come back over their commands: which output (group and name), each trial's loop, and all together."""
+    """The loops of all trials that return over their commands: the output (group and name), and each trial's loop."""
 
     group: str
     name: str
@@ -66,12 +69,12 @@ class Loops:
 
 
 def loops(prepared: PreparedRecording, predicted: Sequence[np.ndarray] | None = None) -> Loops:
-    """Of the output that stands for the twin: of points the one that moves most.
+    """Return the loops of the headline output: of points the one that moves most.
 
-    With `predicted` outputs (n_k, n_output) those of a twin, in the channel and along the direction of the measured ones, where
-    these are known.
+    With `predicted` outputs (n_k, n_output) return those of a twin, in the channel and along the direction of the measured ones,
+    where these are known.
     """
-    group = headline_group([o.group for o in prepared.outputs if o.group != "skin"] or ["skin"])  # clouds are too few to come back
+    group = headline_group([o.group for o in prepared.outputs if o.group != "skin"] or ["skin"])  # too few clouds
     name, columns = _largest(prepared, group)
     top = np.max([np.abs(i.command).max(axis=0) for i in prepared.inputs], axis=0)
     top = np.where(top > 0.0, top, 1.0)
@@ -84,7 +87,7 @@ def loops(prepared: PreparedRecording, predicted: Sequence[np.ndarray] | None = 
 
 
 def _largest(prepared: PreparedRecording, group: str) -> tuple[str, list[int]]:
-    """The point, or the channel, of this group that moves most: its name and its columns."""
+    """Return the name and the columns of the point, or the channel, of this group that moves most."""
     found: dict[str, list[int]] = {}
     for j, o in enumerate(prepared.outputs):
         if o.group == group:
@@ -100,8 +103,10 @@ def _any(y: np.ndarray) -> bool:
 
 
 def _loop(trial: int, inputs: Inputs, u: np.ndarray, y: np.ndarray, measured: np.ndarray) -> Loop | None:
-    """Of commands u (n, n_tendon), in units of the largest, and one point's or channel's positions y (n, 1 to 3); `measured` ones
-    give the direction."""
+    """Return the loop of one point or channel; None where too few commands are repeated.
+
+    `u` (n, n_tendon): commands in units of the largest. `y` (n, 1 to 3): positions. `measured` positions give the direction.
+    """
     if len(u) < 4 or not _any(y):
         return None
     first, then, share, pulling = crossings(inputs, u)
@@ -120,8 +125,11 @@ def _loop(trial: int, inputs: Inputs, u: np.ndarray, y: np.ndarray, measured: np
 
 
 def crossings(inputs: Inputs, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where commands u (n, n_tendon) come back against their direction: row i, the first later row j for which u_i lies a share s
-    of the way from row j to the next, the s, and whether row i pulls (|u| grows)."""
+    """Return where commands u (n, n_tendon) return in the opposite direction.
+
+    Rows i; the first later row j for which u_i lies a share s of the way from row j to the next; the s; and whether row i pulls
+    (|u| grows).
+    """
     v = slope(inputs, u)
     speed = np.linalg.norm(v, axis=1)
     moving = speed > MOVING_RATE_SHARE * max(float(speed.max()), 1e-12)
@@ -142,7 +150,7 @@ def crossings(inputs: Inputs, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _along(u: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Unit vector from where y is at the least fifth of the pulls to where it is at the largest fifth."""
+    """Return the unit vector from the mean y at the least fifth of the pulls to that at the largest fifth."""
     order = np.argsort(np.linalg.norm(u, axis=1), kind="stable")
     order = order[np.isfinite(y[order]).all(axis=1)]
     fifth = max(1, len(order) // 5)

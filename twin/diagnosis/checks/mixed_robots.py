@@ -1,7 +1,7 @@
-"""Do the trials come from one robot? Two groups of trials, each with values of its own for the robot's parameters, against one.
+"""A check whether the trials come from one robot: two groups of trials with own values of the robot's parameters, against one.
 
-To first order a group G of trials that may move the robot's parameters takes fall(G) = g'(sum J_k'J_k + P)^-1 g, g = sum J_k'z_k,
-off its |z|^2. Trials change sides while the sum of both falls grows (a two-means search from several starts).
+To first order a group G of trials with own parameters reduces its |z|^2 by fall(G) = g'(sum J_k'J_k + P)^-1 g, g = sum J_k'z_k.
+Trials change groups while the sum of both falls grows (a two-means search from several starts).
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,10 @@ from twin.prediction.prepared import PreparedRecording
 
 @dataclass(frozen=True)
 class MixedRobots:
-    """Two groups of trials (indices into the bench) that want different robots, and what that takes off |z|^2, the price of the
-    second robot paid."""
+    """Two groups of trials (indices into the recording) that fit two robots.
+
+    `fall`: the reduction of |z|^2 less the penalty for the second robot.
+    """
 
     one: tuple[int, ...]
     other: tuple[int, ...]
@@ -27,7 +29,10 @@ class MixedRobots:
 
 
 def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit) -> MixedRobots | None:
-    """The two groups, the larger first; None where one robot does. `fitted` to the listed trials, its residuals in their order."""
+    """Return the two groups, the larger first; None where one robot fits.
+
+    `fitted`: the fit to the listed trials, with its residuals in their order.
+    """
     own = [i for i, f in enumerate(fitted.model.free) if f.effect is None]
     rows = np.concatenate([[0], np.cumsum([len(prepared.inputs[k].time) * len(prepared.outputs) for k in trials])])
     J, z = fitted.J[:, own], fitted.z.ravel()
@@ -46,7 +51,7 @@ def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit
 
     best, sides = 0.0, None
     for seed in range(len(trials)):
-        # From each trial in turn: with the half of the others that its own robot suits best.
+        # Start from each trial in turn, with the half of the others that its own robot fits best.
         start = costs(solve(H[seed] + P, g[seed]))
         side = start <= np.median(start)
         for _ in range(GROUPING_ROUNDS):
@@ -62,7 +67,7 @@ def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit
         ):
             best, sides = gain, side
     n = int(np.count_nonzero(z))
-    # As many parameters more, and a choice of sides for every trial.
+    # The penalty: as many parameters more, and a choice of group for every trial.
     worth = best - fall(np.ones(len(trials), bool)) - len(own) * np.log(n) - 2.0 * len(trials) * np.log(2.0)
     if sides is None or worth < SECOND_ROBOT_GAIN**2 * n:
         return None

@@ -1,4 +1,4 @@
-"""Stage `look`: the robot as described held against the data, and what they may mean otherwise, before anything is fitted."""
+"""Stage `preview`: compare the robot as described with the data, and look for mistakes in the files, before any fit."""
 
 from dataclasses import dataclass, replace
 
@@ -19,9 +19,12 @@ from twin.prediction.twin import Twin
 
 @dataclass(frozen=True)
 class DataPreview:
-    """The bench with notices of unstable starts, the sealed trials (none of fewer than `FEWEST_TRIALS_FOR_HELD_OUT`), the
-    prediction (n_k, n_output) of the twin as described, the suspicions, and the loops of pulling and releasing in the trials that
-    are not sealed."""
+    """What is known before the first fit.
+
+    The prepared recording with notices of unstable starts, the held-out trials (none with fewer than `FEWEST_TRIALS_FOR_HELD_OUT`
+    trials), the prediction (n_k, n_output) of the twin as described, the suspicions, and the loops of pulling and releasing in the
+    fitted trials.
+    """
 
     prepared: PreparedRecording
     held_out: tuple[int, ...]
@@ -31,8 +34,10 @@ class DataPreview:
 
 
 def preview_data(prepared: PreparedRecording, twin: Twin, settings: Settings, progress: Progress = silent) -> DataPreview:
-    """What is known before the first fit. Raises SolveError, with what may be wrong, where the twin as described has no
-    equilibrium."""
+    """Return the preview.
+
+    Raise SolveError, with possible mistakes in the files, where the twin as described has no equilibrium.
+    """
     held_out = split(prepared, settings.seed)[1] if len(prepared.inputs) >= FEWEST_TRIALS_FOR_HELD_OUT else []
     progress("nominal prediction")
     try:
@@ -43,7 +48,7 @@ def preview_data(prepared: PreparedRecording, twin: Twin, settings: Settings, pr
         raise SolveError("\n".join([str(error), *(f"Suspicion: {s.words}. Change: {s.change}." for s in found)])) from None
     nominal = tuple(t.outputs(twin, prepared) for t in traces)
     unstable = tuple(f"{name}: unstable start, its shape is one of several" for name in unstable_starts(prepared, traces))
-    progress("what the files may mean otherwise")
+    progress("possible mistakes in the files")
     found = suspicions(prepared, twin, held_out, nominal)
     return DataPreview(
         replace(prepared, notices=(*prepared.notices, *unstable)), tuple(held_out), nominal, found, loops(blind(prepared, held_out))

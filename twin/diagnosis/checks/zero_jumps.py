@@ -1,7 +1,7 @@
-"""Zeros that jumped: a joint's angle that counts from elsewhere, or a camera that was moved, from some row of the session on.
+"""Zeros that jump: a joint angle with a new zero, or a moved camera, from some row of the session on.
 
-No law of the robot: a nuisance of the recording, fitted beside whatever else is fitted, never sought as an effect and no part of
-the twin that is handed on.
+No effect of the robot but a nuisance of the recording: it is fitted beside everything else, never sought as an effect, and no part
+of the diagnosed twin.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,7 +26,10 @@ ANGLE = "angle"
 
 @dataclass(frozen=True)
 class Jump:
-    """Of one group of outputs: the last row before it and the first row after it (clock, s); for angles the joints' indices."""
+    """One jump of a group of outputs.
+
+    The last row before it and the first row after it (clock, s); for angles the joints' indices.
+    """
 
     group: str
     last: float
@@ -38,11 +41,11 @@ class Jump:
         return tuple(f"angle_{j + 1}" for j in self.joints) or (*TURN, *SHIFT)
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
-        """Of the n-th jump (from 1)."""
+        """Return the parameters of the n-th jump (from 1)."""
         known = {
             "angle": Parameter("", 0.0, "rad", -np.pi, np.pi, "an encoder counts from its start", std=0.2, scale=0.01),
-            "turn": Parameter("", 0.0, "rad", -0.5, 0.5, "a camera knocked or set up anew", std=0.05, scale=0.01),
-            "shift": Parameter("", 0.0, "m", -0.1, 0.1, "a camera knocked or set up anew", std=0.01, scale=1e-3),
+            "turn": Parameter("", 0.0, "rad", -0.5, 0.5, "a camera knocked or set up again", std=0.05, scale=0.01),
+            "shift": Parameter("", 0.0, "m", -0.1, 0.1, "a camera knocked or set up again", std=0.01, scale=1e-3),
         }
         return tuple(replace(known[x.partition("_")[0]], name=f"{x}_{n}") for x in self.numbers)
 
@@ -67,7 +70,7 @@ class Zeros(Effect):
 
 
 def with_zero_jumps(model: Model, jumps: Sequence[Jump]) -> Model:
-    """A calibrated model whose zeros jump there too, by how much is free."""
+    """Return a calibrated model with these jumps, their sizes free."""
     parameters = tuple(p for n, jump in enumerate(jumps, 1) for p in jump.parameters(n))
     law = cast("type[Zeros]", type("Zeros", (Zeros,), {"jumps": tuple(jumps), "parameters": parameters}))
     return Model(replace(model.twin, effects=(*model.twin.effects, law())), (*model.free, *(Free(Zeros.id, p) for p in parameters)))
@@ -78,23 +81,23 @@ def jumps_of(twin: Twin) -> tuple[Jump, ...]:
 
 
 def without(law: Zeros, jump: Jump) -> Zeros:
-    """The same zeros but for one jump."""
+    """Return the zeros without one jump."""
     n = law.jumps.index(jump) + 1
     return type(law)({**law.values, **{f"{x}_{n}": 0.0 for x in jump.numbers}})
 
 
 def of_robot(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Without what belongs to one recording only."""
+    """Return the effects without those that belong to one recording only."""
     return tuple(e for e in effects if not isinstance(e, Zeros))
 
 
 def without_zero_jumps(twin: Twin) -> Twin:
-    """The twin without what belongs to one recording only."""
+    """Return the twin without what belongs to one recording only."""
     return replace(twin, effects=of_robot(twin.effects))
 
 
 def words(prepared: PreparedRecording, fit: Fit) -> list[str]:
-    """Every jump with its fitted size, as a notice."""
+    """Return every jump with its fitted size, as a notice."""
     found, label = fit.fitted(Zeros.id), {t.name: t.label for t in prepared.recording.trials}
     clock = prepared.inputs[0].clock[0]
     out = []
@@ -106,27 +109,29 @@ def words(prepared: PreparedRecording, fit: Fit) -> list[str]:
                 abs(a) > SIGNIFICANT_STANDARD_ERRORS * (found[f"{x}_{n}"].std or 0.0) for a, x in zip(at, jump.numbers, strict=True)
             ]
             sizes = [f"joint_{j + 1}_angle by {np.rad2deg(a):.2f} deg" for j, a in zip(jump.joints, at, strict=True)]
-            what = f"the zero jumped of {', '.join(s for s, yes in zip(sizes, sure, strict=True) if yes) or ', '.join(sizes)}"
+            what = f"the zero jumped: {', '.join(s for s, yes in zip(sizes, sure, strict=True) if yes) or ', '.join(sizes)}"
         else:
             turn, shift = np.rad2deg(np.linalg.norm(at[:3])), 1e3 * np.linalg.norm(at[3:])
             alone = len({o.index for o in prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) == 1
-            who = "the camera, or the robot in its clamp: one point does not tell" if alone else "the camera, not the robot"
+            who = "the camera, or the robot in its clamp: one point cannot show which" if alone else "the camera, not the robot"
             what = f"the markers' frame moved by {shift:.1f} mm and {turn:.1f} deg ({who})"
         if before is after:
             where = f"within {label[before.name]}, {jump.since - before.clock[0]:.1f} s from its start"
         else:
             where = f"between {label[before.name]} and {label[after.name]}"
         minutes = (jump.since - clock) / 60.0
-        out.append(f"{what}, {where}, {minutes:.0f} min into the session: taken as a nuisance from there on, no effect")
+        out.append(f"{what}, {where}, {minutes:.0f} min into the session: fitted as a nuisance from there on, not as an effect")
         lost = [label[i.name] for i in prepared.inputs if jump.last < i.clock[0] and i.clock[-1] < jump.since]
         if lost:
-            out.append(f"{', '.join(lost)}: run between the two, so that its zero is not known; the old one is taken")
+            out.append(f"{', '.join(lost)}: run between these two rows, so that its zero is not known; the old one is used")
     return out
 
 
 def rezeroed(prepared: PreparedRecording, group: str, raw: np.ndarray) -> np.ndarray:
-    """Residuals (n, n_output) of a trial less the mean of its first `ROWS_FOR_ZERO` rows: each angle's own, of points one shift of
-    all."""
+    """Return the residuals (n, n_output) of a trial less the mean of its first `ROWS_FOR_ZERO` rows.
+
+    Each angle has its own mean; points share one shift.
+    """
     out = raw.copy()
     alike: dict[int, list[int]] = {}
     for c, o in enumerate(prepared.outputs):

@@ -1,1 +1,1 @@
-"""What a candidate is worth: first-order patterns, scores, predictions of trials left out."""
+"""The evidence of a candidate: first-order patterns, scores, predictions of left-out trials."""

@@ -1,8 +1,8 @@
-"""How well a model explains the data when the alternative is "some smooth error nobody has named".
+"""The evidence of a model against an unnamed smooth error.
 
 The whitened residual of each channel is modelled as z ~ N(0, I + Phi D Phi'), Phi the regressors below (unit RMS, one block a
-component: static, direction, rate, memory, slow, trial) and D their variances, one a component and group of channels. The
-variances are found by maximising the likelihood (MacKay's fixed point). Kennedy and O'Hagan's discrepancy, as variance components.
+component: static, direction, rate, memory, slow, trial) and D their variances, one a component and group of channels. The variances
+maximise the likelihood (MacKay's fixed point). This is Kennedy and O'Hagan's discrepancy, as variance components.
 """
 
 from __future__ import annotations
@@ -64,7 +64,10 @@ class Regressors:
 
 
 def regressors(prepared: PreparedRecording, trials: Sequence[int], noise: np.ndarray) -> Regressors:
-    """What an unnamed error could move with, on the listed trials' samples (n, p); `noise` (n_tendon,) is the readings'."""
+    """Return the regressors of an unnamed error, on the listed trials' samples (n, p).
+
+    `noise` (n_tendon,) is the readings' noise.
+    """
     inputs = [prepared.inputs[k] for k in trials]
     span = np.max([np.abs(i.command).max(axis=0) for i in inputs], axis=0)
     held = prepared.driven_by(Drive.DISPLACEMENT)
@@ -121,8 +124,11 @@ def regressors(prepared: PreparedRecording, trials: Sequence[int], noise: np.nda
 
 
 def quiet(inputs: Inputs, noise: np.ndarray) -> np.ndarray:
-    """Commands (n, n_tendon), each as the rows beside it tell, unless it differs from that by more than three of its `noise`
-    (n_tendon,): a regressor with a reading's own noise in it is like the residual, which has it too, though nothing is missing."""
+    """Return commands (n, n_tendon), each interpolated from the neighbouring rows where it agrees with them.
+
+    It agrees within three standard deviations of its `noise` (n_tendon,). A regressor with a reading's own noise in it would
+    correlate with the residual, which contains that noise too, although nothing is missing.
+    """
     u, t = inputs.command, inputs.time
     if len(u) < 3:
         return u
@@ -133,14 +139,14 @@ def quiet(inputs: Inputs, noise: np.ndarray) -> np.ndarray:
 
 
 def slope(inputs: Inputs, u: np.ndarray) -> np.ndarray:
-    """du/dt (n, n_tendon) of commands smoothed over three samples, so that noise alone makes no direction."""
+    """Return du/dt (n, n_tendon) of commands smoothed over three samples, so that noise alone gives no direction."""
     padded = np.pad(u, ((1, 1), (0, 0)), mode="edge")
     smooth = (padded[:-2] + padded[1:-1] + padded[2:]) / 3.0
     return np.gradient(smooth, inputs.time, axis=0) if len(u) > 1 else np.zeros_like(u)
 
 
 def _lagged(time: np.ndarray, u: np.ndarray, tau: float) -> np.ndarray:
-    """First-order low-pass of u with time constant tau (s), at rest at the start."""
+    """Return the first-order low-pass of u with time constant tau (s), at rest at the start."""
     out = np.empty_like(u)
     out[0] = u[0]
     for i, keep in enumerate(np.exp(-np.diff(time) / tau), 1):
@@ -152,8 +158,8 @@ def _lagged(time: np.ndarray, u: np.ndarray, tau: float) -> np.ndarray:
 class Discrepancy:
     """The smooth error left in a residual.
 
-    `gain` = 2 (log N(z; 0, I + Phi D Phi') - log N(z; 0, I)); `mean` (n, m) its posterior mean in sigmas, `static` (n, m) what of
-    that is a function of the pose; `variance` (n_group, n_component); `coefficients` (p, m).
+    `gain` = 2 (log N(z; 0, I + Phi D Phi') - log N(z; 0, I)). `mean` (n, m): its posterior mean in sigmas. `static` (n, m): the
+    part of the mean that is a function of the pose. `variance` (n_group, n_component). `coefficients` (p, m).
     """
 
     gain: float
@@ -168,19 +174,23 @@ class Discrepancy:
         return float(np.sqrt(np.mean(self.mean**2)))
 
     def rest(self, accuracy: np.ndarray) -> np.ndarray:
-        """The mean (n, m) without what a description that is good for `accuracy` (m,) sigmas (RMS) gets wrong of each channel:
-        functions of the pose, up to that."""
+        """Return the mean (n, m) less what errors of the description explain.
+
+        A description with the accuracy `accuracy` (m,) sigmas (RMS) of each channel explains functions of the pose up to that size.
+        """
         static = np.sqrt(np.mean(self.static**2, axis=0))
         return self.mean - np.minimum(1.0, accuracy / np.maximum(static, np.finfo(float).tiny)) * self.static
 
     def beyond(self, accuracy: np.ndarray) -> float:
-        """Root-mean-square of that, in sigmas."""
+        """Return the root-mean-square of `rest`, in sigmas."""
         return float(np.sqrt(np.mean(self.rest(accuracy) ** 2)))
 
 
 class Evidence:
-    """Discrepancy of whitened residuals on fixed trials, of readings with that `noise` (n_tendon,) N, m or A; everything that does
-    not depend on the residual is made once."""
+    """The discrepancies of whitened residuals on fixed trials, of readings with that `noise` (n_tendon,) N, m or A.
+
+    Everything that does not depend on the residual is computed once.
+    """
 
     def __init__(self, prepared: PreparedRecording, trials: Sequence[int], noise: np.ndarray) -> None:
         self.phi = regressors(prepared, trials, noise)
@@ -189,14 +199,14 @@ class Evidence:
         self.member = np.array([groups.index(o.group) for o in prepared.outputs])
         present = np.isfinite(np.concatenate([prepared.measured[k] for k in trials]))
         self.present = present
-        # Channels of one group that are missing together (a marker's x, y and z) share everything but their residual.
+        # Channels of one group that are missing together (a marker's x, y and z) share everything except the residual.
         alike, self.kind = np.unique(np.vstack([self.member, present]), axis=1, return_inverse=True)
         self.kind = self.kind.ravel()
         self.group = alike[0].astype(int)  # (n_kind,)
         self.gram = np.stack([self.phi.matrix.T @ (self.phi.matrix * mask[:, None]) for mask in alike[1:].T])
 
     def discrepancy(self, z: np.ndarray) -> Discrepancy:
-        """The most likely discrepancy of z (n * m,) or (n, m)."""
+        """Return the most likely discrepancy of z (n * m,) or (n, m)."""
         Z = z.reshape(self.present.shape)
         n_group, n_component = len(self.groups), len(COMPONENTS)
         variance = np.full((n_group, n_component), 1e-2)
@@ -217,9 +227,9 @@ class Evidence:
                         explained[block].sum() / max(determined[block].sum(), 1e-6) if (component == c).any() else LEAST_VARIANCE
                     )
             new = np.clip(new, LEAST_VARIANCE, LARGEST_VARIANCE)
-            settled = np.all((np.abs(np.log(new / variance)) < SETTLED_VARIANCE_CHANGE) | (new < NEGLIGIBLE_VARIANCE))
+            converged = np.all((np.abs(np.log(new / variance)) < SETTLED_VARIANCE_CHANGE) | (new < NEGLIGIBLE_VARIANCE))
             variance = new
-            if settled:
+            if converged:
                 break
         D = variance[self.group][:, component]
         inner = np.eye(len(component)) + np.sqrt(D)[:, :, None] * self.gram * np.sqrt(D)[:, None, :]
@@ -229,7 +239,7 @@ class Evidence:
         return Discrepancy(gain, mean, of_pose, variance, coefficients.T)
 
     def whiten(self, discrepancy: Discrepancy, X: np.ndarray) -> np.ndarray:
-        """(I + Phi D Phi')^-1 X for columns X (n * m, k)."""
+        """Return (I + Phi D Phi')^-1 X for columns X (n * m, k)."""
         n, m = self.present.shape
         Y = X.reshape(n, m, -1)
         D = discrepancy.variance[self.group][:, self.phi.component]
@@ -240,12 +250,15 @@ class Evidence:
         return (Y - smooth).reshape(X.shape)
 
     def log_likelihood_gain(self, z: np.ndarray) -> tuple[float, Discrepancy]:
-        """2 max log N(z; 0, I + Phi D Phi') up to a constant, -|z|^2 + gain, and the discrepancy."""
+        """Return 2 max log N(z; 0, I + Phi D Phi') up to a constant, -|z|^2 + gain, and the discrepancy."""
         found = self.discrepancy(z)
         return found.gain - float(z.ravel() @ z.ravel()), found
 
     def beyond_pose(self, z: np.ndarray) -> float:
-        """Root-mean-square of what of z (n * m,) is no smooth function of the pose: least squares on the static regressors."""
+        """Return the root-mean-square of z (n * m,) less its smooth function of the pose.
+
+        The function is a least-squares fit of the static regressors.
+        """
         Z = np.where(self.present, z.reshape(self.present.shape), 0.0)
         pose = np.flatnonzero(self.phi.component == COMPONENTS.index("static"))
         gram = self.gram[:, pose[:, None], pose] + 1e-9 * self.gram[:, pose, pose].max() * np.eye(len(pose))
@@ -255,13 +268,13 @@ class Evidence:
         return float(np.sqrt(np.mean(left**2)))
 
     def strongest(self, discrepancy: Discrepancy, count: int = 5) -> list[tuple[str, float]]:
-        """Regressors that carry most of a discrepancy: (name, RMS in sigmas)."""
+        """Return the regressors that carry most of a discrepancy: (name, RMS in sigmas)."""
         size = np.sqrt(np.mean(discrepancy.coefficients**2, axis=1))
         return [(self.phi.names[i], float(size[i])) for i in np.argsort(-size)[:count]]
 
 
 def _diagonal(x: np.ndarray) -> np.ndarray:
-    """Rows of x (m, p) as diagonal matrices (m, p, p)."""
+    """Return the rows of x (m, p) as diagonal matrices (m, p, p)."""
     return x[:, :, None] * np.eye(x.shape[1])
 
 
@@ -281,11 +294,11 @@ class Spectrum:
         return Spectrum(grid, tuple(np.exp(-2j * np.pi * np.outer(grid, t - t[0])).astype(np.complex64) for t in times))
 
     def peak(self, rest: np.ndarray) -> tuple[float, float]:
-        """The strongest line of what is left when the smooth error is removed: (z-score, frequency in Hz).
+        """Return the strongest spectral line of the residual without its smooth error: (z-score, frequency in Hz).
 
-        Periodograms of all trials and channels (n, m) are added; noise gives each grid point its continuum's level times a
-        chi-square of 2 (trials x channels) degrees of freedom over their number. The continuum need not be flat: noise that
-        remembers otherwise than by the row before (coloured and white together, say) is not made white, and is no line.
+        Periodograms of all trials and channels (n, m) are added. Noise gives each grid point its continuum's level times a
+        chi-square of 2 (trials x channels) degrees of freedom over their number. The continuum need not be flat: noise with a
+        memory longer than one row (such as coloured and white together) is not whitened, and is no line.
         """
         if self.grid.size < 4:
             return 0.0, 0.0
@@ -305,8 +318,11 @@ class Spectrum:
         return float(score[best]), float(self.grid[best])
 
     def _continuum(self, power: np.ndarray) -> np.ndarray:
-        """What lines stand out of (n_f,): log power as a parabola of log frequency, of fewer than 16 frequencies a line, of fewer
-        than 8 a constant; three robust deviations above it is a line and left out."""
+        """Return the spectral continuum (n_f,) below the lines.
+
+        Log power is a parabola of log frequency; a line with fewer than 16 frequencies, a constant with fewer than 8. Points more
+        than three robust deviations above it are lines and left out.
+        """
         x = np.log(self.grid / self.grid[0])
         basis, log = np.vander(x, min(3, 1 + x.size // 8)), np.log(power)
         below = np.ones(x.size, dtype=bool)

@@ -1,7 +1,7 @@
-"""An error that is neither smooth nor noise: the robot rings, or a law is right on average and wrong in every row.
+"""An error that is neither smooth nor noise: the robot oscillates, or an effect is right on average and wrong in every row.
 
-Smooth errors are sought among what moves with the pose, the past and the time; what swings faster leaves them alone. It shows in
-how large residuals are at all, where trials repeat: two of them agree to the noise, and the twin is off by more.
+Smooth errors move with the pose, the past and the time; faster errors are not among them. They show in the size of residuals where
+trials repeat: two of them agree to the noise, and the twin is off by more.
 """
 
 import numpy as np
@@ -13,12 +13,13 @@ from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE
 
 
 def fast_error(context: FitContext, found: ScoredModel) -> float:
-    """What is left (sigma, RMS) beside the smooth error, in squares beyond what noise makes and may make: five standard errors of
-    the n differences between repeated trials that it was read off,
+    """Return the error (sigma, RMS) beside the smooth error and noise.
+
+    It exceeds noise by five standard errors of the n differences between repeated trials from which the noise was estimated,
 
         q^2 = mean (z - m)^2 - 1 - 5 sqrt(2 / n).
 
-    Zero where no trial repeats another: then white noise may be larger than declared, and who would tell?
+    Zero where no trial repeats another: then white noise may be larger than declared, and the data cannot show it.
     """
     prepared = context.prepared
     pairs = [(a, b) for a, b in repeats(prepared) if {a, b} <= set(context.trials)]
@@ -31,7 +32,8 @@ def fast_error(context: FitContext, found: ScoredModel) -> float:
 
 
 def words(size: float) -> str:
+    """Return the sentence for an error of this `size` (sigma)."""
     return (
         f" Beside that {size:.2f} sigma are left that are neither smooth nor noise, since repeated trials agree better: something "
-        "rings or chatters, or logs and commands are not of the same moments."
+        "oscillates or chatters, or the clocks of logs and commands differ."
     )

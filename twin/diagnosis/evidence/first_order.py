@@ -1,4 +1,4 @@
-"""First-order patterns of the effects a model lacks: what each would do to the white residual if it were switched on."""
+"""First-order patterns of the effects that a model lacks: the change of the whitened residual as each is switched on."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from twin.prediction.twin import Twin
 
 @dataclass(frozen=True)
 class Pattern:
-    """What an effect would do first: its start, the amplitudes switched on one by one, and where their columns stand."""
+    """The first-order pattern of an effect: its start, the amplitudes switched on one by one, and the indices of their columns."""
 
     effect: str
     start: FitStart
@@ -25,7 +25,7 @@ class Pattern:
     where: tuple[int, ...]
 
     def least(self, n_tendon: int) -> np.ndarray:
-        """The least each amplitude may be, counted from OFF (n,): a one-sided one is not negative."""
+        """Return the least value of each amplitude, counted from OFF (n,): zero for a one-sided one."""
         table = {p.name: p for p in catalogue()[self.effect].all_parameters(n_tendon)}
         return np.array([0.0 if table[n].low >= table[n].value else -np.inf for n in self.amplitudes])
 
@@ -38,7 +38,7 @@ class Dictionary:
     columns: np.ndarray
 
     def beside(self, effects: Collection[str]) -> Dictionary:
-        """Without the patterns of these effects and of those akin to them."""
+        """Return the dictionary without the patterns of these effects and of those confusable with them."""
         left = [
             p for p in self.patterns if p.effect not in effects and not set(catalogue()[p.effect].confusable_with) & set(effects)
         ]
@@ -46,8 +46,10 @@ class Dictionary:
 
 
 def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = None) -> Dictionary:
-    """Patterns of every effect of the catalogue (or `among` these) that the model lacks, that finds what it needs and is not akin
-    to one it has."""
+    """Return patterns of the effects of the catalogue (or `among` these) that the model lacks.
+
+    Left out are effects whose needs the robot or the data do not meet, and those confusable with one in the model.
+    """
     prepared = objective.prepared
     present = {e.id for e in fit.model.twin.effects}
     predicted = [fit.model.twin.effect_chain.sense(t.true) for t in fit.evaluation.traces.values()]
@@ -71,14 +73,14 @@ def dictionary(objective: Objective, fit: Fit, among: Collection[str] | None = N
             where = tuple(index.setdefault(m.twin, len(index)) for m, _ in models)
             patterns.append(Pattern(identifier, start, tuple(names), where))
             neighbours |= {m.twin: (m, size) for m, size in models}
-    # one without an equilibrium gets a column of zeros and so no gain
+    # a model without an equilibrium has a column of zeros, and so no gain
     return Dictionary(tuple(patterns), objective.columns(fit.evaluation, list(neighbours.values()), unsolved="zeros"))
 
 
 def _patterns(
     model: Model, prepared: PreparedRecording, identifier: str, start: FitStart
 ) -> tuple[list[tuple[Model, float]], list[str]]:
-    """For each amplitude of the effect, the model with that amplitude alone switched on, and by how much."""
+    """Return, for each amplitude of the effect, the model with that amplitude alone switched on, and by how much."""
     law = catalogue()[identifier]
     off = {p.name: p.value for p in scaled_parameters(law, prepared.n_tendon, prepared.robot.size)}
     shape = {k: v for k, v in start.values.items() if k in law.inactive_when_off}

@@ -1,4 +1,4 @@
-"""What a model would do on each half of the session, had it been fitted to the other: how it predicts farther than one trial."""
+"""Predictions of each half of the session by a fit to the other: a longer extrapolation than one left-out trial."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -15,14 +15,17 @@ from twin.foundation.errors import SolveError
 
 @dataclass(frozen=True)
 class PredictiveErrors:
-    """Errors on what a model was not fitted to: on trials left out in turn (`near`), and on halves of the session (`far`)."""
+    """Errors on data that a model was not fitted to: left-out trials (`near`), and halves of the session (`far`)."""
 
     near: LeftOut
     far: LeftOut
 
     @property
     def square(self) -> float:
-        """Geometric mean of the two mean squares (sigma^2): a law that halves the one may not double the other."""
+        """Geometric mean of the two mean squares (sigma^2).
+
+        An effect that halves the one may not double the other.
+        """
         return sqrt(self.near.square * self.far.square)
 
     @property
@@ -31,16 +34,20 @@ class PredictiveErrors:
 
 
 def predictive_errors(context: FitContext, weighed: ScoredModel) -> PredictiveErrors:
-    """Near and far; of fewer than `FEWEST_TRIALS_TO_HALVE` fitted trials a half is hardly more than a trial, and far is near."""
+    """Return the errors near and far.
+
+    With fewer than `FEWEST_TRIALS_TO_HALVE` fitted trials a half is hardly more than a trial, and far is near.
+    """
     near = left_out(context, weighed.fit)
     return PredictiveErrors(near, halves(context, weighed) if len(context.trials) >= FEWEST_TRIALS_TO_HALVE else near)
 
 
 def halves(context: FitContext, weighed: ScoredModel) -> LeftOut:
-    """Each half of the session as a fit to the other leaves it: two fits in truth, for a step to first order reaches one trial, not
-    half of them. Infinite where a half has no equilibrium under what the other one says.
+    """Return the residuals of each half of the session under a fit to the other half.
 
-    A law that is not the robot's own bends to the poses that were fitted. Neighbours in time mostly share them; halves do not.
+    Both fits are made in full, since a first-order step is accurate for one trial and not for half of them. Residuals are infinite
+    where a half has no equilibrium under the other's fit. A wrong effect adapts to the poses that were fitted; neighbours in time
+    mostly share these, halves do not.
     """
     objective, found = context.objective, weighed.fit
     own = [i for i, f in enumerate(found.model.free) if f.effect is None]

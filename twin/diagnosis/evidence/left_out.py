@@ -1,4 +1,4 @@
-"""What a fitted model would do on each of its own trials, had it been fitted to the others: what every choice is made by."""
+"""Predictions of each fitted trial by a fit to the others (cross-validation): the basis of every choice."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from twin.prediction.evaluate import headline_group
 
 @dataclass(frozen=True)
 class LeftOut:
-    """White residuals z (n, m) sigmas, those of every trial as a fit to the other ones leaves them."""
+    """White residuals z (n, m) sigmas, each trial's under a fit to the others."""
 
     context: FitContext
     z: np.ndarray
@@ -37,12 +37,12 @@ class LeftOut:
 
     @property
     def headline(self) -> float:
-        """The same of the outputs whose error stands for the twin."""
+        """Mean square (sigma^2) of the headline outputs."""
         return float((self.z[:, self._own] ** 2).sum() / self.context.evidence.present[:, self._own].sum())
 
     @property
     def excused(self) -> float:
-        """Of the headline, what the robot's description is not good for (sigma^2)."""
+        """The part of `headline` that errors of the description may explain (sigma^2)."""
         present = self.context.evidence.present[:, self._own]
         return float((present * self.context.accuracy[self._own] ** 2).sum() / present.sum())
 
@@ -53,26 +53,28 @@ class LeftOut:
 
     @cached_property
     def structure(self) -> float:
-        """Its smooth part, sigmas, but for what the robot's description is not good for."""
+        """RMS of the smooth error (sigma) beyond what errors of the description explain."""
         return self.context.evidence.discrepancy(self.z).beyond(self.context.accuracy)
 
     def worse(self, than: LeftOut) -> bool:
-        """In all channels together, each in its own noise, or in the headline's alone, and there by more than what the description
-        gets wrong: that adds to one law's error and takes from another's.
+        """Return whether these errors are larger `than` others.
 
-        An effect that only tendon displacements show leaves the markers' error where it was, but for its last digits.
+        Compare the sum over all channels, each in its own noise, or the headline alone. The latter must exceed the possible errors
+        of the description, which add to the error of one effect and subtract from another's. An effect that shows only in tendon
+        displacements leaves the markers' error nearly unchanged.
         """
         return self.square > than.square or self.headline > WORSE_ERROR_RATIO**2 * than.headline + self.excused
 
 
 def left_out(context: FitContext, fitted: Fit, groups: Sequence[Sequence[int]] | None = None) -> LeftOut:
-    """Residuals on trials left out in turn, to first order; a single trial by quarters. With `groups`, which part the trials by
-    their positions, those of a group are left out together.
+    """Return the residuals of trials left out in turn, to first order; a single trial is left out by quarters.
 
-    With g_k = J_k'z_k and p the priors' gradient, one step from the fit leads the others of trial k to
-    d_k = -(sum_(j != k) J_j'J_j + P)^-1 (sum_(j != k) g_j + p), less the step that all together would still take; z_k becomes
-    z_k + J_k d_k and no fit is repeated. What trial k alone shows stays where it is, as do parameters at an end of their range.
-    Allen (1974), PRESS, by trials.
+    With `groups`, a partition of the trials by position, the trials of a group are left out together.
+
+    With g_k = J_k'z_k and p the priors' gradient, one step from the fit leads the others of trial k to d_k = -(sum_(j != k) J_j'J_j
+    + P)^-1 (sum_(j != k) g_j + p), less the step that all together would still take; z_k becomes z_k + J_k d_k and no fit is
+    repeated. What trial k alone determines stays unchanged, as do parameters at an end of their range. Allen (1974), PRESS, by
+    trials.
     """
     moving = np.flatnonzero(~fitted.at_bound())
     J, z = fitted.J[:, moving], fitted.z.ravel()
@@ -84,7 +86,7 @@ def left_out(context: FitContext, fitted: Fit, groups: Sequence[Sequence[int]] |
     together = solve(H.sum(axis=0) + prior, g.sum(axis=0) + pull)
     out = z.copy()
     for group in groups or [[k] for k in range(len(parts))]:
-        others = np.delete(H, group, axis=0).sum(axis=0) + prior  # summed, not subtracted: a trial may alone show something
+        others = np.delete(H, group, axis=0).sum(axis=0) + prior  # summed, not subtracted: a trial may alone determine something
         without = solve(others, np.delete(g, group, axis=0).sum(axis=0) + pull)
         for a, b in (parts[k] for k in group):
             out[a:b] += J[a:b] @ (together - without)
@@ -92,10 +94,11 @@ def left_out(context: FitContext, fitted: Fit, groups: Sequence[Sequence[int]] |
 
 
 def proven(context: FitContext, fitted: Fit, known: LeftOut) -> LeftOut:
-    """`known`, but for trials whose square a step to first order makes more than `FIRST_ORDER_LIMIT` times what it is: these as a
-    fit to the others, in truth, leaves them; as they are where that has no equilibrium.
+    """Return `known` with full fits for the trials at which a first-order step is not accurate.
 
-    What few trials show, in a way that bends with a parameter as an obstacle's place does, no step tells when they are left out.
+    These are the trials whose square the step makes more than `FIRST_ORDER_LIMIT` times as large; each is predicted by a fit to the
+    others, or unchanged where that has no equilibrium. A first-order step fails for what few trials show, in a way nonlinear in a
+    parameter, as an obstacle's position.
     """
     objective, out, before = context.objective, known.z.ravel().copy(), fitted.z.ravel()
     own = [i for i, f in enumerate(fitted.model.free) if f.effect is None]
@@ -115,7 +118,7 @@ def proven(context: FitContext, fitted: Fit, known: LeftOut) -> LeftOut:
 
 
 def _ends(context: FitContext) -> np.ndarray:
-    """Where each part begins in the flat residual, and where the last ends."""
+    """Return where each part begins in the flat residual, and where the last ends."""
     rows = [len(context.prepared.inputs[k].time) for k in context.trials]
     if len(rows) == 1:
         rows = [len(part) for part in np.array_split(np.arange(rows[0]), PARTS_OF_ONE_TRIAL)]

@@ -1,11 +1,11 @@
-"""Thresholds for the user's own design, from simulated data without any effect.
+"""Acceptance limits for the user's own design, from simulated data without any effect.
 
-With the robot's own parameters fitted, no-effect data leave white noise less what the parameters absorb:
-z = (1 - J (J'J + P)^-1 J') e, e ~ N(0, 1) where something was measured. Each draw is searched as the data are; the 99 % quantile of
-the largest statistic over all effects, regressors and frequencies (a Gumbel law fitted by its moments: few draws do) is what an
-effect must exceed. The floors guard against what no simulation from the model knows: that the model is slightly wrong.
+With the robot's own parameters fitted, data without an effect leave white noise less what the parameters absorb: z = (1 - J (J'J +
+P)^-1 J') e, e ~ N(0, 1) where something was measured. Each draw is searched as the data are. An effect must exceed the 99 %
+quantile of the largest statistic over all effects, regressors and frequencies (of a Gumbel distribution fitted by its moments, for
+which few draws suffice). Fixed lower limits allow for the errors of the model, which no simulation from it shows.
 
-Drawn anew in every diagnosis: they depend on the data and the seed, on nothing that another run left behind.
+Every diagnosis draws again: the limits depend on the data and the seed only.
 """
 
 from dataclasses import dataclass
@@ -34,10 +34,10 @@ from twin.diagnosis.thresholds import (
 
 @dataclass(frozen=True)
 class AcceptanceLimits:
-    """What counts on this design: evidence of an effect, its contribution (sigma), structure left (sigma), a spectral line (z).
+    """The limits on this design: evidence of an effect, its contribution (sigma), structure left (sigma), a spectral line (z).
 
-    `accuracy` (sigma) is what the twin's description is good for. What it gets wrong is a function of the pose, so that it bounds
-    contributions (`visible`) but not the part of them that depends on how a pose was reached (`material`).
+    `accuracy` (sigma) is that of the twin's description. Its errors are functions of the pose: they limit contributions
+    (`visible`), but not the part of them that depends on how a pose was reached (`material`).
     """
 
     accept: float = LEAST_EVIDENCE
@@ -48,24 +48,26 @@ class AcceptanceLimits:
 
     @property
     def visible(self) -> float:
-        """The least contribution (sigma) worth claiming of what the pose alone decides."""
+        """The least contribution (sigma) worth claiming, of an effect that is a function of the pose."""
         return max(self.material, self.accuracy)
 
     @property
     def slight(self) -> float:
-        """Structure (sigma) that a description of this accuracy may leave beside right laws, as it may where none is found."""
+        """Residual structure (sigma) that the accuracy of the description can explain, with or without effects."""
         return max(self.left, min(LARGE_STRUCTURE_WITHOUT_EFFECT, self.accuracy))
 
     @property
     def faint(self) -> float:
-        """A line's bar where no effect was found whose law could leave one."""
+        """The limit of a line where no effect was found that could leave one."""
         return FAINT_LINE_SHARE * self.line
 
 
 @dataclass(frozen=True)
 class NullDraws:
-    """What each no-effect set shows, (NO_EFFECT_DRAWS,) each: evidence and contribution (sigma) of the effect that imitates it
-    best, structure (sigma), and its strongest spectral line (z)."""
+    """The statistics of each simulated set without an effect, (NO_EFFECT_DRAWS,) each.
+
+    Evidence and contribution (sigma) of the effect that imitates it best, structure (sigma), and its strongest spectral line (z).
+    """
 
     gain: np.ndarray
     moved: np.ndarray
@@ -74,7 +76,7 @@ class NullDraws:
 
 
 def acceptance_limits(context: FitContext, base: Fit, known: Dictionary, seed: int) -> AcceptanceLimits:
-    """The larger of floor and null quantile, each."""
+    """Return the larger of the fixed limit and the null quantile, for each statistic."""
     d = draws(context, base, known, seed)
     return AcceptanceLimits(
         accept=max(LEAST_EVIDENCE, quantile(d.gain)),
@@ -85,6 +87,7 @@ def acceptance_limits(context: FitContext, base: Fit, known: Dictionary, seed: i
 
 
 def draws(context: FitContext, base: Fit, known: Dictionary, seed: int) -> NullDraws:
+    """Draw sets without an effect and return their statistics."""
     objective, evidence = context.objective, context.evidence
     n, k = base.z.size, base.J.shape[1]
     present = evidence.present.ravel()[:, None]
@@ -113,5 +116,5 @@ def draws(context: FitContext, base: Fit, known: Dictionary, seed: int) -> NullD
 
 
 def quantile(x: np.ndarray) -> float:
-    """The 99 % quantile of a Gumbel law with the moments of x."""
+    """Return the 99 % quantile of a Gumbel distribution with the moments of x."""
     return float(np.mean(x) + GUMBEL_99_QUANTILE * np.std(x, ddof=1))

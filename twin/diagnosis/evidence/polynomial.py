@@ -1,6 +1,6 @@
 """A prediction without physics: a polynomial of the commands and loads, with a branch for the direction of travel.
 
-What any lab has in ten lines, and what a twin must beat to be worth its name. Each output is ridge regression on
+Any lab has such a fit, and a twin must predict better to be useful. Each output is ridge regression on
 
     1, u_a, u_a u_b, s_a, s_a u_a, m, m u_a        (u commands over their span, s = tanh(du/dt / typical), m payload or gravity)
 
@@ -21,9 +21,9 @@ DEGREES, BRANCHES, RIDGES = (1, 2, 3), (False, True), (1e-6, 1e-4, 1e-2)
 
 
 def predict_by_polynomial(prepared: PreparedRecording, known: Sequence[int], wanted: Sequence[int]) -> list[np.ndarray]:
-    """Return outputs (n_k, n_output) SI of the `wanted` trials from what was measured in the `known` ones.
+    """Return outputs (n_k, n_output) SI of the `wanted` trials from the measurements of the `known` ones.
 
-    NaN throughout for outputs that no known trial has. With fewer than three known trials the plainest form is taken.
+    NaN throughout for outputs that no known trial has. With fewer than three known trials the simplest form is taken.
     """
     order = [*known, *wanted]
     forms = {form: dict(zip(order, _features(prepared, order, *form), strict=True)) for form in product(DEGREES, BRANCHES)}

@@ -1,4 +1,4 @@
-"""Which effects are worth a refit: how much of the residual the first-order pattern of each explains that the model cannot."""
+"""The ranking of effects for a refit: the part of the residual that each first-order pattern explains and the model cannot."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from twin.effects import FitStart, catalogue
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect, where to start it, and the fall of |z|^2 its pattern promises less p log n: white, and beside the discrepancy."""
+    """An effect, its start, and the fall of |z|^2 that its pattern promises less p log n: white, and beside the discrepancy."""
 
     effect: str
     start: FitStart
@@ -35,12 +35,12 @@ class Candidate:
 def rank(
     objective: Objective, evidence: Evidence, fit: Fit, discrepancy: Discrepancy, known: Dictionary, top: int = CANDIDATES_REFITTED
 ) -> list[Candidate]:
-    """The `top` candidates by either measure, best first, a few starts of each effect's forms.
+    """Return the `top` candidates by either measure, best first, a few starts of each effect's forms.
 
     With c the effect's white pattern (per free parameter), J the model's derivatives with their priors P and V the residual's
     covariance (I, or I + Phi D Phi'): A = c' V^-1 c - c' V^-1 J (J' V^-1 J + P)^-1 J' V^-1 c, u = c' V^-1 z less the same
-    projection, gain = u' A^-1 u - p log n. One-sided amplitudes that would be negative stay OFF and cost nothing; an effect of
-    which none is left gains nothing.
+    projection, gain = u' A^-1 u - p log n. One-sided amplitudes that would be negative stay OFF and cost nothing; an effect with no
+    amplitude left gains nothing.
     """
     both = np.concatenate([fit.J, known.columns, fit.z[:, None]], axis=1)
     white, beside = (gains(both, X, fit, known, objective) for X in (both, evidence.whiten(discrepancy, both)))
@@ -60,9 +60,9 @@ def rank(
 
 
 def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
-    """X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X.
+    """Return X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X.
 
-    A parameter at an end of its range imitates nothing: it went as far as it may.
+    A parameter at an end of its range imitates nothing.
     """
     S = X.T @ VX
     own = np.flatnonzero(~fit.at_bound())
@@ -71,7 +71,7 @@ def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
 
 
 def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective: Objective) -> list[float]:
-    """Gain of every pattern; X = [J, columns, z] and VX = V^-1 X."""
+    """Return the gain of every pattern; X = [J, columns, z] and VX = V^-1 X."""
     k = fit.J.shape[1]
     left = projected(X, VX, fit)
     raw = np.einsum("ni,ni->i", X, VX)
@@ -92,8 +92,11 @@ def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective:
 
 
 def _amplitudes(A: np.ndarray, u: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """What takes most off |z|^2, none below its `least`: z falls by column * amplitude, columns being changes of the residual, so
-    that without bounds it is -A^-1 u. Of a law for every tendon some stay at 0 where one is worn."""
+    """Return the amplitudes that reduce |z|^2 most, none below its `least`.
+
+    z falls by column * amplitude, the columns being changes of the residual, so that without bounds the solution is -A^-1 u. Of an
+    effect with one amplitude a tendon, some stay at 0 where one tendon has it.
+    """
     held = A + 1e-9 * np.trace(A) * np.eye(len(A))
     amplitude = -solve(held, u)
     if np.all(amplitude >= least):

@@ -1,4 +1,4 @@
-"""A fitted model, what the evidence says of it, and its refits."""
+"""A fitted model, its evidence, and its refits."""
 
 from dataclasses import dataclass, replace
 
@@ -13,13 +13,16 @@ from twin.effects import FitStart, catalogue
 from twin.effects.base.scaling import scaled_extended_starts
 from twin.foundation.errors import SolveError
 
-EffectForms = tuple[tuple[str, str], ...]  # effect and its form, sorted; by these sets are told apart
+EffectForms = tuple[tuple[str, str], ...]  # effect and its form, sorted; the key of a set of effects
 
 
 @dataclass(frozen=True)
 class ScoredModel:
-    """A fitted model and its evidence: `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n, less the noise of
-    readings that the law keeps from the robot, `unheard` (`Study.unheard`), up to a constant."""
+    """A fitted model and its evidence, up to a constant.
+
+    `score` = 2 max log N(z; 0, I + Phi D Phi') - prior terms - k log n - `unheard`, where `unheard` is the input noise that the
+    effects keep from the robot (`FitContext.blocked_input_noise`).
+    """
 
     fit: Fit
     score: float
@@ -28,12 +31,12 @@ class ScoredModel:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Of the robot, that is: not the zeros of this recording that jumped."""
+        """The effects of the robot, without the jumping zeros of this recording."""
         return tuple(sorted(e.id for e in of_robot(self.fit.model.twin.effects)))
 
     @property
     def forms(self) -> EffectForms:
-        """The same with the form each effect has."""
+        """The effects, each with its form."""
         free = {e: tuple(f.parameter.name for f in self.fit.model.free if f.effect == e) for e in self.effects}
         return tuple((e, catalogue()[e].form(free[e])) for e in self.effects)
 
@@ -42,6 +45,7 @@ class ScoredModel:
 
 
 def score_model(context: FitContext, fitted: Fit) -> ScoredModel:
+    """Return a fit with its score."""
     gain, discrepancy = context.evidence.log_likelihood_gain(fitted.z)
     prior = fitted.cost - float(fitted.z @ fitted.z)
     size = fitted.effective_parameters() * float(np.log(context.objective.n))
@@ -52,10 +56,10 @@ def score_model(context: FitContext, fitted: Fit) -> ScoredModel:
 def with_effect_added(
     context: FitContext, member: ScoredModel, effect: str, start: FitStart, beat: float = np.inf
 ) -> ScoredModel | None:
-    """`member` with one effect more, fitted as far as it may `beat` a cost; None without equilibrium.
+    """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
-    Amplitudes of either sign take a step before the shape that goes with them: what a shape does is in proportion to them, and
-    of a drift begun with the wrong sign the first step would end in any shape.
+    Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
+    and from a drift of the wrong sign the first step could reach any shape.
     """
     n_tendon, model, near = context.prepared.n_tendon, member.fit.model, member.fit.evaluation
     values = dict(start.values)
@@ -73,7 +77,7 @@ def with_effect_added(
 
 
 def _signed(effect: str, start: FitStart, n_tendon: int) -> tuple[str, ...]:
-    """Of a start that frees a shape too, the amplitudes that may have either sign."""
+    """Return the signed amplitudes of a start that frees the parameters of a shape too."""
     law = catalogue()[effect]
     if not set(start.free) & set(law.inactive_when_off):
         return ()
@@ -82,10 +86,10 @@ def _signed(effect: str, start: FitStart, n_tendon: int) -> tuple[str, ...]:
 
 
 def with_extended_law(context: FitContext, found: ScoredModel, accept: float) -> ScoredModel:
-    """The fuller law of an effect (a second creep time), where it is not in force yet and the data ask for it; where one is, one
-    that has all of that and more (springs each with its own).
+    """Return the model with the extended equation of an effect (a second creep time), where the data support it.
 
-    Before other effects are added: what the plain law leaves would be taken for them.
+    Where an extended equation is in force, try one that contains it and more (an own value for each spring). This comes before
+    other effects are added, which would otherwise be fitted to what the simple equation leaves.
     """
     n_tendon, parts = context.prepared.n_tendon, context.prepared.robot.build().features
     for effect in found.effects:
@@ -100,27 +104,27 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
         starts = [s for s in starts if in_force <= set(s.free) and not set(s.free) <= set(free)]
         if not starts:
             continue
-        if not context.budget.allows(f"the fuller law of {effect}"):
+        if not context.budget.allows(f"the extended equation of {effect}"):
             continue
-        context.progress(f"fuller law of {effect}")
+        context.progress(f"extended equation of {effect}")
         for start in starts:
             values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
             model = plain.fit.model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
                 stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE)
-                fuller = score_model(context, fit(context.objective, model, J=_own(plain.fit), stop=stop))
+                extended = score_model(context, fit(context.objective, model, J=_own(plain.fit), stop=stop))
             except SolveError:
                 continue
-            if fuller.score > max(found.score, plain.score + accept):
-                found = fuller
+            if extended.score > max(found.score, plain.score + accept):
+                found = extended
     return found
 
 
 def refit_without(context: FitContext, base: ScoredModel, best: ScoredModel, effect: str) -> ScoredModel:
-    """The best set less one effect, everything else fitted again.
+    """Return the best set less one effect, with everything else fitted again.
 
-    A robot fitted with the effect may have no equilibrium without it, where lengths are held: then from the base's robot, and where
-    that has none under the other effects, the base itself.
+    A robot fitted with the effect may have no equilibrium without it, where lengths are held. Then the fit starts from the base's
+    robot; where that has none under the other effects, return the base itself.
     """
     context.progress(f"without {effect}")
     keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
@@ -135,12 +139,15 @@ def refit_without(context: FitContext, base: ScoredModel, best: ScoredModel, eff
 
 
 def better(found: ScoredModel, than: ScoredModel) -> bool:
-    """Of two fits of the same effects. With the same parameters free they are minima of one cost, and the lower one is the fit."""
+    """Return whether one of two fits of the same effects is the better one.
+
+    With the same free parameters both are minima of one cost, and the lower one is the better; else the score decides.
+    """
     if set(found.fit.model.free) == set(than.fit.model.free):
         return found.fit.cost < than.fit.cost
     return found.score > than.score
 
 
 def _own(fitted: Fit) -> np.ndarray:
-    """Derivatives for the robot's own parameters, which come first."""
+    """Return the derivatives for the robot's own parameters, which come first."""
     return fitted.J[:, [i for i, f in enumerate(fitted.model.free) if f.effect is None]]

@@ -1,1 +1,1 @@
-"""What is left, in words, and the experiment that would settle a doubt."""
+"""What is left, in words, and the experiment that would separate ambiguous candidates."""

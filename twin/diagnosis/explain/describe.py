@@ -1,4 +1,4 @@
-"""Stage `describe`: what is left after the verdict, in words, and where to look for it."""
+"""Stage `describe`: describe what the verdict leaves, and where in the data it is."""
 
 from dataclasses import dataclass
 
@@ -21,14 +21,14 @@ from twin.diagnosis.verdict.gate import Gated
 from twin.diagnosis.verdict.judge import Judgement
 
 PREDICTED = (
-    "what is claimed was chosen for what it predicts of trials and halves of the session left out; by evidence, to which a large "
-    "smooth error costs no more than a small one, other sets come before it, which the probabilities show"
+    "the claims were chosen for their predictions of left-out trials and halves of the session; other sets have more evidence, "
+    "in which a large smooth error costs no more than a small one, and the probabilities follow the evidence"
 )
 
 
 @dataclass(frozen=True)
 class Description:
-    """What is left: in words; RMS (sigmas) by component; its strongest regressors; the channel it shows in most; notices."""
+    """What is left: in words; RMS (sigmas) by component; its strongest regressors; the channel with most of it; notices."""
 
     words: str
     components: dict[str, float]
@@ -38,14 +38,14 @@ class Description:
 
 
 def describe(context: FitContext, found: Search, gated: Gated, judged: Judgement, limits: AcceptanceLimits) -> Description:
-    """Of the model that the verdict leaves in force."""
+    """Describe what the model in force leaves."""
     final = judged.final
     strongest = tuple(context.evidence.strongest(final.discrepancy))
     if judged.verdict in ("noise", "explained"):
         words = f"What is left looks like noise (smooth part {_parts(final.discrepancy.size, judged.signs.after)})."
     else:
         words = _left(context, found, judged, limits, strongest[0][0])
-        words += "" if gated.doubts else _hint(context, found, judged)  # what is in doubt explains more, and is said below
+        words += "" if gated.doubts else _hint(context, found, judged)  # an ambiguous effect explains more, and follows below
     words += "".join(undecided(d.effect, d.rival) for d in gated.doubts)
     z = final.fit.z.reshape(final.discrepancy.mean.shape)
     rebuilt = (mixed(context.prepared, judged.rigs).strip(),) if judged.rigs else ()
@@ -53,11 +53,11 @@ def describe(context: FitContext, found: Search, gated: Gated, judged: Judgement
     late = undersampled_commands(context.prepared, context.trials, final.fit)
     outweighed = any(w.score > final.score for w in found.all)
     chosen = (PREDICTED,) if found.predicted and outweighed and judged.verdict == "partly_explained" else ()
-    doubts = (doubtful(judged.doubtful),) if judged.doubtful else ()
+    unlikely_claims = (doubtful(judged.doubtful),) if judged.doubtful else ()
     notices = (
         *unlikely(final.fit),
         *judged.signs.strained,
-        *doubts,
+        *unlikely_claims,
         *repeatability(context, final.fit),
         *late,
         *rebuilt,
@@ -68,7 +68,7 @@ def describe(context: FitContext, found: Search, gated: Gated, judged: Judgement
 
 
 def _parts(size: float, beyond: float) -> str:
-    within = f", {beyond:.2f} beyond what the robot's description is good for" if size - beyond > STRUCTURE_WORTH_A_WORD else ""
+    within = f", {beyond:.2f} beyond the description's accuracy" if size - beyond > STRUCTURE_WORTH_A_WORD else ""
     return f"{size:.2f} sigma{within}"
 
 
@@ -93,7 +93,7 @@ def _left(context: FitContext, found: Search, judged: Judgement, limits: Accepta
 
 
 def _hint(context: FitContext, found: Search, judged: Judgement) -> str:
-    """The runner-up, with the share it takes off the error left out."""
+    """Return the best runner-up, with the share of the left-out error that it explains."""
     if not judged.runners_up:
         return ""
     first = judged.runners_up[0]

@@ -1,7 +1,4 @@
-"""Which place of the body an error sits at.
-
-All from residuals of the fitted trials, (n, m).
-"""
+"""The place on the body of an error, from residuals of the fitted trials (n, m)."""
 
 from collections.abc import Sequence
 
@@ -14,7 +11,7 @@ from twin.robots.family import load_family
 
 
 def _markers(prepared: PreparedRecording) -> dict[str, list[int]]:
-    """Columns of each marker by its name, base to tip, in order of their axes."""
+    """Return the columns of each marker by its name, base to tip, in order of their axes."""
     found: dict[int, list[int]] = {}
     for j, o in enumerate(prepared.outputs):
         if OUTPUT_GROUPS[o.group].is_point:
@@ -24,7 +21,7 @@ def _markers(prepared: PreparedRecording) -> dict[str, list[int]]:
 
 
 def place(prepared: PreparedRecording, x: np.ndarray) -> str:
-    """Which markers carry an error x (n, m), in words; "" with fewer than three of them."""
+    """Return which markers carry an error x (n, m), in words; "" with fewer than three of them."""
     columns = _markers(prepared)
     if len(columns) < 3:
         return ""
@@ -41,12 +38,12 @@ def place(prepared: PreparedRecording, x: np.ndarray) -> str:
 
 
 def describe_location(prepared: PreparedRecording, trials: Sequence[int], off: np.ndarray, predicted: Sequence[np.ndarray]) -> str:
-    """The place that `misbent` finds, in words; "" if there is none."""
+    """Return the place found by `misbent_segment`, in words; "" if there is none."""
     at = misbent_segment(prepared, trials, off, predicted)
     if at is None:
         return ""
     if at == 0:
-        return " The fitted robot is off from its base on, as a whole: look at the clamp and the camera."
+        return " The fitted robot is off from its base on, as a whole: check the clamp and the camera."
     names = [name for name, c in _markers(prepared).items() if len(c) == 3]
     return f" The fitted robot bends wrongly at one place, between {names[at - 1]} and {names[at]}."
 
@@ -54,12 +51,12 @@ def describe_location(prepared: PreparedRecording, trials: Sequence[int], off: n
 def misbent_segment(
     prepared: PreparedRecording, trials: Sequence[int], off: np.ndarray, predicted: Sequence[np.ndarray]
 ) -> int | None:
-    """The chord, from 0 at the base, in which alone the fitted robot bends wrongly; None if there is no such place.
+    """Return the chord, from 0 at the base, in which alone the fitted robot bends wrongly; None if there is none.
 
-    `off` (n, m) is the smooth part of its error, `predicted` (n_k, m) where it should be, both SI. A chord t from marker to marker,
-    the base the first, turns by w = t x (change of `off` along it) / |t|^2. Bending that is wrong between two markers makes w jump
-    at both, whatever the rest of the body does to make up for it. That holds of markers on a backbone: between points of a skin,
-    here and there around it, a chord turns with the section too, and the shorter it is the more by their noise.
+    `off` (n, m) is the smooth part of its error, `predicted` (n_k, m) the predicted positions, both SI. A chord t from marker to
+    marker, the base the first, turns by w = t x (change of `off` along it) / |t|^2. Wrong bending between two markers makes w jump
+    at both, however the rest of the body compensates. This holds for markers on a backbone. Between points around a skin a chord
+    also turns with the section, and short chords turn by noise.
     """
     whole = {name: c for name, c in _markers(prepared).items() if len(c) == 3}
     if len(whole) < 4 or load_family(prepared.robot.family).chain is None:
@@ -77,5 +74,5 @@ def misbent_segment(
 
 
 def _chords(x: np.ndarray) -> np.ndarray:
-    """Differences (n, marker, 3) from each marker to the next, the first from the base, which is at rest."""
+    """Return differences (n, marker, 3) from each marker to the next, the first from the base, which is at rest."""
     return np.diff(x, axis=1, prepend=0.0)

@@ -1,8 +1,8 @@
-"""Inside and beyond what was fitted: what the model in force predicts of a trial, and of a whole level of a condition, left out.
+"""Prediction within and beyond the fitted conditions: errors on left-out trials, and on left-out levels of a condition.
 
-A law that holds at every payload that was fitted need not hold at the next one. Where trials span a condition, each of its levels
-is left out at once, to first order as single trials are; where a day is only partly explained each half of the session too, by fits
-to the other. An effect that helps on trials left out and harms on levels is named.
+An effect that holds at every fitted payload need not hold at the next one. Where trials span a condition, each of its levels is
+left out at once, to first order as single trials are. Where the verdict is "partly explained", each half of the session is
+predicted by a fit to the other too. An effect that helps on left-out trials and harms on left-out levels is named.
 """
 
 from collections.abc import Sequence
@@ -24,8 +24,11 @@ NAMED_CONDITIONS = {"payload": "payload", "torque": "load torque", "rate": "rate
 
 @dataclass(frozen=True)
 class Extrapolation:
-    """Of one condition: what it is, how many levels there are, the error (sigmas) on trials (`inside`) and on levels (`beyond`)
-    left out in turn, and which claimed effects lessen the one and enlarge the other."""
+    """The errors of one condition.
+
+    Its name, the number of levels, the errors (sigmas) on left-out trials (`inside`) and on left-out levels (`beyond`), and the
+    claimed effects that reduce the former and increase the latter.
+    """
 
     condition: str
     levels: int
@@ -34,39 +37,42 @@ class Extrapolation:
     harmful: tuple[str, ...]
 
     def words(self) -> str:
-        told = (
-            f"left out by {self.condition} ({self.levels} levels): {self.beyond:.2f} sigma are left beyond what was fitted, "
-            f"{self.inside:.2f} inside"
+        words = (
+            f"left out by {self.condition} ({self.levels} levels): an error of {self.beyond:.2f} sigma beyond the fitted levels, "
+            f"{self.inside:.2f} within them"
         )
         if not self.harmful:
-            return told
+            return words
         named = " and ".join(display_name(e) for e in self.harmful)
-        return f"{told}; {named} helps inside and harms beyond: do not trust it there"
+        return f"{words}; {named} helps within and harms beyond: do not trust it there"
 
 
 def extrapolation(context: FitContext, final: ScoredModel, gated: Gated, by_time: bool) -> tuple[Extrapolation, ...]:
-    """One for each condition that the fitted trials span, if asked for time too; `final` is the model in force."""
+    """Return one for each condition that the fitted trials span, and for time where `by_time`.
+
+    `final` is the model in force.
+    """
     added = [e for e in gated.without if e in final.effects]
     models = {"": final, **{e: gated.without[e] for e in added}}
     inside = {e: left_out(context, w.fit).square for e, w in models.items()}
 
-    def told(condition: str, count: int, far: dict[str, float]) -> Extrapolation:
+    def compared(condition: str, count: int, far: dict[str, float]) -> Extrapolation:
         harmful = tuple(e for e in added if inside[e] > inside[""] and far[""] > WORSE_ERROR_RATIO**2 * far[e])
         return Extrapolation(condition, count, float(np.sqrt(inside[""])), float(np.sqrt(far[""])), harmful)
 
     out = []
     for condition, groups in levels(context.prepared, context.trials).items():
-        out.append(told(condition, len(groups), {e: left_out(context, w.fit, groups).square for e, w in models.items()}))
+        out.append(compared(condition, len(groups), {e: left_out(context, w.fit, groups).square for e, w in models.items()}))
     if by_time and len(context.trials) >= FEWEST_TRIALS_TO_HALVE:
-        out.append(told("half of the session", 2, {e: halves(context, w).square for e, w in models.items()}))
+        out.append(compared("half of the session", 2, {e: halves(context, w).square for e, w in models.items()}))
     return tuple(out)
 
 
 def levels(prepared: PreparedRecording, trials: Sequence[int]) -> dict[str, list[list[int]]]:
-    """By condition the positions in `trials` that share a level, where there are three levels or more, not all of one trial.
+    """Return by condition the positions in `trials` that share a level.
 
-    Loads within a tenth of their range are one level, rates within half a decade. Two levels would leave one, which shows no trend
-    to go on; and a level of one trial is that trial left out.
+    Only conditions with three levels or more, not all of one trial. Loads within a tenth of their range are one level, rates within
+    half a decade. With two levels, leaving one out leaves no trend; and a level of one trial is that trial left out.
     """
     inputs = [prepared.inputs[k] for k in trials]
     speed = [np.median(np.abs(np.diff(i.command, axis=0)).max(axis=1) / np.diff(i.time)) for i in inputs]
@@ -82,7 +88,7 @@ def levels(prepared: PreparedRecording, trials: Sequence[int]) -> dict[str, list
 
 
 def _apart(values: np.ndarray, gap: float) -> list[list[int]]:
-    """Positions of values that follow one another closer than `gap`, together."""
+    """Return the positions of values in groups: neighbouring values closer than `gap` are in one group."""
     order = np.argsort(values, kind="stable")
     cuts = np.flatnonzero(np.diff(values[order]) > max(gap, 1e-12)) + 1
     return [sorted(part.tolist()) for part in np.split(order, cuts)]

@@ -1,6 +1,6 @@
-"""The next experiment: the one trial, from a menu the robot can run, that best separates the two best explanations.
+"""The next experiment: the one trial, from a menu that the robot can run, that best separates the two best explanations.
 
-T-optimality (Atkinson and Fedorov 1975): with both models fitted to today's data, T = min over B's parameters, held by their
+T-optimality (Atkinson and Fedorov 1975): with both models fitted to the present data, T = min over B's parameters, held by their
 present covariance, of |W (y_A - y_B)|^2; T = 25 separates them by five standard errors.
 """
 
@@ -21,13 +21,15 @@ from twin.foundation.errors import SolveError
 from twin.measurements import Channel
 from twin.prediction.prepared import Inputs, Output, PreparedRecording
 
-_Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, what a's adds to it
+_Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, the difference
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A trial in words and as commands, the separation T of one run of it, how many runs reach T = 25, and the sets of effects it
-    separates."""
+    """A trial in words and as commands, with its power to separate two sets of effects.
+
+    `separation`: T of one run. `repeats`: how many runs reach T = 25. `between`: the two sets of effects.
+    """
 
     words: str
     trial: Inputs
@@ -37,11 +39,11 @@ class Experiment:
 
 
 def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
-    """Trials this robot could run, within the commands already used; payload up to three times as much, at most 30 g; of a jaw
-    load torques from none to the largest.
+    """Return trials that this robot could run, within the commands already used.
 
-    Where displacements are commanded, the tendons that do not pull are paid out, so that they are slack. Springs that currents heat
-    cool within a minute: what is fast to a motor they would not feel.
+    The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
+    are commanded, the tendons that do not pull are let out, so that they are slack. Springs heated by currents cool within a minute
+    and would not respond to a fast pull of a motor.
     """
     n = prepared.n_tendon
     top = np.max([i.command.max(axis=0) for i in prepared.inputs], axis=0)
@@ -68,7 +70,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
     up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
     hold = np.concatenate([[0.0], np.full(60, HELD_COMMAND_SHARE)])
-    for i in np.flatnonzero(top > 0.0):  # what was never commanded has no range to stay within
+    for i in np.flatnonzero(top > 0.0):  # a tendon that was never commanded has no range
         alone = np.eye(n)[i]
         what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", 4.0)
         pull = f"heat {what} with up" if prepared.drives[i] is Drive.CURRENT else f"pull {what}"
@@ -97,11 +99,11 @@ def _shown(x: float) -> str:
 
 
 def next_experiment(prepared: PreparedRecording, noise: Noise, a: Fit, b: Fit, jobs: int) -> Experiment | None:
-    """The trial of the menu with the largest separation of the rival `b` from the claimed `a`; None where no trial helps."""
+    """Return the trial of the menu that best separates the rival `b` from the claimed `a`; None where no trial helps."""
     rivals = tuple(e.id for e in of_robot(a.model.twin.effects)), tuple(e.id for e in of_robot(b.model.twin.effects))
     prepared, noise = _foreseen(prepared, noise)
 
-    def told(words: str, inputs: Inputs) -> _Apart | None:
+    def predicted(words: str, inputs: Inputs) -> _Apart | None:
         n = len(inputs.time)
         empty = np.zeros((n, len(prepared.outputs)))
         imagined = replace(prepared, inputs=(inputs,), measured=(empty,))
@@ -114,8 +116,10 @@ def next_experiment(prepared: PreparedRecording, noise: Noise, a: Fit, b: Fit, j
         except SolveError:
             return None
 
-    found: Any = Parallel(n_jobs=jobs, prefer="threads", require="sharedmem")(delayed(told)(*trial) for trial in menu(prepared))
-    # What a robot does not feel (a load where nothing weighs, a pace without a law of time) makes no other trial: the first stands.
+    found: Any = Parallel(n_jobs=jobs, prefer="threads", require="sharedmem")(
+        delayed(predicted)(*trial) for trial in menu(prepared)
+    )
+    # Keep one of several trials to which the robot responds alike (a load without gravity, a rate without a time effect).
     alike: dict[bytes, _Apart] = {}
     for trial in found:
         if trial is not None:
@@ -123,11 +127,11 @@ def next_experiment(prepared: PreparedRecording, noise: Noise, a: Fit, b: Fit, j
     apart = list(alike.values())
     best: Experiment | None = None
     for words, inputs, objective, at, d in sorted(apart, key=lambda trial: -float(trial[-1] @ trial[-1])):
-        if best is not None and float(d @ d) <= best.separation:  # what b could imitate only lessens it
+        if best is not None and float(d @ d) <= best.separation:  # b's imitation can only reduce it
             break
         try:
             T = _separation(objective, b, at, d)
-        except SolveError:  # a neighbour of b has no equilibrium there: no trial to send anyone to
+        except SolveError:  # a neighbour of b has no equilibrium there: not a trial to recommend
             continue
         if best is None or best.separation < T:
             best = Experiment(words, inputs, T, max(1, int(np.ceil(CLEAR_CHI_SQUARE / max(T, 1e-9)))), rivals)
@@ -135,7 +139,10 @@ def next_experiment(prepared: PreparedRecording, noise: Noise, a: Fit, b: Fit, j
 
 
 def _foreseen(prepared: PreparedRecording, noise: Noise) -> tuple[PreparedRecording, Noise]:
-    """With the tip in place of patches of skin: which points of it a camera will see is not known, but that it tells the tip is."""
+    """Return the recording with the tip in place of patches of skin, and its noise model.
+
+    Which points of the skin a camera will see is not known; that it shows the tip is.
+    """
     skin = [j for j, o in enumerate(prepared.outputs) if o.group == "skin"]
     if not skin:
         return prepared, noise
@@ -148,7 +155,7 @@ def _foreseen(prepared: PreparedRecording, noise: Noise) -> tuple[PreparedRecord
 
 
 def _separation(objective: Objective, b: Fit, at: Evaluation, d: np.ndarray) -> float:
-    """What is left of |d|^2, d = W (y_A - y_B), when B's parameters move within their present covariance to imitate A."""
+    """Return the part of |d|^2, d = W (y_A - y_B), that B's parameters cannot imitate within their present covariance."""
     J = objective.jacobian(at, range(len(b.model.free)))
     inner = b.information() + J.T @ J
     u = J.T @ d

@@ -1,12 +1,12 @@
-"""What is left, held against a force on the tip that changes with where the tip is: a magnet, a spring, a cable that drags.
+"""A check of what is left for a tip force that depends on the tip's position: a magnet, a spring, a cable that drags.
 
-No law of the catalogue, since every such thing has its own. To first order in where the tip is,
+It is no effect of the catalogue, since every such force has its own form. To first order in the tip's position,
 
     F(x) = f + G (x - mean x),
 
 twelve numbers, whose effect on the white residual is C_a per newton along axis a, so that z ~ C_a (f_a + G_ab (x - mean x)_b) is
-linear least squares beside the robot's own parameters. It is said where it takes `TIP_FORCE_SHARE` of the smooth error, f alone
-does not, and the evidence is `LEAST_EVIDENCE` after twelve numbers.
+linear least squares beside the robot's own parameters. It is reported where it explains `TIP_FORCE_SHARE` of the smooth error, f
+alone does not, and the evidence is `LEAST_EVIDENCE` after twelve numbers.
 """
 
 from dataclasses import dataclass, replace
@@ -35,21 +35,27 @@ class TipForce(Effect):
 
 @dataclass(frozen=True)
 class PoseDependentForce:
-    """The share of the smooth error it takes, and by how much (N) it changes: of |F - mean F| over the fitted samples what nine of
-    ten are below. Where it points is not told: what pulls along a robot that does not stretch moves nothing."""
+    """A tip force that depends on the tip's position.
+
+    `share`: of the smooth error that it explains. `change` (N): the 90 % quantile of |F - mean F| over the fitted samples. Its
+    direction is not reported: a force along an inextensible robot moves nothing.
+    """
 
     share: float
     change: float
 
     def words(self) -> str:
         return (
-            f" A force on the tip that changes with where the tip is, by some {1e3 * self.change:.2g} mN, would take "
+            f" A force on the tip that changes with where the tip is, by some {1e3 * self.change:.2g} mN, would explain "
             f"{100 * self.share:.0f} % of it: a magnet, a spring, a cable that drags?"
         )
 
 
 def pose_dependent_force(context: FitContext, final: ScoredModel) -> PoseDependentForce | None:
-    """The force on the tip that would leave what `final` leaves; None where none would, or where the tip is not known."""
+    """Return the tip force that would explain what `final` leaves.
+
+    None where none would, or where the tip is not known.
+    """
     body, fit, size = context.prepared.robot.build(), final.fit, final.discrepancy.size
     if "tip_x" not in body.senses or size == 0.0:
         return None
@@ -71,7 +77,7 @@ def pose_dependent_force(context: FitContext, final: ScoredModel) -> PoseDepende
 
 
 def _taken(context: FitContext, final: ScoredModel, K: np.ndarray) -> tuple[float, np.ndarray]:
-    """The fall of |z|^2, beside the robot's own parameters with their priors, and the numbers (p,) for columns K (n, p)."""
+    """Return the fall of |z|^2, beside the robot's own parameters with their priors, and the numbers (p,) for columns K (n, p)."""
     J, z, k = final.fit.J, final.fit.z, final.fit.J.shape[1]
     scale = np.maximum(np.linalg.norm(K, axis=0), 1e-30)
     prior = np.zeros((k, k + K.shape[1]))

@@ -1,11 +1,11 @@
-"""Judged within trials: which law goes the way of what is left there, where declared noise is how trials repeat.
+"""Effects within trials: which effect explains what is left there, where the declared noise is that between repeated trials.
 
-Noise that is the same throughout a trial hides nothing of what happens in it. Against what rows scatter by,
+Noise that is constant throughout a trial hides nothing that happens within it. In units of the scatter of rows,
 
     z = C a + J b + what is left,
 
-C a law's first-order pattern, J the model's derivatives, all of what outputs move by within a trial; b is held to what the fit to
-the whole says of it, its posterior.
+C an effect's first-order pattern, J the model's derivatives, all less the mean of each trial. The prior of b is its posterior from
+the fit to all data.
 """
 
 from collections.abc import Sequence
@@ -26,25 +26,28 @@ Share = tuple[str, float]
 
 @dataclass(frozen=True)
 class WithinTrial:
-    """What is left within trials that the robot's own numbers do not take either, RMS in what rows scatter by; and the share of its
-    square beyond that scatter that each law takes on trials left out in turn, the largest first, those that take some."""
+    """The error within trials that the robot's own parameters do not explain, and what effects explain of it.
+
+    `size`: RMS in units of the scatter of rows. `shares`: of its square beyond that scatter, by effect, on trials left out in turn;
+    the largest first, without those that explain nothing.
+    """
 
     size: float
     shares: tuple[Share, ...]
 
     def words(self) -> str:
         if self.size < np.hypot(1.0, LARGE_STRUCTURE_WITHOUT_EFFECT):
-            return "as much as rows scatter by"
+            return "no more than rows scatter by"
         if not self.shares or self.shares[0][1] < EVEN_CHANCE:
-            return "of which no effect known here takes half"
+            return "of which no known effect explains half"
         (first, most), *others = self.shares
         rivals = [f"{e.replace('_', ' ')} {100 * s:.0f} %" for e, s in others if s > RIVAL_SHARE * most]
-        told = f"; told apart by nothing here: {', '.join(rivals)}" if rivals else ""
-        return f"of whose square {first.replace('_', ' ')} takes {100 * most:.0f} % on trials left out in turn{told}"
+        similar = f"; these data cannot separate it from {', '.join(rivals)}" if rivals else ""
+        return f"of whose square {first.replace('_', ' ')} explains {100 * most:.0f} % on left-out trials{similar}"
 
 
 class Moving(Whitener):
-    """White by the noise of a trial's rows, of what every output moves by within it, its mean over what was measured taken off."""
+    """A whitener by the noise of a trial's rows, of outputs less their mean over the trial."""
 
     def trial(self, k: int, r: np.ndarray) -> np.ndarray:
         present = self.present[k]
@@ -53,13 +56,16 @@ class Moving(Whitener):
 
     @property
     def free(self) -> float:
-        """How many numbers are left to scatter: a mean of each output and trial less than were measured."""
+        """Degrees of freedom of the scatter: the measured samples less a mean of each output and trial."""
         return float(sum(np.maximum(p.sum(axis=0) - 1, 0).sum() for p in self.present))
 
 
 def within_trial(context: FitContext, found: Fit, rows: Noise, sensitivity: Sequence[np.ndarray], asked: np.ndarray) -> WithinTrial:
-    """Of the model in force, against what its `rows` scatter by, with the answers to its drives (n_k, n_output, n_tendon); of the
-    outputs that are `asked` (n_output,)."""
+    """Return the error within trials of the model in force.
+
+    `rows`: the noise model of rows. `sensitivity` (n_k, n_output, n_tendon): responses to the drives. `asked` (n_output,): the
+    outputs to use.
+    """
     prepared, trials = context.prepared, context.trials
     measured = [np.where(asked, prepared.measured[k], np.nan) for k in trials]
     moving = Moving(rows, measured, sensitivity, [prepared.inputs[k].command for k in trials])
@@ -73,7 +79,10 @@ def within_trial(context: FitContext, found: Fit, rows: Noise, sensitivity: Sequ
 
 
 def _judged(S: np.ndarray, believed: np.ndarray, known: Dictionary, n_tendon: int, count: float) -> WithinTrial:
-    """From each trial's products S (n_trial, p, p) of [J, C, z], and the information (k, k) on the model's own parameters."""
+    """Return the result from each trial's products S (n_trial, p, p) of [J, C, z].
+
+    `believed` (k, k): the information on the model's own parameters.
+    """
     own = np.arange(len(believed))
     alone, _ = _unseen(S, own, believed)
     best: dict[str, float] = {}
@@ -81,7 +90,7 @@ def _judged(S: np.ndarray, believed: np.ndarray, known: Dictionary, n_tendon: in
         where = len(own) + np.array(pattern.where)
         used = S[:, where, where].sum(axis=0) > 0.0
         least, left = pattern.least(n_tendon), alone
-        while used.any():  # without those that would have to be below their least
+        while used.any():  # without those that would be below their least value
             left, amplitudes = _unseen(S, np.append(own, where[used]), believed)
             low = amplitudes[len(own) :] < least[used]
             if not low.any():
@@ -94,7 +103,10 @@ def _judged(S: np.ndarray, believed: np.ndarray, known: Dictionary, n_tendon: in
 
 
 def _unseen(S: np.ndarray, which: np.ndarray, believed: np.ndarray) -> tuple[float, np.ndarray]:
-    """The squares left on every trial by numbers fitted to the others, and those fitted to all; z falls by column * number."""
+    """Return the squares left on every trial by numbers fitted to the others, and the numbers fitted to all.
+
+    z falls by column * number.
+    """
     prior = np.zeros((len(which), len(which)))
     prior[: len(believed), : len(believed)] = believed
     H, g, square = S[:, which[:, None], which], S[:, which, -1], S[:, -1, -1]

@@ -1,5 +1,4 @@
-"""What is left, in words, so that an engineer knows where to look: channel, frequency, what it moves with, since when, and the
-known effect that comes nearest.
+"""What is left, in words: channel, frequency, what it moves with, when it began, and the nearest known effect.
 
 All from whitened residuals of the fitted trials, (n, m) in sigmas: noise alone is 1.
 """
@@ -18,12 +17,12 @@ from twin.prediction.prepared import PreparedRecording
 
 
 def components(discrepancy: Discrepancy) -> dict[str, float]:
-    """RMS (sigmas) of the left-over smooth error by component, over all channels."""
+    """Return the RMS (sigmas) of the residual smooth error by component, over all channels."""
     return {c: float(np.sqrt(np.mean(v))) for c, v in zip(COMPONENTS, discrepancy.variance.T, strict=True)}
 
 
 def worst_channel(prepared: PreparedRecording, z: np.ndarray) -> str:
-    """The channel of the largest residual."""
+    """Return the channel with the largest residual."""
     return prepared.outputs[int(np.argmax((z**2).mean(axis=0)))].channel.name
 
 
@@ -36,7 +35,10 @@ def structure(
     line: tuple[float, float],
     limits: AcceptanceLimits,
 ) -> str:
-    """The residual z (n, m) of a twin that leaves structure, with its strongest regressor and its line (z-score, Hz)."""
+    """Describe the residual z (n, m) of a twin that leaves structure.
+
+    `strongest`: its strongest regressor. `line`: its strongest spectral line (z-score, Hz).
+    """
     parts = components(discrepancy)
     main = max(parts, key=lambda c: parts[c])
     words = []
@@ -53,9 +55,9 @@ def structure(
 
 
 def since(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) -> str:
-    """When the residual z (n, m) of the calibrated robot changed at once, in words; "" if it did not.
+    """Return when the residual z (n, m) of the calibrated robot changed in one step, in words; "" if it did not.
 
-    Calibrated, without effects: no known law steps once in a session, but several together may be bent into one.
+    The robot is calibrated without effects: no known effect steps once in a session, but several together may imitate a step.
     """
     began = change(prepared, trials, z)
     if began is None:
@@ -69,30 +71,33 @@ def since(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) -> 
 
 
 def mixed(prepared: PreparedRecording, rigs: MixedRobots) -> str:
-    """Two rigs' data in one set, in words."""
+    """Describe two robots' data in one set."""
     label = {t.name: t.label for t in prepared.recording.trials}
     few = ", ".join(label[prepared.inputs[k].name] for k in rigs.other[:NAMED_ONE_BY_ONE])
     more = f" and {len(rigs.other) - NAMED_ONE_BY_ONE} more" if len(rigs.other) > NAMED_ONE_BY_ONE else ""
     return (
-        f" The trials want two different robots, {len(rigs.one)} the one, {len(rigs.other)} the other ({few}{more}), more than "
-        "any known effect: are two rigs in this set, or was it rebuilt? Diagnose the two groups apart."
+        f" The trials fit two different robots, {len(rigs.one)} the one, {len(rigs.other)} the other ({few}{more}), better than "
+        "any known effect: does this set mix two robots, or was the robot rebuilt? Diagnose the two groups apart."
     )
 
 
 def unlike(unseen: float, seen: float) -> str:
-    """The smooth error (sigma) on trials left out of the fit in turn, beside that on trials it has."""
+    """Compare the smooth error (sigma) on left-out trials with that on fitted ones."""
     return (
-        f" On trials left out of the fit in turn a smooth error of {unseen:.2f} sigma is left, on the others {seen:.2f}: "
+        f" On left-out trials a smooth error of {unseen:.2f} sigma is left, on fitted ones {seen:.2f}: "
         "what was found does not hold there."
     )
 
 
 def nearest(effects: Sequence[str], share: float) -> str:
-    """A hint: the best known explanation that was not claimed, and the share it takes off the error left out; "" if little."""
+    """Return a hint: the best known explanation that was not claimed, and the share of the left-out error that it explains.
+
+    "" if the share is small.
+    """
     if not share > HINT_SHARE:
         return ""
     names = " with ".join(display_name(e) for e in effects)
-    return f" Of the known effects {names} comes nearest, but takes only {100 * share:.0f} % off the error on trials left out."
+    return f" Of the known effects {names} comes nearest, but explains only {100 * share:.0f} % of the error on left-out trials."
 
 
 def _and(words: str) -> str:
@@ -100,7 +105,7 @@ def _and(words: str) -> str:
 
 
 def wave(prepared: PreparedRecording, trials: Sequence[int], x: np.ndarray, frequency: float) -> np.ndarray:
-    """The part of x (n, m) that swings with `frequency` (Hz), its phase free in every trial."""
+    """Return the part of x (n, m) that oscillates with `frequency` (Hz), its phase free in every trial."""
     out, row = np.empty_like(x), 0
     for k in trials:
         turn = 2.0 * np.pi * frequency * prepared.inputs[k].time
@@ -112,10 +117,10 @@ def wave(prepared: PreparedRecording, trials: Sequence[int], x: np.ndarray, freq
 
 
 def change(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) -> tuple[int, int] | None:
-    """The two neighbouring trials between which the mean residual steps; None where it drifts, scatters or stays.
+    """Return the two neighbouring trials between which the mean residual steps; None where it drifts, scatters or stays.
 
-    With M_k the mean of trial k (m,) less that of all K, a step after trial k explains K / (k (K - k)) |M_1 + ... + M_k|^2.
-    The trials' order is what a step needs and scatter does not: the largest such sum must exceed that of every shuffled order.
+    With M_k the mean of trial k (m,) less that of all K, a step after trial k explains K / (k (K - k)) |M_1 + ... + M_k|^2. A step
+    depends on the order of the trials and scatter does not: the largest such sum must exceed that of every shuffled order.
     """
     if len(trials) < 4:
         return None
@@ -123,7 +128,7 @@ def change(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) ->
     M = np.stack([part.mean(axis=0) for part in np.split(z, ends[:-1])])
     M -= M.mean(axis=0)
     K = len(M)
-    after = np.arange(2, K - 1)  # two trials at least on either side: one alone is that trial's
+    after = np.arange(2, K - 1)  # at least two trials on either side: one alone is an outlier
     orders = np.random.default_rng(0).permuted(np.tile(np.arange(K), (SHUFFLED_ORDERS, 1)), axis=1)
 
     def explained(rows: np.ndarray) -> np.ndarray:
@@ -141,14 +146,12 @@ def change(prepared: PreparedRecording, trials: Sequence[int], z: np.ndarray) ->
 
 
 def doubtful(effects: Sequence[str]) -> str:
-    """Of claims less likely than not."""
+    """Describe claims less likely than not."""
     named = " and ".join(display_name(e) for e in effects)
-    return (
-        f"{named}: less likely than not, for other sets of effects have more evidence; what all of them imitate may be none of them"
-    )
+    return f"{named}: less likely than not, since other sets of effects have more evidence; the true cause may be none of them"
 
 
 def undecided(effect: str, rival: str) -> str:
-    """An effect that was found, and is not claimed because these data cannot tell it from another."""
+    """Describe an effect that was found, and is not claimed because these data cannot separate it from another."""
     one, other = (display_name(e) for e in (effect, rival))
     return f" {one.capitalize()} or {other} would explain more, but these data cannot tell which: neither is claimed."

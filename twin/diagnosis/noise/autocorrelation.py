@@ -1,27 +1,29 @@
-"""Whether sensors' noise remembers the row before, where no trial repeats another.
+"""The correlation of sensor noise from row to row, where no trial repeats another.
 
-Smooth noise and a smooth error of the model look alike in one channel. In many they do not: an error of the body is shared by its
-markers, in the few ways in which a body moves, and noise is each channel's own.
+Smooth noise and a smooth model error look alike in one channel. In many channels they differ: an error of the body is shared by its
+markers, in the few ways in which a body moves, and noise is independent between channels.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-FEWEST_DIRECTIONS = 4  # directions without anything shared, that a correlation is read from
-LEAST_ROWS_SEEN = 0.7  # of the rows: a channel seen in fewer is left out
+FEWEST_DIRECTIONS = 4  # directions not shared between channels, needed to estimate a correlation
+LEAST_ROWS_SEEN = 0.7  # of the rows: a channel measured in fewer is left out
 CLEAR_AUTOCORRELATION = 3.0  # standard errors
 
 
 def autocorrelation(residual: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
-    """Lag-1 correlation (n_output,) of AR(1) noise, one a group of channels (`member` (n_output,)), from residuals (n_k, n_output)
-    of one unit in a group; zero where it is not clearly there, or too few channels tell.
+    """Return the lag-1 correlation (n_output,) of AR(1) noise, one a group of channels.
 
-    With V_k = mean (r_i - r_(i-k))^2 of what no two channels share, 2 sigma^2 (1 - rho^k) of such noise, rho = V_2 / V_1 - 1:
-    what is slow takes no part in it. Shared is what stands out of the covariance of r_i - r_(i-4), beyond the lags that rho is read
-    from (from the same ones it would come out larger by one standard error): its largest eigenvalues down to the edge
-    (1 + sqrt(m / n))^2 that independent channels have (Marchenko and Pastur 1967), n rows told as half since they may be
-    correlated. The standard error of rho is sqrt(2 / (n m)), that of white noise.
+    `member` (n_output,): the group of each channel. `residual` (n_k, n_output): of one unit in a group. Zero where the correlation
+    is not clear, or too few channels show it.
+
+    With V_k = mean (r_i - r_(i-k))^2 of what no two channels share, 2 sigma^2 (1 - rho^k) of such noise, rho = V_2 / V_1 - 1: slow
+    errors take no part in it. Shared directions stand out of the covariance of r_i - r_(i-4), beyond the lags of rho (from the same
+    lags rho would be larger by one standard error): its largest eigenvalues down to the edge (1 + sqrt(m / n))^2 of independent
+    channels (Marchenko and Pastur 1967), n rows counted as half since they may be correlated. The standard error of rho is sqrt(2 /
+    (n m)), that of white noise.
     """
     rho = np.zeros(member.size)
     seen = np.isfinite(np.concatenate(residual)).mean(axis=0)
@@ -48,7 +50,7 @@ def _differences(residual: Sequence[np.ndarray], lag: int) -> np.ndarray:
 
 
 def _own(d: np.ndarray) -> np.ndarray:
-    """Directions (n_channel, k) of differences d (n, n_channel) that nothing shared moves."""
+    """Return the directions (n_channel, k) of differences d (n, n_channel) that are not shared between channels."""
     values, vectors = np.linalg.eigh(d.T @ d / len(d))
     edge, k = (1.0 + np.sqrt(2.0 * values.size / len(d))) ** 2, values.size
     while values[k - 1] > edge * np.mean(values[:k]):

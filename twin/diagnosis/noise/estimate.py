@@ -1,4 +1,4 @@
-"""The noise of a robot's sensors and driving readings, read off measured - predicted."""
+"""The estimate of the noise of a robot's sensors and driving readings, from measured - predicted."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,18 +13,17 @@ from twin.diagnosis.noise.model import DECLARED, Noise
 from twin.prediction.prepared import Inputs, PreparedRecording
 
 INPUT_NOISE_RATIO = 10.0  # times the spread of differences: an output that the noise of its inputs alone would move by more
-CORRELATION_LAGS = (1, 2, 3, 4)  # rows, at which what noise remembers is read off repeats
-CLEAR_CORRELATION = 3.0  # standard errors of a correlation that is clearly there
-LARGEST_CORRELATION = 0.9  # correlation from row to row: beyond it noise is no noise, but drifts
-LARGEST_FADE = 0.97  # the same, of what lasts beside white noise
+CORRELATION_LAGS = (1, 2, 3, 4)  # rows, at which the correlation of noise is estimated from repeats
+CLEAR_CORRELATION = 3.0  # standard errors of a clear correlation
+LARGEST_CORRELATION = 0.9  # correlation from row to row: beyond it noise is a drift
+LARGEST_FADE = 0.97  # the same, of the correlated part beside white noise
 OUTLIER_PROBABILITY = 1e-6  # probability: rows that noise makes less often are not noise
-REPEAT_DIFFERENCE = (
-    0.03  # two trials repeat each other if their inputs differ by less than this share of their range (RMS), or two readings' noise
-)
+# Two trials repeat each other if their inputs differ by less than this share of their range (RMS), or by two readings' noise.
+REPEAT_DIFFERENCE = 0.03
 
 
 def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
-    """Pairs of trials that repeat each other: same loads, same samples at the same times, same commands but for noise."""
+    """Return pairs of trials that repeat each other: same loads, same sample times, same commands but for noise."""
     pairs = []
     for a in range(len(prepared.inputs)):
         for b in range(a + 1, len(prepared.inputs)):
@@ -37,7 +36,7 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
             if not same_loads or len(A.time) != len(B.time):
                 continue
             if np.abs((A.time - A.time[0]) - (B.time - B.time[0])).max() > REPEAT_DIFFERENCE * np.ptp(A.time):
-                continue  # the same way at another pace
+                continue  # the same path at another rate
             torque = np.broadcast_arrays(A.loads.torque, B.loads.torque)
             if np.sqrt(np.mean((torque[0] - torque[1]) ** 2)) > REPEAT_DIFFERENCE * np.abs(torque).max():
                 continue
@@ -50,7 +49,7 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
 def estimate_noise(
     prepared: PreparedRecording, trials: Sequence[int], residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray]
 ) -> tuple[Noise, list[str]]:
-    """The noise of the listed trials, and what had to be assumed, in plain words.
+    """Return the noise model of the listed trials, and its assumptions in words.
 
     From repeats among the trials (differences cancel what the model lacks), else as declared, else from second differences along
     each trial (which cancel what is smooth), its correlation from what channels do not share. Tension noise as declared, else by
@@ -80,7 +79,7 @@ def estimate_noise(
             notes.append(f"no repeated trials: the noise is taken as declared, and as {in_time}")
         else:
             source = f"second differences along each trial; taken as {in_time}"
-            notes.append(f"no repeated trials: the noise floor is read off second differences and taken as {in_time}")
+            notes.append(f"no repeated trials: the noise floor is estimated from second differences and taken as {in_time}")
     D, G_all = np.concatenate(d), np.concatenate(G)
     if source == DECLARED:
         sigma = declared
@@ -94,16 +93,18 @@ def estimate_noise(
     noise = replace(noise, rho=rho, fade=fade)
     if not np.isfinite(cells).all():
         units = ["mm" if d is Drive.DISPLACEMENT else f"m{d.display_unit[0]}" for d in prepared.drives]
-        said = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
-        notes.append(f"no noise declared for the inputs: estimated as {said} from the data")
+        estimates = ", ".join(f"{1e3 * d:.3g} {unit}" for d, unit in zip(drive, units, strict=True))
+        notes.append(f"no noise declared for the inputs: estimated as {estimates} from the data")
     return noise, notes
 
 
 def row_noise(
     prepared: PreparedRecording, residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], drive: np.ndarray
 ) -> Noise:
-    """What rows scatter by within trials, beside the inputs' noise `drive` (n_tendon,): from second differences, whatever repeats
-    or a bench say. What was never measured has an infinite one, and tells nothing."""
+    """Return the noise model of rows within trials, beside the inputs' noise `drive` (n_tendon,).
+
+    From second differences, whatever repeats show or the file declares. Outputs that were never measured have infinite noise.
+    """
     d, G = (np.concatenate(x) for x in _along_rows(residual, sensitivity, np.zeros(residual[0].shape[1])))
     seen = np.isfinite(d).any(axis=0)
     sigma = np.full(d.shape[1], np.inf)
@@ -116,25 +117,28 @@ def row_noise(
 def _along_rows(
     residual: Sequence[np.ndarray], sensitivity: Sequence[np.ndarray], rho: np.ndarray
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Second differences, of the variance of noise with the lag-1 correlation rho (n_output,), and what inputs add to them."""
+    """Return second differences and the sensitivities that belong to them.
+
+    They are scaled to the variance of noise with the lag-1 correlation rho (n_output,).
+    """
     size = np.sqrt(6.0 - 8.0 * rho + 2.0 * rho**2)
     shrunk = np.sqrt(6.0) / size[:, None]
     return [(r[:-2] - 2 * r[1:-1] + r[2:]) / size for r in residual], [g[1:-1] * shrunk for g in sensitivity]
 
 
 def _members(prepared: PreparedRecording) -> tuple[list[str], np.ndarray]:
-    """Groups of outputs in the order in which they come, and each output's (n_output,)."""
+    """Return the groups of outputs in their order, and each output's group (n_output,)."""
     groups = list(dict.fromkeys(o.group for o in prepared.outputs))
     return groups, np.array([groups.index(o.group) for o in prepared.outputs])
 
 
 def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray, reading: np.ndarray) -> np.ndarray:
-    """Differences of repeats d (n, m) less what may have changed between the two: a line in time in each channel, and an offset
-    and a gain of each input, felt through its sensitivities G (n, m, n_tendon).
+    """Return differences of repeats d (n, m) less what may have changed between the two.
 
-    All gains together are a stiffness: a robot that was warmer, or older, the second time is not noise. Each counts by what it may
-    scatter by, its group's spread and the inputs' `reading` (n_tendon,); NaN where the inputs' share is `INPUT_NOISE_RATIO` times
-    the spread. There tendons hold each other, a tenth of a millimetre is newtons to the twin, and what gives way in the robot is
+    That is a line in time in each channel, and an offset and a gain of each input, through its sensitivities G (n, m, n_tendon).
+    All gains together act as a stiffness: a robot that was warmer, or older, the second time is not noise. Each is weighted by its
+    expected scatter: its group's spread and the inputs' `reading` (n_tendon,). NaN where the inputs' share is `INPUT_NOISE_RATIO`
+    times the spread: there tendons hold each other, a tenth of a millimetre is newtons to the twin, and the robot's compliance is
     not known.
     """
     t = (inputs.time - inputs.time[0]) / max(inputs.time[-1] - inputs.time[0], 1e-9) - 0.5
@@ -143,7 +147,7 @@ def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray,
     scale, noise = _scales(d, member)[member], np.sqrt(((G * reading) ** 2).sum(axis=2))  # (m,), (n, m)
     weight = 1.0 / np.hypot(scale, noise)
     locked = noise >= INPUT_NOISE_RATIO * scale
-    d = np.where(locked & ~locked.all(axis=0), np.nan, d)  # a channel that would be left out altogether is what there is
+    d = np.where(locked & ~locked.all(axis=0), np.nan, d)  # a channel that would be left out entirely is kept
     out, moved = np.full_like(d, np.nan), np.zeros_like(felt)
     for j in range(d.shape[1]):
         ok = np.isfinite(d[:, j])
@@ -157,7 +161,7 @@ def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray,
 
 
 def _scales(d: np.ndarray, member: np.ndarray) -> np.ndarray:
-    """Robust spread (n_group,) of differences d (n, m), by group."""
+    """Return the robust spread (n_group,) of differences d (n, m), by group."""
     median = [np.nanmedian(np.abs(d[:, member == g])) for g in range(member.max() + 1)]
     return np.maximum(1.4826 * np.array(median), 1e-9)
 
@@ -166,20 +170,23 @@ def _likeliest(
     d: np.ndarray, G: np.ndarray, member: np.ndarray, n_group: int, reading: np.ndarray, *, drive: np.ndarray | None = None,
     sigma: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Maximum-likelihood sigma per group and that of the inputs, a common multiple of `reading` (n_tendon,), for differences
-    d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Where sigma is sought, rows whose |z|^2 noise exceeds in one of a
-    million are left out, again and again until none is left: a body that snaps over an obstacle from row to row is not noisy."""
+    """Return the maximum-likelihood sigma by group and that of the inputs, a common multiple of `reading` (n_tendon,).
+
+    Differences are d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Where sigma is sought, rows whose |z|^2 noise exceeds with
+    a probability below one in a million are left out, repeatedly until none is left: a body that snaps over an obstacle from row to
+    row is not noisy.
+    """
     present = np.isfinite(d)
     unlikely = chi2.isf(OUTLIER_PROBABILITY, np.maximum(present.sum(axis=1), 1))
     scale = _scales(d, member)
-    d, G = np.where(present, d, 0.0), G * present[:, :, None]  # what is missing says nothing, of no channel and no input
+    d, G = np.where(present, d, 0.0), G * present[:, :, None]  # missing samples have no weight
 
     def unpack(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         s = sigma if sigma is not None else (scale * np.exp(x[:n_group]))[member]
         return s, drive if drive is not None else reading * np.exp(x[-1])
 
     def of_rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Each row's |z|^2 and the logarithm of its covariance's determinant."""
+        """Return each row's |z|^2 and the logarithm of its covariance's determinant."""
         s, s_u = unpack(x)
         A, r = s_u * G / s[:, None], d / s
         inner = np.eye(G.shape[2]) + np.einsum("nmt,nms->nts", A, A)
@@ -203,12 +210,12 @@ def _likeliest(
 def _remembered(
     noise: Noise, d: Sequence[np.ndarray], G: Sequence[np.ndarray], member: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How differences d remember, by group: `rho` and `fade` of a Noise, zero unless clearly there (3 standard errors).
+    """Return the correlation of differences by group: `rho` and `fade` of a Noise, zero unless clear (3 standard errors).
 
-    Rows x in sigmas, of the covariance C across channels, have the lagged covariances g_k I, where g_k is a sensor's own: what
-    inputs add is each row's own. Those of y = C^-1 x are g_k C^-2, so that directions in which inputs are most of the noise tell
-    little, as the score of the likelihood has it. Noise is AR(1) unless g_2 is clearly more than g_1^2; then s f^k is fitted to
-    g_1 .. g_4.
+    Rows x in sigmas, of the covariance C across channels, have the lagged covariances g_k I, where g_k is a sensor's own: input
+    noise is independent from row to row. Those of y = C^-1 x are g_k C^-2, so that directions dominated by input noise have little
+    weight, as in the score of the likelihood. Noise is AR(1) unless g_2 is clearly more than g_1^2; then s f^k is fitted to g_1 ..
+    g_4.
     """
     A = [noise.drive * g / noise.sigma[:, None] * np.isfinite(x)[:, :, None] for g, x in zip(G, d, strict=True)]
     inner = [np.linalg.inv(np.eye(a.shape[2]) + a.transpose(0, 2, 1) @ a) for a in A]
@@ -219,14 +226,14 @@ def _remembered(
     rho, fade = np.zeros(member.size), np.zeros(member.size)
     for g in range(member.max() + 1):
         own = member == g
-        told = sum(float((C[:, own] ** 2).sum()) for C in inverse)  # trace of C^-2
+        weight = sum(float((C[:, own] ** 2).sum()) for C in inverse)  # trace of C^-2
         spread = np.sqrt(sum(float((C[:, own][:, :, own] ** 2).sum()) for C in inverse))
-        alone = sum(float(C[:, own, own].sum()) for C in inverse)  # of the squares seen, the sensors' own
+        alone = sum(float(C[:, own, own].sum()) for C in inverse)  # the sensors' own part of the squares
         if not alone > 0.0:  # never measured
             continue
         power = sum(float((x[:, own] ** 2).sum()) for x in y) / alone
-        lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in CORRELATION_LAGS]) / (told * power)
-        sure = CLEAR_CORRELATION * spread / told
+        lagged = np.array([sum(float((x[k:, own] * x[:-k, own]).sum()) for x in y) for k in CORRELATION_LAGS]) / (weight * power)
+        sure = CLEAR_CORRELATION * spread / weight
         if lagged[0] > sure:
             rho[own] = fade[own] = min(lagged[0], LARGEST_CORRELATION)
             if lagged[1] - lagged[0] ** 2 > sure * np.sqrt(1.0 + 4.0 * lagged[0] ** 2):
@@ -235,7 +242,7 @@ def _remembered(
 
 
 def _fading(lagged: np.ndarray) -> tuple[float, float]:
-    """s f and f of the s f^k, s at most 1, that are nearest to the correlations `lagged` at `CORRELATION_LAGS`."""
+    """Return s f and f of the s f^k, s at most 1, that are nearest to the correlations `lagged` at `CORRELATION_LAGS`."""
     fade = np.linspace(max(lagged[0], 0.01), LARGEST_FADE, 200)
     powers = fade[:, None] ** np.array(CORRELATION_LAGS)
     share = np.clip(powers @ lagged / (powers**2).sum(axis=1), 0.0, 1.0)

@@ -1,8 +1,8 @@
-"""What an effect beside friction gains by noise that friction stills, which the robot has never felt.
+"""A correction of the score for load-cell noise that static friction keeps from moving the robot.
 
-A tendon that rubs holds still under what its reading trembles by, the more so the farther from sliding it is, or the less it is
-pulled: laws that move it there are paid for it in |z|^2 though they need not be true. How much depends on travel, slip and tension
-row by row; no closed form tells, so that the twin is shaken by as much noise again.
+Below sliding, a tendon with friction does not move under the noise of its tension reading. An extra effect that moves it less thus
+gains |z|^2 although it need not be true. The amount depends on travel, slip and tension in each row, without a closed form. The
+twin is therefore simulated again with additional noise.
 """
 
 from dataclasses import replace
@@ -18,23 +18,28 @@ from twin.prediction.simulate import SolveOptions, simulate
 
 
 def noise_credit(context: FitContext, with_it: ScoredModel, without: ScoredModel) -> float:
-    """By how much more of the readings' noise than `Weighed.unheard` tells, in |z|^2, the one set keeps from a robot whose tendons
-    rub in both; 0 where they do not, where all the noise there is would not pay, or shaken the robot has no equilibrium."""
-    heard = sum(float(h.sum()) for h in context.objective.whitener.input_noise_energy)
-    if not with_it.score - without.score < heard or not all(
+    """Return the extra input noise (in |z|^2) that `with_it` blocks compared with `without`, beyond `ScoredModel.unheard`.
+
+    Zero if either model has no friction, if the total input noise could not change the ranking, or if a perturbed run has no
+    equilibrium.
+    """
+    input_noise = sum(float(h.sum()) for h in context.objective.whitener.input_noise_energy)
+    if not with_it.score - without.score < input_noise or not all(
         w.fit.model.twin.effect_chain.route.mu > 0.0 for w in (with_it, without)
     ):
         return 0.0
     try:
-        felt = [w.unheard + resimulated_noise(context, w.fit) for w in (with_it, without)]
+        not_blocked = [w.unheard + resimulated_noise(context, w.fit) for w in (with_it, without)]
     except SolveError:
         return 0.0
-    return max(0.0, felt[1] - felt[0])
+    return max(0.0, not_blocked[1] - not_blocked[0])
 
 
 def resimulated_noise(context: FitContext, fit: Fit) -> float:
-    """|z|^2 of what moves when as much noise is drawn onto the readings once more, in the mean of `FRICTION_NOISE_DRAWS` draws, the
-    same ones for every set. Raises SolveError."""
+    """Return |z|^2 of the motion caused by additional noise on the readings.
+
+    The mean of `FRICTION_NOISE_DRAWS` draws, the same ones for every set. Raise SolveError.
+    """
     prepared, whitener, twin = context.prepared, context.objective.whitener, fit.model.twin
     rng, total = np.random.default_rng(0), 0.0
     at = [fit.evaluation.traces[k].outputs(twin, prepared) for k in context.trials]

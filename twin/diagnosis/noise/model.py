@@ -1,4 +1,4 @@
-"""How large the noise of sensors and of the readings that drive the twin is, and what a perfect twin would leave."""
+"""The noise model of sensors and driving readings, and the error that a perfect twin would leave."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ DECLARED = "as declared"
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: sigma (n_output,) SI per channel; drive (n_tendon,) N or m of a driving reading.
+    """Standard deviations: sigma (n_output,) SI by channel; drive (n_tendon,) N or m of a driving reading.
 
-    rho (n_output,): correlation of a row's noise with that of the row before; rho fade^(g-1) is that with the row g before. Where
-    `fade` is rho, as where none is given, it is AR(1); where it is more, white noise is beside it, and the share rho / fade lasts.
+    rho (n_output,) is the correlation of a row's noise with that of the row before; rho fade^(g-1) is that with the row g before.
+    Noise is AR(1) where `fade` is rho or not given. Where it is more, white noise is added, and the share rho / fade is AR(1).
     """
 
     sigma: np.ndarray
@@ -26,12 +26,15 @@ class Noise:
 
     @property
     def lasting(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of noise's variance the share (n_output,) that remembers, and that one's correlation from row to row."""
+        """The share (n_output,) of the noise's variance that is correlated, and its correlation from row to row."""
         fade = self.rho if self.fade is None else self.fade
         return np.divide(self.rho, fade, out=np.ones_like(self.rho), where=fade > 0.0), fade
 
     def in_means(self, rows: int) -> np.ndarray:
-        """Standard deviation (n_output,) of the mean of many `rows`: sigma^2 (1 + 2 (rho + rho fade + ...)) / rows squared."""
+        """Return the standard deviation (n_output,) of the mean of many `rows`.
+
+        Its square is sigma^2 (1 + 2 (rho + rho fade + ...)) / rows.
+        """
         return self.sigma * np.sqrt((1.0 + 2.0 * self.rho / (1.0 - self.lasting[1])) / rows)
 
     @property
@@ -39,9 +42,9 @@ class Noise:
         return self.source == DECLARED
 
     def floor(self, prepared: PreparedRecording, sensitivity: Sequence[np.ndarray]) -> dict[str, float]:
-        """RMS error a perfect twin would still show, by group (m; Euclidean per marker).
+        """Return the RMS error that a perfect twin would still show, by group (m; Euclidean per marker).
 
-        The sensors' noise, and that of the readings it is driven by, through the sensitivities (n_k, n_output, n_tendon).
+        The noise of the sensors, and that of the driving readings through the sensitivities (n_k, n_output, n_tendon).
         """
         driven = np.mean([((G * self.drive) ** 2).sum(axis=2).mean(axis=0) for G in sensitivity], axis=0)  # (n_output,)
         floors = {}

@@ -1,6 +1,7 @@
-"""How far trials repeat, beside how far rows scatter: what of the noise lasts through a trial, and is not white.
+"""The repeatability of trials beside the scatter of rows: noise that is constant throughout a trial is not white.
 
-A hold that is 3 mm elsewhere the next day, read by a camera good for 0.05 mm, has two noises. What a bench declares may be either.
+A hold that differs by 3 mm the next day, measured by a camera with a noise of 0.05 mm, has two noises. Declared noise may be
+either.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,21 +20,21 @@ from twin.prediction.evaluate import OUTPUT_GROUPS
 
 
 def repeatability(context: FitContext, found: Fit) -> tuple[str, ...]:
-    """Of each group of outputs, in words, where it matters.
+    """Return notices on each group of outputs, where the two noises differ.
 
-    Declared noise (where no trial repeats another) that is `OVERSTATED_NOISE_RATIO` times what rows scatter by, s = RMS (r_(i-1) -
-    2 r_i + r_(i+1)) / sqrt(6) of the residuals r under the twin in force, less what the inputs' noise makes: it says how trials
-    repeat. What r moves by within trials is named beside it, for there s is what a right twin would leave, and the effect that goes
-    that way (`within`).
+    Declared noise (where no trial repeats another) is reported if it is `OVERSTATED_NOISE_RATIO` times the scatter of rows, s = RMS
+    (r_(i-1) - 2 r_i + r_(i+1)) / sqrt(6) of the residuals r under the twin in force, less the inputs' noise: it then is the
+    difference between repeated trials. The notice compares the variation of r within trials with s, which a true twin would leave,
+    and names the effect that explains it (`within_trial`).
 
-    Pairs of repeats whose means differ, by RMS d / sqrt(2), more than `LASTING_DIFFERENCE` of the noise and than chance: between
-    sessions, `LONG_PAUSE` apart, and within one.
+    Pairs of repeats are reported if their means differ, by RMS d / sqrt(2), by more than `LASTING_DIFFERENCE` of the noise and more
+    than by chance: between sessions, `LONG_PAUSE` apart, and within one.
     """
     groups = dict.fromkeys(o.group for o in context.prepared.outputs)
     if context.objective.whitener.noise.declared:
         try:
             return tuple(_declared(context, found, groups))
-        except SolveError:  # a neighbour of the model in force has no equilibrium: nothing is said
+        except SolveError:  # a neighbour of the model in force has no equilibrium: no notice
             return ()
     return tuple(words for g in groups for words in _repeated(context, found.evaluation.raw, g))
 
@@ -51,10 +52,9 @@ def _declared(context: FitContext, found: Fit, groups: Iterable[str]) -> Iterato
         moves = _rms(np.concatenate([(r - _means(r))[:, own].ravel() for r in raw]))
         d, s, w = (f"{factor * x:.2g} {unit}" for x in (declared, scatter, moves))
         yield (
-            f"{OUTPUT_GROUPS[group].kind}: {d} are declared as noise, but rows scatter by {s} within a trial: that is how trials "
-            "repeat, the "
-            f"same throughout one of them. Smaller errors are called noise, whatever makes them; within trials what is left moves "
-            f"by {w}, {within_trial(context, found, rows, G, own).words()}"
+            f"{OUTPUT_GROUPS[group].kind}: {d} are declared as noise, but rows scatter by {s} within a trial: the rest is constant "
+            f"throughout a trial. Errors below the declared noise count as noise, whatever their cause; within trials what is left "
+            f"varies by {w}, {within_trial(context, found, rows, G, own).words()}"
         )
 
 
@@ -83,14 +83,13 @@ def _repeated(context: FitContext, raw: list[np.ndarray], group: str) -> Iterato
         within, between = (_rms(np.array([size[p] for p in pairs if far[p] == apart])) for apart in (False, True))
         parts = f", {shown(within)} within a session and {shown(between)} between sessions"
     yield (
-        f"{OUTPUT_GROUPS[group].kind}: repeated trials are off from one another by {shown(whole)} throughout{parts}, where rows "
-        f"scatter by "
-        f"{shown(sigma)}: no law in force explains what changed from one to the other"
+        f"{OUTPUT_GROUPS[group].kind}: repeated trials differ by {shown(whole)} throughout{parts}, where rows scatter by "
+        f"{shown(sigma)}: no effect in force explains the difference"
     )
 
 
 def _session(context: FitContext, trial: int) -> int:
-    """How many breaks there were before a trial."""
+    """Return the number of pauses before a trial."""
     inputs = sorted(context.prepared.inputs, key=lambda i: float(i.clock[0]))
     begun = context.prepared.inputs[trial].clock[0]
     return sum(int(b.clock[0] - a.clock[-1] > LONG_PAUSE and b.clock[0] <= begun) for a, b in pairwise(inputs))

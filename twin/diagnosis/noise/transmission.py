@@ -1,8 +1,8 @@
-"""What of the readings' noise a law lets through to the robot: a lag, a delay between rows and a creep average it away.
+"""The fraction of input noise that reaches the robot under a set of effects; lags, sub-row delays and creep low-pass it.
 
-The robot has felt none of it, so that |z|^2 falls by what a law keeps from it though the law need not be true. A law's drives are
-probed: with w_ij the change of row i's drive by a unit of reading j, sum_j w_ij^2 of the noise's square is passed on. What all rows
-feel alike, sum_j w_ij, is no matter of noise: a gain is taken up by the robot's stiffness.
+Noise that an effect blocks reduces |z|^2 although the effect need not be true. The drives of the effects are probed: with w_ij the
+change of row i's drive by a unit of reading j, the share sum_j w_ij^2 of the noise's square is transmitted. A change common to all
+rows, sum_j w_ij, is no matter of noise: such a gain is absorbed by the robot's stiffness.
 """
 
 from dataclasses import replace
@@ -15,9 +15,10 @@ from twin.prediction.twin import Twin
 
 
 def transmitted_noise(twin: Twin, inputs: Inputs, noise: np.ndarray, antagonists: bool = False) -> np.ndarray:
-    """Share (n, n_tendon) of the square of the readings' noise (n_tendon,) that moves the robot, of what a lasting change moves it.
+    """Return the share (n, n_tendon) of the square of the readings' noise (n_tendon,) that moves the robot.
 
-    A body that creeps feels noise at once, by 1, and what lasts by 1 + sum_j a_j (1 - exp(-t / tau_j)), here in the trial's mean.
+    It is relative to the response to a constant change. A body that creeps responds to noise at once, by 1, and to a constant
+    change by 1 + sum_j a_j (1 - exp(-t / tau_j)), here in the trial's mean.
     """
     laws, command = twin.effect_chain, inputs.command
     share = np.ones_like(command)

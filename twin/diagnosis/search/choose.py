@@ -1,4 +1,4 @@
-"""Stage `choose`: of the sets weighed, the one to go on with, by what it would predict of trials that no fit has seen."""
+"""Stage `choose`: choose among the fitted candidates, by their predictions of left-out trials where evidence does not decide."""
 
 from itertools import combinations
 from math import isfinite
@@ -18,10 +18,11 @@ from twin.prediction.twin import Twin
 
 
 def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Search:
-    """The best set by evidence where it halves the smooth error; else the one that predicts best, and what else there is beside it.
+    """Return the search with its chosen candidate.
 
-    Where laws and robot are far from the data, what no law follows is smooth, and to the evidence a smooth error costs the same
-    small or large: its names are worth little. What an effect predicts does not depend on that.
+    That is the best candidate by evidence if it halves the smooth error; else the one that predicts best, and one effect more if
+    the data support it. Where effects and robot are far from the data, much of the error is smooth, and evidence penalises a large
+    smooth error no more than a small one, so that it hardly separates the effects. Prediction errors do not have this flaw.
     """
     best = predicting(context, found, limits.accept)
     if _smaller(context, found.base, best):
@@ -38,14 +39,17 @@ def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Sear
 
 
 def predicting(context: FitContext, found: Search, accept: float) -> ScoredModel:
-    """The best set that every fitted trial can be predicted with."""
+    """Return the best candidate under which every fitted trial has an equilibrium."""
     ranked = [found.best, *sorted(found.all, key=lambda w: accept * len(w.effects) - w.score)]
     return next((w for w in ranked if solves(context, w.fit.model.twin)), found.base)
 
 
 def most_predictive(context: FitContext, found: Search) -> ScoredModel | None:
-    """Of the sets that halve the squared error on what was not fitted, near and far (`unseen`), and whose every effect takes a
-    quarter of it, the one that errs least there. Halves of the session are fitted for the few that err least on single trials."""
+    """Return the candidate with the least error on left-out data; None if none qualifies.
+
+    A candidate must halve the squared error on left-out trials and halves of the session (`PredictiveErrors`), and each of its
+    effects must remove a quarter. Halves are fitted only for the few candidates that are best on single trials.
+    """
     base, sets, seen = found.base, {w.forms: w for w in found.all}, dict[EffectForms, PredictiveErrors]()
 
     def error(laws: EffectForms) -> PredictiveErrors:
@@ -63,18 +67,21 @@ def most_predictive(context: FitContext, found: Search) -> ScoredModel | None:
 
 
 def _each(laws: EffectForms, square: float) -> float:
-    """A squared error that every effect of a set must pay for."""
+    """Return a squared error with the penalty that every effect of a set must make up for."""
     return square / LEFT_BY_EACH_EFFECT ** len(laws)
 
 
 def add_one_effect(context: FitContext, core: ScoredModel, found: Search, limits: AcceptanceLimits) -> ScoredModel:
-    """The set with one effect more that has the most evidence, if that is enough to be accepted, of those that take a quarter of
-    the squared error on trials left out. What harms beyond the trials fitted is named in the report (`beyond`)."""
+    """Return the candidate with the effect added that has the most evidence, if enough; else the candidate itself.
+
+    The effect must remove a quarter of the squared error on left-out trials. An effect that harms beyond the fitted trials is named
+    in the report (`extrapolation`).
+    """
     context.progress(f"beside {' + '.join(core.effects)}")
     fresh: Known = {}
     extend(context, found.base, core, dictionary(context.objective, core.fit), limits, fresh)
-    bar = LEFT_BY_EACH_EFFECT * left_out(context, core.fit).square
-    helpful = [w for w in fresh.values() if left_out(context, w.fit).square <= bar and solves(context, w.fit.model.twin)]
+    limit = LEFT_BY_EACH_EFFECT * left_out(context, core.fit).square
+    helpful = [w for w in fresh.values() if left_out(context, w.fit).square <= limit and solves(context, w.fit.model.twin)]
     best = max(helpful, key=lambda w: w.score, default=core)
     return _converged(context, best) if best.score >= core.score + limits.accept else core
 
@@ -84,7 +91,10 @@ def _converged(context: FitContext, rough: ScoredModel) -> ScoredModel:
 
 
 def halved(context: FitContext, base: ScoredModel, best: ScoredModel) -> bool:
-    """Whether effects halve the smooth error; or the squared error on what was not fitted, of all outputs and of the headline."""
+    """Return whether effects halve the error.
+
+    That is the smooth error, or the squared error on left-out data, of all outputs and of the headline.
+    """
     return _smaller(context, base, best) or _half(predictive_errors(context, best), predictive_errors(context, base))
 
 
@@ -105,7 +115,7 @@ def _smaller(context: FitContext, base: ScoredModel, best: ScoredModel) -> bool:
 
 
 def solves(context: FitContext, twin: Twin) -> bool:
-    """Whether every fitted trial has an equilibrium that not only its neighbours in the fit lead to."""
+    """Return whether every fitted trial has an equilibrium when solved from rest, not only from its neighbours in the fit."""
     try:
         simulate(twin, context.prepared, trials=context.trials)
     except SolveError:

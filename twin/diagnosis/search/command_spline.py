@@ -1,10 +1,10 @@
-"""What a command did between the rows of its log, and how surely: a smoothing spline whose stiffness is found row by row.
+"""A smoothing spline of a command between the rows of its log, with its variance; the stiffness is estimated for each interval.
 
-The command is the integral of its rate, the rate that of white noise of intensity q, one for each interval between rows; a row
-reads the command with the noise of its reading. What such a spline knows of the path comes from Kalman's filter and the smoother of
-Rauch, Tung and Striebel; q from expectation maximisation (Shumway and Stoffer 1982) under a prior that knows no scale, 1 / q, and a
-share of it from its neighbours: stiff where a command runs evenly, loose where a ramp begins or ends. Inside, everything is in
-units of a row's interval and of the reading's noise.
+The command is the integral of its rate, and the rate that of white noise of intensity q, one for each interval between rows; a row
+reads the command with the noise of its reading. The spline is Kalman's filter with the smoother of Rauch, Tung and Striebel. q
+comes from expectation maximisation (Shumway and Stoffer 1982) under the scale-free prior 1 / q, and a share of it from its
+neighbours: the spline is stiff where a command runs evenly, loose where a ramp begins or ends. Inside, everything is in units of a
+row's interval and of the reading's noise.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,10 @@ class SmoothedCommand:
 
 
 def smooth_command(time: np.ndarray, command: np.ndarray, noise: float) -> SmoothedCommand:
-    """Of rows at `time` (n,) s with `command` (n, n_tendon), read with `noise`; `MOMENTS_PER_ROW` moments for each row."""
+    """Return the spline through `command` (n, n_tendon) at `time` (n,) s, read with `noise`.
+
+    It has `MOMENTS_PER_ROW` moments for each row.
+    """
     n = len(command)
     unit = max(noise, LEAST_COMMAND_NOISE * float(np.ptp(command, axis=0).max()), 1e-12)
     fine = np.interp(np.arange((n - 1) * MOMENTS_PER_ROW + 1) / MOMENTS_PER_ROW, np.arange(n), time)
@@ -44,7 +47,7 @@ class _Smoothed:
 
 
 def _intensity(step: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """q (n - 1,) of every interval between rows (n, n_tendon), which are `step` long."""
+    """Return q (n - 1,) of every interval between rows (n, n_tendon), which are `step` long."""
     tendons = rows.shape[1]
     q = np.full(
         len(step),
@@ -66,7 +69,7 @@ def _intensity(step: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def _steps(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How command and rate go on over each step, and the covariance of what white noise of unit intensity adds (n, 2, 2)."""
+    """Return the transition of command and rate over each step, and the covariance added by unit white noise (n, 2, 2)."""
     F, Q = np.tile(np.eye(2), (len(step), 1, 1)), np.empty((len(step), 2, 2))
     F[:, 0, 1] = step
     Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 1] = step**3 / 3.0, step**2 / 2.0, step
@@ -75,7 +78,10 @@ def _steps(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _smooth(step: np.ndarray, q: np.ndarray, read: np.ndarray, rows: np.ndarray) -> _Smoothed:
-    """Of `rows` (n_row, n_column), read with unit noise at the moments `read` of those that `step` (n - 1,) lies between."""
+    """Return the smoothed state for `rows` (n_row, n_column), read with unit noise.
+
+    They are read at the moments `read` of those that `step` (n - 1,) lies between.
+    """
     F, Q = _steps(step)
     Q = q[:, None, None] * Q
     n, reading = len(step) + 1, dict(zip(read.tolist(), rows, strict=True))

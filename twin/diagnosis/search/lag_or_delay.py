@@ -1,12 +1,14 @@
-"""Stage `lateness`: whether a drive that lags, a log that is delayed, or both make the robot late.
+"""Stage `lag_or_delay`: decide whether a lag of the drive, a delay of the log, or both make the robot late.
 
-The laws differ in what they make of a command within a few tenths of a second, and there a log knows the command only at its rows,
-and only with the noise of its reading. The search takes one path through the rows for the true one; on it a lag, which smooths,
-beats a delay where readings are noisy, and loses to it where corners fall between rows. So the laws are weighed anew, by what the
-outputs say the tendons were given: at each row u, with covariance C, from residuals, their noise and the outputs' sensitivities.
-What the command was between rows is known with a variance (`path`), of which V is that of commands as late as the robot is. A law
-that makes m of the likeliest path is worth 2 sum log t(u - m; C + V) - k log n, t Student's. V is one for all laws: each by its own
-would be a likelihood if rows were independent; a lag blurs over rows what is unknown and seems surer than it is.
+A lag and a delay differ in what they make of a command within a few tenths of a second. There the log knows the command only at its
+rows, with the noise of its reading. The search takes one path through the rows for the true one. On it a lag, which smooths, beats
+a delay where readings are noisy, and loses to it where corners fall between rows.
+
+The effects are therefore scored again, by the commands that the outputs imply: at each row u, with covariance C, from residuals,
+their noise and the outputs' sensitivities. The command between rows is known with a variance (`smooth_command`), of which V is that
+of commands as late as the robot is. An effect that makes m of the likeliest path scores 2 sum log t(u - m; C + V) - k log n, t
+Student's. V is the same for all effects: an own V each would be a likelihood only if rows were independent; a lag averages the
+unknown over rows and would seem more certain than it is.
 """
 
 from __future__ import annotations
@@ -33,15 +35,18 @@ from twin.foundation.errors import SolveError
 from twin.prediction.prepared import PreparedRecording
 
 LAG, DELAY = ActuatorLag.id, TimeDelay.id
-LATE = frozenset({LAG, DELAY})  # effects for which it counts when a command came
+LATE = frozenset({LAG, DELAY})  # effects that depend on when a command came
 LateEffects = frozenset[str]
 Form = Callable[[np.ndarray], tuple[float, float, float]]  # free numbers -> delay (s), lag (s), inertia
 
 
 @dataclass(frozen=True)
 class Given:
-    """What the outputs of a trial say its tendons were given: `pull` (n, n_tendon) at `time` (n,), with precision (n, n_tendon,
-    n_tendon), that of commands counted; and what was commanded."""
+    """The commands that a trial's outputs imply.
+
+    `pull` (n, n_tendon) at `time` (n,), with precision (n, n_tendon, n_tendon), which includes the uncertainty of the command; and
+    the logged command.
+    """
 
     time: np.ndarray
     pull: np.ndarray
@@ -51,15 +56,18 @@ class Given:
 
 @dataclass(frozen=True)
 class Weight:
-    """What a law of lateness is worth (2 ln odds), and its values by effect."""
+    """The score (2 ln odds) of a lag, a delay or both, and the parameter values by effect."""
 
     score: float
     values: Mapping[str, Mapping[str, float]]
 
 
 def lag_or_delay(context: FitContext, found: Search) -> Search:
-    """`found` with its laws of lateness weighed anew, where its best set has one and all tendons are driven alike, not by currents:
-    springs remember by themselves."""
+    """Return the search with its lag and delay scored again.
+
+    Unchanged if the best candidate has neither, or if tendons are driven in different ways or by currents: springs have a memory of
+    their own.
+    """
     laws = LATE & set(found.best.effects)
     if not laws or not tells_laws(context) or not context.budget.allows("what makes it late"):
         return found
@@ -78,13 +86,16 @@ def lag_or_delay(context: FitContext, found: Search) -> Search:
 
 
 def tells_laws(context: FitContext) -> bool:
-    """Whether laws of lateness are weighed by what the tendons were given: all of them driven alike, not by currents."""
+    """Return whether lag and delay are scored by the implied commands.
+
+    They are if all tendons are driven alike, and not by currents.
+    """
     drives = set(context.prepared.drives)
     return len(drives) == 1 and Drive.CURRENT not in drives
 
 
 def rescored(sets: list[ScoredModel], weights: Mapping[LateEffects, Weight]) -> list[ScoredModel]:
-    """Sets that differ in their laws of lateness alone differ in score by what these are worth; the best of them keeps its own."""
+    """Rescore candidates that differ only in lag and delay by the scores of these; the best of each group keeps its score."""
     top: dict[frozenset[tuple[str, str]], float] = {}
     for w in sets:
         if LATE & set(w.effects):
@@ -103,13 +114,13 @@ def _rest(w: ScoredModel) -> frozenset[tuple[str, str]]:
 
 
 def typical(best: ScoredModel) -> float:
-    """By how much (s) a steady pull is late."""
+    """Return the lateness (s) of a steady pull."""
     laws = {e.id: e for e in best.fit.model.twin.effects if e.id in LATE}
     return sum(e["time" if n == LAG else "delay"] for n, e in laws.items())
 
 
 def _in_place(context: FitContext, best: ScoredModel, likely: Weight) -> ScoredModel | None:
-    """The set with these laws in place of its own, fitted; None without equilibrium."""
+    """Return the candidate with these effects in place of its own lag or delay, fitted; None without an equilibrium."""
     model = best.fit.model
     for law in LATE:
         model = model.without_effect(law)
@@ -122,10 +133,10 @@ def _in_place(context: FitContext, best: ScoredModel, likely: Weight) -> ScoredM
 
 
 def weighed(trials: list[Given], late: float) -> dict[LateEffects, Weight] | None:
-    """Every law by itself and both, for a robot some `late` seconds late; None for one that is early, which no drive is.
+    """Return the scores of lag, delay and both, for a robot some `late` seconds late; None for an early one, which no drive is.
 
-    A lag of second order must be clearly better than what is simpler, since it bends to what `path` does not know of corners and
-    smooths its errors; both laws clearly better than that, of which an overdamped one is nearly a delay and a lag.
+    A second-order lag must be clearly better than a simpler one, since it adapts to errors of the spline at corners. Both effects
+    together must be clearly better than that, since an overdamped lag is nearly a delay and a lag.
     """
     if late <= 0.0:
         return None
@@ -150,7 +161,7 @@ def weighed(trials: list[Given], late: float) -> dict[LateEffects, Weight] | Non
 
 
 def _best(trials: list[Given], form: Form, start: np.ndarray) -> tuple[float, tuple[float, float, float]]:
-    """Twice the largest log likelihood of a form, and where it is."""
+    """Return twice the largest log likelihood of a form, and its parameters."""
 
     def cost(x: np.ndarray) -> float:
         delay, lag, inertia = form(np.atleast_1d(x))
@@ -170,7 +181,7 @@ def _best(trials: list[Given], form: Form, start: np.ndarray) -> tuple[float, tu
 
 
 def likelihood(seen: Given, delay: float, lag: float, inertia: float) -> float:
-    """Log likelihood, up to a constant, of what the tendons of a trial were given, under such a law."""
+    """Return the log likelihood, up to a constant, of a trial's implied commands under a delay (s), a lag (s) and its inertia."""
     way, tendons = seen.command, seen.pull.shape[1]
     delivered = way.mean
     if lag > 0.0:
@@ -183,13 +194,15 @@ def likelihood(seen: Given, delay: float, lag: float, inertia: float) -> float:
 
 
 def shifted(time: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
-    """Values (n, m) at `time` (n,) as they were at the moments `when`; what was before the first of them is as the first."""
+    """Return values (n, m) given at `time` (n,), interpolated at the moments `when`; before the first they equal the first."""
     return make_interp_spline(time, values, k=1)(np.clip(when, time[0], time[-1]))
 
 
 def given(context: FitContext, best: ScoredModel) -> list[Given]:
-    """Of the fitted trials that move fastest, `LAG_OR_DELAY_ROWS` of each at most, under the best set: what it has the tendons
-    given, and what its residuals add."""
+    """Return the implied commands of the fitted trials that move fastest, `LAG_OR_DELAY_ROWS` of each at most.
+
+    They are the commands delivered under the best candidate plus what its residuals add.
+    """
     prepared, at = context.prepared, best.fit.evaluation
     twin, place = at.model.twin, {k: i for i, k in enumerate(context.trials)}
     laws = [e for e in twin.effects if e.id in LATE]
@@ -205,7 +218,7 @@ def given(context: FitContext, best: ScoredModel) -> list[Given]:
         seen = np.isfinite(raw)
         per_sigma = np.where(seen[:, :, None], g[rows] / noise.sigma[:, None], 0.0)
         r = np.where(seen, raw, 0.0) / noise.sigma
-        span = max(float(np.ptp(inputs.command)), 1e-9)  # what no output shows is somewhere within it
+        span = max(float(np.ptp(inputs.command)), 1e-9)  # a command that no output shows lies somewhere within it
         covariance = np.linalg.inv(np.einsum("nma,nmb->nab", per_sigma, per_sigma) + np.eye(prepared.n_tendon) / span**2)
         more = np.einsum("nab,nmb,nm->na", covariance, per_sigma, r)
         way = smooth_command(time, command, float(np.mean(noise.drive)))
@@ -216,12 +229,15 @@ def given(context: FitContext, best: ScoredModel) -> list[Given]:
 
 
 def _driving(prepared: PreparedRecording, signals: Signals) -> np.ndarray:
-    """(n, n_tendon) of whatever drives each tendon."""
+    """Return whatever drives each tendon (n, n_tendon)."""
     return np.where(prepared.driven_by(Drive.DISPLACEMENT), signals.displacement, signals.tension)
 
 
 def _fastest(prepared: PreparedRecording, trials: list[int]) -> list[int]:
-    """Trials of three rows or more by the rate of their commands, as many as `LAG_OR_DELAY_ROWS` hold and at least one."""
+    """Return trials of three rows or more by the rate of their commands, the fastest first.
+
+    As many as `LAG_OR_DELAY_ROWS` hold, and at least one.
+    """
     long = [k for k in trials if len(prepared.inputs[k].time) > 2]
     rate = {k: float(np.abs(np.diff(prepared.inputs[k].command, axis=0)).sum() / np.ptp(prepared.inputs[k].time)) for k in long}
     out, rows = [], 0

@@ -1,4 +1,4 @@
-"""Stage `screen`: what each effect would do to these data first, what noise alone would show, and what the design can tell."""
+"""Stage `screen`: compute first-order patterns of all effects, the limits from simulated noise, and what the design can show."""
 
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ from twin.diagnosis.fit_context import FitContext
 
 @dataclass(frozen=True)
 class Screening:
-    """First-order patterns of all effects that may be missing, what counts on this design, and what it tells of each effect."""
+    """First-order patterns of all effects that may be missing, the limits on this design, and what it can show of each effect."""
 
     patterns: Dictionary
     limits: AcceptanceLimits
@@ -21,7 +21,7 @@ class Screening:
 
 
 def screen(context: FitContext, base: ScoredModel, seed: int) -> Screening:
-    """Before any effect is sought; `seed` draws the no-effect sets."""
+    """Return the screening, before any search for effects; `seed` draws the sets without an effect."""
     patterns = dictionary(context.objective, base.fit)
     context.progress("no-effect sets of this design")
     limits = acceptance_limits(context, base.fit, patterns, seed)
@@ -30,6 +30,6 @@ def screen(context: FitContext, base: ScoredModel, seed: int) -> Screening:
 
 
 def _accuracy(context: FitContext) -> float:
-    """The twin's own accuracy over the mean sigma of the outputs it is declared for."""
+    """Return the twin's accuracy over the mean sigma of the outputs for which it is declared."""
     stated = context.accuracy[context.accuracy > 0.0]
     return 1.0 / float(np.mean(1.0 / stated)) if stated.size else 0.0

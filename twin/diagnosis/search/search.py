@@ -1,4 +1,8 @@
-"""Stage `search`: beam search over sets of effects: rank, refit, weigh by evidence, add while it pays, then drop what does not."""
+"""Stage `search`: beam search over sets of effects.
+
+Rank effects by their first-order patterns, refit the best, score by evidence, add effects while the score rises enough, then drop
+those whose removal costs little.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -35,8 +39,10 @@ Known = dict[EffectForms, ScoredModel]
 
 @dataclass(frozen=True)
 class Search:
-    """The base model, the best set found, and every set that was weighed (the best start of its laws), best first; whether the best
-    is that for what it predicts, and not by evidence."""
+    """The base model, the best candidate, and every candidate fitted (with the best start of each effect), best first.
+
+    `predicted`: whether the best was chosen for its predictions, and not by evidence.
+    """
 
     base: ScoredModel
     best: ScoredModel
@@ -45,7 +51,7 @@ class Search:
 
 
 def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits: AcceptanceLimits) -> Search:
-    """From the calibrated base, whose missing effects have these first-order patterns, to the best set of effects."""
+    """Return the best set of effects, starting from the calibrated base and first-order patterns of its missing effects."""
     known: Known = {base.forms: base}
     beam, step = [base], []
     for level in range(1, MOST_EFFECTS + 1):
@@ -53,8 +59,8 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
         fresh: Known = {}
         for member in (*beam, *step):
             lacks = patterns.beside(member.effects)
-            # Patterns depend little on what is already fitted (gains by some per cent): the leading set's alone are taken anew, of
-            # effects that promise something by the base's; the others' are the base's.
+            # Patterns depend little on what is already fitted (gains by some per cent). Only the leading set's are computed again,
+            # of effects that promise something by the base's patterns; the others use the base's.
             if member is (*beam, *step)[0] and member is not base:
                 least = REUSED_PROMISE_SHARE * _asked(context, base, member, limits)
                 promise = rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
@@ -80,18 +86,19 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
 
 
 def carried(
-    context: FitContext, base: ScoredModel, beam: list[ScoredModel], fresh: list[ScoredModel], bar: float
+    context: FitContext, base: ScoredModel, beam: list[ScoredModel], fresh: list[ScoredModel], limit: float
 ) -> tuple[list[ScoredModel], list[ScoredModel]]:
-    """The models of the `beam` and one effect to which one more is added next: where evidence passes the `bar` the best by it,
-    `BEAM_WIDTH` of them, none far behind; and, as a step only, the one that leaves least of |z|^2, where that is less than
-    `WHITER_MODEL_LEAVES` of what these leave, or where there are none the beam. What is built on a step counts where it passes the
-    bar and halves the error once more: it explains what lay under the smooth one.
+    """Return the models to which one effect more is added next: the best by evidence, and at most one exception.
 
-    Evidence forgives a smooth error whatever its size: of two effects that bend alike either may leave it as smooth as none, and
-    so have no evidence until the other is there.
+    Those by evidence are up to `BEAM_WIDTH` models above `limit`, none far behind the best. The exception is the model that leaves
+    least of |z|^2, where that is less than `WHITER_MODEL_LEAVES` of what the others leave (of the `beam`'s where there are none).
+    Its extensions count only if they pass the limit and halve the error again.
+
+    Evidence does not penalise a smooth error by its size. When two effects bend the robot alike, neither alone may look better, and
+    so neither has evidence until the other is added.
     """
     best = max((w.score for w in fresh), default=-np.inf)
-    ahead = sorted((w for w in fresh if best >= bar and w.score >= best - LARGEST_SCORE_GAP), key=lambda w: -w.score)[:BEAM_WIDTH]
+    ahead = sorted((w for w in fresh if best >= limit and w.score >= best - LARGEST_SCORE_GAP), key=lambda w: -w.score)[:BEAM_WIDTH]
     least = min(_leaves(context, base, w) for w in ahead or beam)
     whitest = min(fresh, key=lambda w: _leaves(context, base, w), default=base)
     return ahead, [whitest] if _leaves(context, base, whitest) < WHITER_MODEL_LEAVES * least else []
@@ -100,7 +107,7 @@ def carried(
 def extend(
     context: FitContext, base: ScoredModel, member: ScoredModel, lacks: Dictionary, limits: AcceptanceLimits, fresh: Known
 ) -> None:
-    """Into `fresh`: `member` with each of the effects whose pattern promises most."""
+    """Add to `fresh` `member` with each of the effects whose pattern promises most."""
     for candidate in rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks):
         if candidate.gain < _asked(context, base, member, limits):
             continue
@@ -115,28 +122,30 @@ def extend(
 
 
 def _leaves(context: FitContext, base: ScoredModel, member: ScoredModel) -> float:
-    """The share of the base's |z|^2 above the noise that a set leaves."""
+    """Return the share of the base's |z|^2 above the noise that a candidate leaves."""
     noise = float(context.objective.n)
     return max(float(member.fit.z @ member.fit.z) - noise, 0.0) / max(float(base.fit.z @ base.fit.z) - noise, 1.0)
 
 
 def _asked(context: FitContext, base: ScoredModel, member: ScoredModel, limits: AcceptanceLimits) -> float:
-    """The gain an effect's pattern must promise beside `member` to be fitted there."""
+    """Return the gain that an effect's pattern must promise beside `member` to be fitted there."""
     return PROMISED_SHARE * max(limits.accept, _material(context, base, member, limits.visible))
 
 
-def _material(context: FitContext, base: ScoredModel, member: ScoredModel, bar: float) -> float:
-    """The fall of |z|^2 below which an effect added to `member` would be immaterial: in the group of outputs in which `member`
-    explains least, where its laws' faults show least."""
+def _material(context: FitContext, base: ScoredModel, member: ScoredModel, limit: float) -> float:
+    """Return the fall of |z|^2 below which an effect added to `member` would be immaterial.
+
+    It counts in the group of outputs that `member` explains least, where errors of its equations show least.
+    """
     explained = max(0.0, float(context.fall_by_group(base.fit, member.fit).min()))
-    return max(bar**2 * context.objective.n, LAW_FORM_SHARE**2 * explained)
+    return max(limit**2 * context.objective.n, LAW_FORM_SHARE**2 * explained)
 
 
 def exchanged(context: FitContext, best: ScoredModel, known: Known) -> ScoredModel:
-    """The best set, or one with another effect in the place of one of its own, where that has more evidence.
+    """Return the best candidate, or one with an effect exchanged, where that has more evidence.
 
-    Tried is what was better than an effect of the set where both were weighed in the same company, and was not seen in the set's:
-    what is too small to be sought beside the true effect may be worth more beside a false one, which it helps to imitate it.
+    Tried are effects that did better than one of the candidate's own in a smaller set, and were not fitted in the full set. An
+    effect too small to be sought beside the true one may help a false one to imitate it.
     """
     for weaker in list(known.values()):
         company = set(weaker.forms)
@@ -153,8 +162,10 @@ def exchanged(context: FitContext, best: ScoredModel, known: Known) -> ScoredMod
 
 
 def _in_company(context: FitContext, member: ScoredModel, best: ScoredModel, effects: set[str], known: Known) -> ScoredModel | None:
-    """`member` and these effects of the best set beside, as they were fitted there; None where they are not to be had together or
-    were weighed already."""
+    """Return `member` with these effects of the best candidate, as they were fitted there.
+
+    None where they exclude each other, or were fitted already.
+    """
     together = {*member.effects, *effects}
     laws = (*member.forms, *(law for law in best.forms if law[0] in effects))
     if (
@@ -178,8 +189,10 @@ def _in_company(context: FitContext, member: ScoredModel, best: ScoredModel, eff
 
 
 def _leaner(context: FitContext, base: ScoredModel, best: ScoredModel, known: Known, accept: float) -> ScoredModel:
-    """Drop every effect beside the base's whose removal costs less evidence than `accept`, less what friction pays it (`paid`); the
-    last one stays. Of sets that lead the one left by effects more, too, what friction pays them is taken off."""
+    """Drop every effect, except the last, whose removal costs less evidence than `accept` and its friction credit.
+
+    The credit (`noise_credit`) is also subtracted from larger sets that still lead.
+    """
     while len(added := [e for e in best.effects if e not in base.effects]) > 1:
         reduced = []
         for effect in added:

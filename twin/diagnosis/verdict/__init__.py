@@ -1,1 +1,1 @@
-"""The verdict: which effects pass, how sure they are, what cannot be told apart."""
+"""The verdict: which effects pass, how sure they are, and which cannot be separated."""

@@ -1,4 +1,4 @@
-"""Stage `gate`: drop what is too small, what may be a larger law's fault, what predicts worse, and what cannot be told apart."""
+"""Stage `gate`: drop effects that are too small, may be errors of a larger one, predict worse, or are confusable with a rival."""
 
 from dataclasses import dataclass, field
 
@@ -27,7 +27,10 @@ class TooSmall:
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """An effect that these data cannot tell from its `rival`; the set it was found in, and the one with the rival in its place."""
+    """An effect that these data cannot separate from its `rival`.
+
+    `found`: the set of effects it was found in. `other`: that set with the rival in its place.
+    """
 
     effect: str
     rival: str
@@ -37,7 +40,10 @@ class Ambiguity:
 
 @dataclass(frozen=True)
 class Gated:
-    """What stays, its refits with one effect dropped, and what did not pass; the doubts of which `settle` took the likelier."""
+    """The candidate that passed, its refits with one effect dropped, and what did not pass.
+
+    `doubts`: ambiguities of which neither effect is taken. `settled`: those of which `resolve_ties` took the likelier effect.
+    """
 
     best: ScoredModel
     without: dict[str, ScoredModel] = field(default_factory=dict)
@@ -50,7 +56,7 @@ class Gated:
 
 
 def gate(context: FitContext, found: Search, screening: Screening) -> Gated:
-    """One effect after the other, the smallest first, until all that is left passes."""
+    """Drop effects one after the other, the smallest first, until all remaining ones pass."""
     best, own = found.best, set(found.base.effects)
     small: list[TooSmall] = []
     doubts: list[Ambiguity] = []
@@ -75,14 +81,14 @@ def gate(context: FitContext, found: Search, screening: Screening) -> Gated:
         if harmful:
             best = without[min(harmful, key=lambda e: moved[e])]
             continue
-        if (doubt := _doubt(context, found, screening, best, without)) is None:
+        if (ambiguity := _ambiguity(context, found, screening, best, without)) is None:
             return Gated(best, without, tuple(small), tuple(doubts))
-        doubts.append(doubt)
-        best = without[doubt.effect]
+        doubts.append(ambiguity)
+        best = without[ambiguity.effect]
 
 
 def has_no_size(fit: Fit, effect: str) -> bool:
-    """Whether each fitted number of an effect is smaller than its own standard error, so that nothing says it is there."""
+    """Return whether each fitted number of an effect is smaller than its own standard error, so that it may be absent."""
     if not (found := fit.fitted(effect)):
         return False
     inactive = catalogue()[effect].inactive_when_off
@@ -95,16 +101,18 @@ def has_no_size(fit: Fit, effect: str) -> bool:
 
 
 def contribution(context: FitContext, best: ScoredModel, without: ScoredModel) -> float:
-    """How far (sigma RMS) dropping an effect and refitting everything else moves the fitted trials."""
+    """Return how far (sigma RMS) dropping an effect and refitting everything else moves the fitted trials."""
     fall = float(without.fit.z @ without.fit.z - best.fit.z @ best.fit.z)
     return float(np.sqrt(max(0.0, fall) / context.objective.n))
 
 
 def _immaterial(context: FitContext, limits: AcceptanceLimits, best: ScoredModel, without: ScoredModel) -> bool:
-    """Whether an effect moves too little, in all outputs together and in each group that an accuracy is declared for, and too
-    little of that depends on more than the pose; nor shows in the outputs as they are. White residuals allow each row what its
-    inputs' readings may err by. An error of that size which comes back at every row, a delay's, is small there: but not in the
-    outputs, and they can be told it."""
+    """Return whether an effect moves the outputs too little to be claimed.
+
+    That is in all outputs together, in each group with a declared accuracy, in the part that depends on more than the pose, and in
+    the residuals before whitening. Whitening allows each row the error of its input readings. An error of that size that returns in
+    every row, a delay's, is small after whitening but not in the outputs.
+    """
     moved = contribution(context, best, without)
     if moved >= limits.visible or (
         moved >= limits.material and bool(np.any(context.fall_by_group(without.fit, best.fit) > context.excused))
@@ -120,9 +128,11 @@ def _immaterial(context: FitContext, limits: AcceptanceLimits, best: ScoredModel
 def _may_be_form(
     context: FitContext, limits: AcceptanceLimits, best: ScoredModel, without: dict[str, ScoredModel], least: str
 ) -> bool:
-    """Whether an effect is so much smaller than another that it may be what that one's law gets wrong: unless it explains half of
-    all that is left without it, on trials left out in turn too. A large law's faults leave more. They show where that law acts: in
-    a group of outputs that it leaves alone, an effect is as large as it is there."""
+    """Return whether an effect may be an error of a much larger effect's equation.
+
+    Not if it explains half of all that is left without it, on left-out trials too: errors of a large effect's equation leave more.
+    Such errors show where that effect acts; in a group of outputs that it does not move, even a small effect counts.
+    """
     moved = {e: np.sqrt(np.maximum(0.0, context.fall_by_group(w.fit, best.fit)) / context.objective.n) for e, w in without.items()}
     if np.any((moved[least] >= limits.material) & (moved[least] >= LAW_FORM_SHARE * np.max(list(moved.values()), axis=0))):
         return False
@@ -131,20 +141,25 @@ def _may_be_form(
 
 
 def _harms(context: FitContext, limits: AcceptanceLimits, best: ScoredModel, without: ScoredModel) -> bool:
-    """Whether trials left out are predicted better without an effect; of a set that leaves noise alone of those fitted, where a
-    step to first order throws one that is left out, by fits in truth."""
+    """Return whether left-out trials are predicted better without an effect.
+
+    Where the candidate leaves only noise on fitted trials, and a first-order step is not accurate for a left-out trial, full fits
+    decide.
+    """
     own, other = left_out(context, best.fit), left_out(context, without.fit)
     if not own.worse(other) or best.discrepancy.size > max(LARGE_STRUCTURE, limits.left):
         return own.worse(other)
     return proven(context, best.fit, own).worse(proven(context, without.fit, other))
 
 
-def _doubt(
+def _ambiguity(
     context: FitContext, found: Search, screening: Screening, best: ScoredModel, without: dict[str, ScoredModel]
 ) -> Ambiguity | None:
-    """The first effect, of those smaller than what the design tells from its closest rival, that the rival in its place explains as
-    well to within five standard errors; None where there is none. A rival that is in the set itself was fitted beside it. What
-    `lateness` weighed is claimed with its odds."""
+    """Return the first ambiguity: an effect whose closest rival in its place explains the data as well; None if there is none.
+
+    Only effects smaller than the design can separate from the rival are tried; "as well" is within five standard errors. A rival in
+    the candidate itself was fitted beside the effect. A lag or a delay that `lag_or_delay` scored is claimed with its odds.
+    """
     rows, form = {(v.effect, v.form): v for v in screening.table}, dict(best.forms)
     for effect in sorted(without, key=lambda e: contribution(context, best, without[e])):
         row = rows.get((effect, form[effect]))
@@ -161,7 +176,7 @@ def _doubt(
 
 
 def _in_its_place(context: FitContext, found: Search, screening: Screening, rest: ScoredModel, rival: str) -> ScoredModel | None:
-    """The set `rest` with the rival, as the search weighed it or fitted now; None without equilibrium."""
+    """Return the set `rest` with the rival, as the search fitted it or fitted now; None without an equilibrium."""
     effects = tuple(sorted((*rest.effects, rival)))
     weighed = [w for w in found.all if w.effects == effects]
     if not weighed:

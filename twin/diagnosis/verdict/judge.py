@@ -1,4 +1,4 @@
-"""Stage `judge`: noise, explained, partly explained or unexplained; the claims, how sure they are, and what else it could be."""
+"""Stage `judge`: decide on noise, explained, partly explained or unexplained; the claims, their probability, and alternatives."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -36,13 +36,15 @@ from twin.prediction.evaluate import OUTPUT_GROUPS
 
 @dataclass(frozen=True)
 class VerdictInputs:
-    """What a verdict is read from: the smooth error (sigma) of the calibrated robot and with the effects, and of these on trials
-    left out, the last two but for what the description gets wrong of a pose (`Discrepancy.rest`); the strongest line left (z-score,
-    Hz); what is left beside it all that is no noise either (`quick`, sigma).
+    """The inputs of a verdict.
 
-    `caveats`: what keeps a day from being explained though little is left, in words (`find_caveats`). `halved`: the effects take
-    half of the error. `strange`: what is left sits at one place of the body, the calibrated error began
-    at once, as that of no known effect does, or a law is at its limit (`strained`, in words).
+    `before`, `after`, `unseen`: the smooth error (sigma) of the calibrated robot, with the effects, and with these on left-out
+    trials; the last two without what errors of the description explain (`Discrepancy.rest`). `line`: the strongest spectral line
+    left (z-score, Hz). `quick`: the error (sigma) that is neither smooth nor noise (`fast_error`).
+
+    `halved`: the effects remove half of the error. `strange`: the error is at one place of the body, the calibrated error began in
+    one step, as that of no known effect does, or an effect is at a limit (`strained`, in words). `caveats`: what keeps the data
+    from being explained although little is left, in words (`find_caveats`).
     """
 
     before: float
@@ -56,7 +58,7 @@ class VerdictInputs:
     caveats: tuple[str, ...] = ()
 
     def without_effects(self, context: FitContext, base: ScoredModel) -> "VerdictInputs":
-        """The same where no effect is in force."""
+        """Return the inputs of a verdict without effects in force."""
         after, unseen = base.discrepancy.beyond(context.accuracy), left_out(context, base.fit).structure
         return replace(
             self, after=after, unseen=unseen, quick=fast_error(context, base), strained=(), caveats=find_caveats(context, base)
@@ -65,9 +67,12 @@ class VerdictInputs:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, the model it leaves in force, claims and runners-up (their errors on sealed trials yet unknown), sets of effects
-    that tell the same, two models between which an experiment should decide; and the claims that alone keep the day from being
-    explained, being less likely than not."""
+    """The verdict and its consequences.
+
+    The model in force, claims and runners-up (their errors on held-out trials not yet known), sets of effects that cannot be
+    separated, two models between which an experiment should decide; and `doubtful`, claims less likely than not that alone keep the
+    data from being explained.
+    """
 
     verdict: str
     final: ScoredModel
@@ -81,7 +86,10 @@ class Judgement:
 
 
 def judge(context: FitContext, found: Search, gated: Gated, limits: AcceptanceLimits) -> Judgement:
-    """From what passed the gates; a set that predicts trials left out worse than the calibrated robot counts nothing."""
+    """Return the judgement on the effects that passed the gate.
+
+    A set that predicts left-out trials worse than the calibrated robot is dropped.
+    """
     context.progress("verdict")
     base, best = found.base, gated.best
     beyond = out_of_sample(context, best, limits)
@@ -90,27 +98,27 @@ def judge(context: FitContext, found: Search, gated: Gated, limits: AcceptanceLi
     added = tuple(e for e in best.effects if e not in base.effects)
     signs = verdict_inputs(context, base, best, limits, beyond)
     apart = mixed_robots(context.prepared, context.trials, base.fit)
-    # What effects explain needs no second robot, also where data cannot tell which of two it is.
+    # What effects explain needs no second robot, also where two effects cannot be separated.
     alike = [w for d in (*gated.settled, *gated.doubts) for w in (d.found, d.other)]
     if apart is not None and apart.fall < base.fit.cost - min(w.fit.cost for w in (best, *alike)):
         apart = None
-    said = "unexplained" if apart else verdict(bool(added), signs, limits)
-    if said in ("noise", "unexplained") and best is not base:
+    decided = "unexplained" if apart else verdict(bool(added), signs, limits)
+    if decided in ("noise", "unexplained") and best is not base:
         signs, best, added = signs.without_effects(context, base), base, ()
     claims = _claims(context, found, gated, best, added, signs, limits)
     small = {s.effect for s in gated.small}
     either = {e: probability(found, pair, small) for pair in ((d.effect, d.rival) for d in gated.settled) for e in pair}
-    doubtful = unsure(claims, either) if said == "explained" else ()
-    said = "partly_explained" if doubtful else said
-    runners = _runners_up(found, gated, () if said == "unexplained" else added)
+    doubtful = unsure(claims, either) if decided == "explained" else ()
+    decided = "partly_explained" if doubtful else decided
+    runners = _runners_up(found, gated, () if decided == "unexplained" else added)
     ambiguous = tuple(dict.fromkeys((*(w.effects for w in alike), *_as_good(found, gated, best))))
-    return Judgement(said, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart, doubtful)
+    return Judgement(decided, best, claims, runners, ambiguous, _rivals(found, gated, best), signs, apart, doubtful)
 
 
 def verdict_inputs(
     context: FitContext, base: ScoredModel, best: ScoredModel, limits: AcceptanceLimits, beyond: LeftOut
 ) -> VerdictInputs:
-    """The signs of the calibrated `base` and of the `best` set, and what it leaves of trials left out."""
+    """Return the inputs for the calibrated `base` and the `best` set; `beyond`: its residuals on left-out trials."""
     prepared, trials = context.prepared, context.trials
     after = best.discrepancy.beyond(context.accuracy)
     rest = best.discrepancy.rest(context.accuracy) * context.objective.whitener.noise.sigma  # SI
@@ -127,12 +135,12 @@ def verdict_inputs(
 
 
 def find_caveats(context: FitContext, model: ScoredModel) -> tuple[str, ...]:
-    """What the fitted trials say against a model that leaves little.
+    """Return caveats of the fitted trials against a model that leaves little.
 
-    Numbers of the robot that no built one is likely to have, and a loop of pull and release that the twin has not.
+    These are numbers of the robot that no built one is likely to have, and a loop of pull and release that the twin does not show.
     """
     prepared, sigma = context.prepared, context.objective.whitener.noise.sigma
-    said = [words] if (words := far_from_description(model.fit)) else []
+    caveats = [words] if (words := far_from_description(model.fit)) else []
     predicted = [np.full_like(y, np.nan) for y in prepared.measured]
     for k, r in zip(context.trials, model.fit.evaluation.raw, strict=True):
         predicted[k] = prepared.measured[k] - r
@@ -143,20 +151,22 @@ def find_caveats(context: FitContext, model: ScoredModel) -> tuple[str, ...]:
         noise = float(np.median([s for s, o in zip(sigma, prepared.outputs, strict=True) if o.group == measured.group]))
         if off > max(LOOP_SIGNIFICANCE * measured.noise, LEFTOVER_SHARE * abs(measured.lag), noise):
             loop, twins = (f"{round(group.factor * x, 2) + 0.0:.2f} {group.unit}" for x in (measured.lag, own.lag))
-            said.append(f"pull and release differ by {loop} at {measured.name} as measured and by {twins} in this twin")
-    return tuple(said)
+            caveats.append(f"pull and release differ by {loop} at {measured.name} as measured and by {twins} in this twin")
+    return tuple(caveats)
 
 
 def out_of_sample(context: FitContext, best: ScoredModel, limits: AcceptanceLimits) -> LeftOut:
-    """A set on trials left out. Where it leaves no more than noise of those fitted, and much to first order of those left out, the
-    latter are fitted to the others in truth."""
+    """Return the residuals of a candidate on left-out trials.
+
+    Full fits replace first-order steps where the candidate leaves only noise on fitted trials and much on left-out ones.
+    """
     first = left_out(context, best.fit)
     much = max(LARGE_STRUCTURE, limits.left)
     return proven(context, best.fit, first) if best.discrepancy.size <= much < first.structure else first
 
 
 def withdraw(context: FitContext, found: Search, judged: Judgement) -> Judgement:
-    """Take the claims back: they are candidates, and the calibrated robot is left in force."""
+    """Turn the claims into runners-up, and leave the calibrated robot in force."""
     signs = judged.signs.without_effects(context, found.base)
     runners = (
         *(replace(c, beside=tuple(o.effect for o in judged.claims if o is not c)) for c in judged.claims),
@@ -166,7 +176,7 @@ def withdraw(context: FitContext, found: Search, judged: Judgement) -> Judgement
 
 
 def verdict(added: bool, signs: VerdictInputs, limits: AcceptanceLimits) -> str:
-    """In the words of the report's contract; `added`: effects passed the gates."""
+    """Return the verdict, as in the report's contract; `added`: whether effects passed the gate."""
     s = signs
     much = max(s.after, s.unseen, s.quick) > max(LARGE_STRUCTURE, limits.left) or s.line[0] > limits.line
     if not added:
@@ -181,15 +191,19 @@ def verdict(added: bool, signs: VerdictInputs, limits: AcceptanceLimits) -> str:
 
 
 def unsure(claims: tuple[Claim, ...], either: Mapping[str, float]) -> tuple[str, ...]:
-    """Claims less likely than not: other sets explain the data better, and what they all imitate may be none of them. A lag or a
-    delay is one of few laws that `lateness` weighed, and the likeliest; of a claim that `settle` took, and of its rival, one or the
-    other must be likely, and that is `either`."""
+    """Return claims less likely than not: other sets explain the data better, and the true cause may be none of them.
+
+    A lag or a delay is exempt, since `lag_or_delay` chose it among few. For a claim from `resolve_ties`, `either` is the
+    probability of the claim or its rival, and that must be likely.
+    """
     return tuple(c.effect for c in claims if max(c.probability, either.get(c.effect, 0.0)) < EVEN_CHANCE and c.effect not in LATE)
 
 
 def probability(found: Search, effects: Collection[str], small: set[str]) -> float:
-    """Share of the tempered weight exp(score / 20) of sets with one of the effects; sets with a `small`, immaterial one do not
-    count, unless they were weighed beside such a one only."""
+    """Return the share of the tempered weight exp(score / 20) of sets with one of the effects.
+
+    Sets with a `small`, immaterial effect do not count, unless the effects were fitted only beside such a one.
+    """
     wanted = set(effects)
     material = [w for w in found.all if not small & set(w.effects)]
     if not any(wanted & set(w.effects) for w in material):
@@ -209,8 +223,8 @@ def _claims(
     signs: VerdictInputs,
     limits: AcceptanceLimits,
 ) -> tuple[Claim, ...]:
-    """The largest first."""
-    # What is left over has a cause too, and that cause may be what these effects imitate: by the share of the error they take.
+    """Return the claims, the largest first."""
+    # What is left has a cause too, which these effects may imitate: reduce by the share of the error that they leave.
     sure = max(0.0, 1.0 - signs.after / signs.before) if signs.after > limits.slight else 1.0
     sure = min(sure, EVEN_CHANCE) if signs.strained else sure
     small = {s.effect for s in gated.small}
@@ -222,7 +236,7 @@ def _claims(
 
 
 def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[Claim, ...]:
-    """Effects weighed and not claimed, each in its best set, best first."""
+    """Return effects fitted and not claimed, each in its best set, best first."""
     small = {s.effect for s in gated.small}
     out: dict[str, Claim] = {}
     for w in found.all:
@@ -234,12 +248,13 @@ def _runners_up(found: Search, gated: Gated, claimed: tuple[str, ...]) -> tuple[
 
 
 def _as_good(found: Search, gated: Gated, final: ScoredModel) -> tuple[tuple[str, ...], ...]:
-    """Other sets, not just the claimed one with something added or dropped, whose evidence comes within `LEAST_EVIDENCE` of it, and
-    two standard deviations of what only one of them hears. What was too small to claim was dropped from the claimed set, and lends
-    no other its evidence.
+    """Return alternative sets, neither sub- nor supersets of the claimed one, with nearly as much evidence.
 
-    In a row whose tendon one law has taut and another slack the one's z is the other's less what the reading's noise adds to it,
-    e with E|e|^2 = h: |z|^2 differs by h in the mean, which evidence is corrected for, and by 2 sqrt(h) of chance.
+    Their score is within `LEAST_EVIDENCE` and two standard deviations of the input-noise term. Sets with an effect already dropped
+    as too small are skipped.
+
+    Where one set has a tendon taut and another has it slack, their z differ by what the reading's noise adds, e with E|e|^2 = h.
+    |z|^2 then differs by h in the mean, for which evidence is corrected, and by 2 sqrt(h) by chance.
     """
     claimed, small = set(final.effects), {s.effect for s in gated.small}
     others = [
@@ -250,10 +265,12 @@ def _as_good(found: Search, gated: Gated, final: ScoredModel) -> tuple[tuple[str
 
 
 def _rivals(found: Search, gated: Gated, final: ScoredModel) -> tuple[ScoredModel, ScoredModel] | None:
-    """Two models that tell different stories: an effect and what these data cannot tell it from, else the model in force and the
-    best set that does not contain it."""
-    for doubt in (*gated.settled, *gated.doubts):
-        return doubt.found, doubt.other
+    """Return two models that explain the data by different effects; None where there are none.
+
+    They are a resolved or open ambiguity, else the model in force and the best set that does not contain it.
+    """
+    for ambiguity in (*gated.settled, *gated.doubts):
+        return ambiguity.found, ambiguity.other
     for w in found.all:
         if w.effects not in (final.effects, found.base.effects) and not set(final.effects) < set(w.effects):
             return final, w

@@ -1,8 +1,7 @@
-"""Stage `settle`: of two effects that data cannot tell apart the likelier, where a structured error is left without either.
+"""Stage `resolve_ties`: where two effects cannot be separated and the data need one of them, take the likelier.
 
-With the one as with the other the day must be explained: then what they do is there, whatever its name, and a twin without it is
-off by that much. Which of them it is stays in doubt. Where a day is noise without them, or not explained with them, neither is
-taken.
+The data must be explained with each of the two: then the error is real, whatever its name, and a twin without it is off by that
+much. Which of the two it is stays ambiguous. Where the data are noise without them, or not explained with them, neither is taken.
 """
 
 from dataclasses import replace
@@ -17,17 +16,20 @@ from twin.diagnosis.verdict.judge import out_of_sample, verdict, verdict_inputs
 
 
 def resolve_ties(context: FitContext, found: Search, gated: Gated, limits: AcceptanceLimits) -> tuple[Search, Gated]:
-    """The sets weighed; the gated one as it is, or the smallest with a doubt's effect, or its rival, that explains the day."""
+    """Return the search and the gated set, with the ambiguities resolved that can be.
+
+    The result is the smallest set, with an ambiguity's effect or its rival, that explains the data; else both are unchanged.
+    """
     base = found.base
 
-    def says(w: ScoredModel) -> str:
+    def verdict_of(w: ScoredModel) -> str:
         return verdict(w is not base, verdict_inputs(context, base, w, limits, out_of_sample(context, w, limits)), limits)
 
-    if not gated.doubts or says(gated.best) in ("noise", "explained"):
+    if not gated.doubts or verdict_of(gated.best) in ("noise", "explained"):
         return found, gated
     for n in reversed(range(len(gated.doubts))):
         pair = gated.doubts[n].found, gated.doubts[n].other
-        if any(says(w) != "explained" or out_of_sample(context, w, limits).worse(left_out(context, base.fit)) for w in pair):
+        if any(verdict_of(w) != "explained" or out_of_sample(context, w, limits).worse(left_out(context, base.fit)) for w in pair):
             continue
         weighed = (*found.all, *(w for w in pair if all(w.effects != known.effects for known in found.all)))
         best = max(pair, key=lambda w: w.score)

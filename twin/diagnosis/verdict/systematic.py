@@ -1,9 +1,9 @@
-"""How far parameters may be off because of what no claim explains.
+"""Systematic errors of parameters from effects that are not claimed.
 
-A claimed effect's numbers take part of what an effect that was not named does. What is left in smooth errors, s sigmas RMS over n
-samples, tells how much of such an effect can be there, not which. With c the white patterns of an effect not claimed (n, k), J the
-model's derivatives and H = J'J + P its information, c shows A = c'c - c'J H^-1 J'c and moves parameters by G = H^-1 J'c; if it were
-all of what is left, along any of its directions alike,
+A claimed effect's numbers absorb part of an unnamed effect. The smooth error left, s sigmas RMS over n samples, shows how large
+such an effect can be, not which it is. With c the white patterns of an effect not claimed (n, k), J the model's derivatives and H =
+J'J + P its information, c shows A = c'c - c'J H^-1 J'c and moves parameters by G = H^-1 J'c; if it caused all of what is left,
+equally along its directions,
 
     v = n s^2 diag(G A^-1 G') / k
 
@@ -23,8 +23,10 @@ from twin.diagnosis.verdict.judge import Judgement
 
 
 def with_systematic(context: FitContext, judged: Judgement, known: Dictionary) -> Judgement:
-    """The judgement, the standard errors of its final twin and its claims with what unclaimed effects may have put in them;
-    `known`: first-order patterns of the calibrated robot."""
+    """Return the judgement with systematic errors added to the standard errors of its final twin and its claims.
+
+    `known`: first-order patterns of the calibrated robot.
+    """
     final = judged.final
     left = final.discrepancy.size * float(np.sqrt(context.objective.n))
     off = systematic(final.fit, known.beside(final.effects), left)
@@ -34,8 +36,10 @@ def with_systematic(context: FitContext, judged: Judgement, known: Dictionary) -
 
 
 def systematic(fit: Fit, unclaimed: Dictionary, left: float) -> np.ndarray:
-    """(n_free,) SI: standard deviations of the free parameters by effects that are not in the model, where a smooth error of norm
-    `left` (sigma) is left; 0 at a bound, and where no pattern shows."""
+    """Return standard deviations (n_free,) SI of the free parameters from effects that are not in the model.
+
+    `left` (sigma): the norm of the smooth error left. 0 at a bound, and where no pattern shows.
+    """
     free = ~fit.at_bound()
     J, C = fit.J[:, free], unclaimed.columns
     H = fit.information()[np.ix_(free, free)]

@@ -1,14 +1,13 @@
-"""Suspicions about what a file means, raised before anything is fitted: units, signs, order, frames, clocks. Nothing is repaired.
+"""Suspicions: possible mistakes in the files, found before any fit: units, signs, order, frames, clocks. Nothing is repaired.
 
-case.py       what is looked at, and how a changed file would be predicted
-
-units.py      readings, commands, payloads in another unit than declared
-signs.py      displacements, readings and gravity the other way round
-frames.py     markers mirrored, turned, shifted
-order.py      tendons and markers exchanged
-trials.py     duplicates, another robot, clocks, milliseconds
-channels.py   dead channels, lost markers, declared noise, room temperature
-clouds.py     point clouds in another unit, or away from their markers
+case.py         the data, and predictions of a changed file
+units.py        readings, commands, payloads in another unit than declared
+signs.py        displacements, readings and gravity of the opposite sign or direction
+frames.py       markers mirrored, turned, shifted
+order.py        tendons and markers exchanged
+trials.py       duplicates, another robot, clocks, milliseconds
+channels.py     dead channels, lost markers, declared noise, room temperature
+clouds.py       point clouds in another unit, or away from their markers
 description.py  robot.toml off by a thousand
 """
 
@@ -31,20 +30,19 @@ SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal predicti
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, order.tendons, channels.inputs,
 )  # fmt: skip
-LAST: tuple[Kind, ...] = (
-    units.commands,
-    description.parameters,
-)  # thousandfold loads: where nothing else explains, or the robot as described has no equilibrium
-UNREADABLE = tuple(units.UNIT_SUSPICIONS.values())  # readings in a wrong unit say nothing of loads
+LAST: tuple[Kind, ...] = (  # thousandfold loads: where nothing else explains, or the robot as described has no equilibrium
+    units.commands, description.parameters,
+)  # fmt: skip
+UNREADABLE = tuple(units.UNIT_SUSPICIONS.values())  # readings in a wrong unit are no evidence about loads
 
 
 def suspicions(
     prepared: PreparedRecording, twin: Twin, held_out: Sequence[int], nominal: Sequence[np.ndarray] | None
 ) -> tuple[Suspicion, ...]:
-    """All that looks wrong about what the file means, with the change that would remove it.
+    """Return all possible mistakes in the files, with the change that would remove each.
 
-    `nominal` (n_k, n_output) is the prediction of the twin as described, None where it has no equilibrium. Of sealed trials only
-    inputs and conditions are looked at. Of changes that explain the same readings the likeliest are kept.
+    `nominal` (n_k, n_output) is the prediction of the twin as described, None where it has no equilibrium. Of held-out trials only
+    inputs and conditions are used. Of several changes that explain the same readings the likeliest are kept.
     """
     case = Case(blind(prepared, held_out), twin, nominal)
     found = [s for kind in SEEN_IN_FILES for s in kind(case)]
@@ -60,7 +58,7 @@ def suspicions(
     for kind in LAST:
         if not explained():
             found += tried([kind])
-    if nominal is None and not explained():  # what has no equilibrium is sooner off by a thousand than turned or exchanged
+    if nominal is None and not explained():  # without an equilibrium a factor of a thousand is likelier than a turn or an exchange
         found += tried(TRIED)
     return tuple(s for s in found if s.left <= UNDECIDED_CHANGES_RATIO * min(o.left for o in found if o.group == s.group))
 

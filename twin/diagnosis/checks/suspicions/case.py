@@ -1,7 +1,7 @@
-"""What every suspicion is raised from: the fitted trials, the twin as described, and how well a changed file would be predicted.
+"""The case of every suspicion: the fitted trials, the twin as described, and the prediction of a changed file.
 
-A suspicion is a change to the file under which the twin as described, nothing fitted, predicts the data far better. Nothing is
-changed for it: the data go on as they came.
+A suspicion is a change to the file under which the twin as described, nothing fitted, predicts the data far better. It is reported
+and not applied.
 """
 
 from __future__ import annotations
@@ -31,8 +31,11 @@ from twin.prediction.twin import Twin
 
 @dataclass(frozen=True)
 class Suspicion:
-    """What looks wrong, in the file's units; the change to the file that would remove it; the share of the error that the change
-    would leave, 0 where the file alone shows it, and the group of outputs that tell."""
+    """A possible mistake in a file, in the file's units, and the change that would remove it.
+
+    `left`: the share of the error that the change would leave, 0 where the file alone shows the mistake. `group`: the group of
+    outputs that shows it.
+    """
 
     kind: str
     words: str
@@ -43,7 +46,10 @@ class Suspicion:
 
 @dataclass(frozen=True)
 class Case:
-    """A bench with the sealed trials blind, the twin as described and its prediction (n_k, n_output), None where it has none."""
+    """A recording without held-out measurements, the twin as described and its prediction (n_k, n_output).
+
+    `predicted` is None where there is no equilibrium.
+    """
 
     prepared: PreparedRecording
     twin: Twin
@@ -51,24 +57,24 @@ class Case:
 
     @property
     def trials(self) -> list[int]:
-        """Those with something measured."""
+        """Trials with something measured."""
         return [k for k, y in enumerate(self.prepared.measured) if np.isfinite(y).any()]
 
     @property
     def group(self) -> str:
-        """The outputs that stand for the twin."""
+        """The headline group of outputs."""
         return headline_group(o.group for o in self.prepared.outputs)
 
     @property
     def unregistered(self) -> bool:
-        """Whether the markers' frame is one of the robot's uncertain parameters, and so no mistake wherever it stands."""
+        """Whether the markers' frame is an uncertain parameter of the robot, so that no frame is a mistake."""
         return any(p.name.startswith("frame.") for p in self.twin.robot.nuisance)
 
     def columns(self, group: str) -> list[int]:
         return [j for j, o in enumerate(self.prepared.outputs) if o.group == group]
 
     def points(self) -> tuple[list[str], np.ndarray]:
-        """Markers seen in x, y and z, base to tip: their names and their columns (n_marker, 3)."""
+        """Return the names of the markers with x, y and z, base to tip, and their columns (n_marker, 3)."""
         found: dict[int, dict[int, int]] = {}
         for j, o in enumerate(self.prepared.outputs):
             if o.group == "marker":
@@ -78,7 +84,7 @@ class Case:
         return names, np.array(whole, int).reshape(-1, 3)
 
     def dead(self) -> list[int]:
-        """Columns of outputs that stand still, but for noise, where the robot as described moves."""
+        """Return the columns of outputs that do not move, but for noise, where the robot as described moves."""
         if self.predicted is None:
             return []
         y, p = (np.concatenate([v[k] for k in self.trials]) for v in (self.prepared.measured, self.predicted))
@@ -89,7 +95,7 @@ class Case:
         return np.flatnonzero(still & (most > UNMISSABLE_MOTION * noise)).tolist()
 
     def few(self) -> list[int]:
-        """Of the fitted trials those that pull each tendon most and that carry most: enough to try a change on."""
+        """Return the fitted trials that pull each tendon most and that have the largest payload: enough to try a change on."""
         if not self.trials:
             return []
         pulled = np.array([np.abs(self.prepared.inputs[k].command).max(axis=0) for k in self.trials])
@@ -97,7 +103,7 @@ class Case:
         return sorted({self.trials[i] for i in (*pulled.argmax(axis=0)[:TRIALS_TO_TRY_COMMANDS].tolist(), heaviest)})
 
     def thinned(self) -> Case:
-        """The case with a few samples of each trial: what explains all of a file otherwise shows in these too."""
+        """Return the case with a few samples of each trial: a mistake in a whole file shows in these too."""
         every = [max(1, -(-len(i.time) // SAMPLES_TO_TRY_COMMANDS)) for i in self.prepared.inputs]
         inputs = tuple(
             replace(i, time=i.time[::s], clock=i.clock[::s], command=i.command[::s], temperature=i.temperature[::s],
@@ -109,12 +115,12 @@ class Case:
         return replace(self, prepared=replace(self.prepared, inputs=inputs, measured=measured), predicted=predicted)
 
     def floor(self, columns: Sequence[int]) -> float:
-        """RMS of the columns' noise, SI: no change to a file leaves less."""
+        """Return the RMS noise of the columns, SI: no change to a file leaves less."""
         of = [self.prepared.outputs[j] for j in columns]
         return float(np.sqrt(np.mean([(o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise) ** 2 for o in of])))
 
     def again(self, change: Callable[[Inputs], Inputs], twin: Twin | None = None) -> dict[int, np.ndarray] | None:
-        """What would be predicted of the `few` trials, driven and loaded otherwise; None without an equilibrium."""
+        """Return the prediction of the `few` trials under changed inputs; None without an equilibrium."""
         few, twin = self.few(), twin or self.twin
         prepared = replace(self.prepared, inputs=tuple(change(i) for i in self.prepared.inputs))
         try:
@@ -129,7 +135,7 @@ class Case:
         return None if self.predicted is None else dict(enumerate(self.predicted))
 
     def error(self, columns: Sequence[int], predicted: dict[int, np.ndarray] | None, trials: Sequence[int] | None = None) -> float:
-        """RMS of measured - predicted over the columns and trials, SI; infinite where nothing is predicted."""
+        """Return the RMS of measured - predicted over the columns and trials, SI; infinite where nothing is predicted."""
         if predicted is None:
             return float("inf")
         trials = self.trials if trials is None else trials
@@ -140,18 +146,18 @@ class Case:
         return rms((measured - shown)[:, columns])
 
     def motion(self, columns: Sequence[int]) -> float:
-        """RMS of the columns about their means over the fitted trials, SI."""
+        """Return the RMS of the columns about their means over the fitted trials, SI."""
         y = np.concatenate([self.prepared.measured[k] for k in self.trials])[:, columns]
         return rms(y - np.nanmean(y, axis=0))
 
     def better(self, before: float, after: float, columns: Sequence[int]) -> float | None:
-        """The share of the error left by a change to the file, where it takes most of it and little is left; else None."""
+        """Return the share of an error that a change leaves, if the change removes most of it and little is left; else None."""
         if not np.isfinite(after) or after >= LEFT_BY_FILE_CHANGE * min(before, self.motion(columns)):
             return None
         return after / before if np.isfinite(before) else 0.5 * after / self.motion(columns)
 
     def _registered(self, measured: np.ndarray, shown: np.ndarray) -> np.ndarray:
-        """Predicted markers turned and shifted onto the measured ones."""
+        """Return the predicted markers turned and shifted onto the measured ones."""
         _, columns = self.points()
         if not len(columns):
             return shown
@@ -162,8 +168,10 @@ class Case:
 
 
 def beginnings(prepared: PreparedRecording) -> PreparedRecording:
-    """The bench with the first row of each trial alone: where that has no equilibrium neither has the trial, and a solver that
-    looks for one row by row takes minutes to say so. Where a seen skin would stand is not asked of it."""
+    """Return the recording with the first row of each trial only, without clouds.
+
+    Where that row has no equilibrium, neither has the trial; a row-by-row solver would take minutes to find out.
+    """
     inputs = tuple(
         replace(i, time=i.time[:1], clock=i.clock[:1], command=i.command[:1], temperature=i.temperature[:1],
                 loads=i.loads if len(i.loads.torque) == 1 else replace(i.loads, torque=i.loads.torque[:1]), clouds=None)
@@ -177,13 +185,13 @@ def _thinned(loads: Loads, step: int) -> Loads:
 
 
 def rms(r: np.ndarray) -> float:
-    """Root mean square of what is there; infinite where nothing is."""
+    """Return the root mean square of what is there; infinite where nothing is."""
     known = r[np.isfinite(r)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("inf")
 
 
 def registration(points: np.ndarray, onto: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Proper rotation (3, 3) and shift (3,) that bring points (n, 3) closest to `onto` (Kabsch, Acta Cryst. A32, 1976)."""
+    """Return the rotation (3, 3) and shift (3,) that bring points (n, 3) closest to `onto` (Kabsch, Acta Cryst. A32, 1976)."""
     known = np.isfinite(points).all(axis=1) & np.isfinite(onto).all(axis=1)
     if known.sum() < 3:
         return np.eye(3), np.zeros(3)
@@ -193,6 +201,6 @@ def registration(points: np.ndarray, onto: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def called(channels: Sequence[Channel]) -> str:
-    """The channels as a pattern: disk_*_*, tendon_*_tension."""
+    """Return the channels as a pattern: disk_*_*, tendon_*_tension."""
     patterns = dict.fromkeys(CHANNEL_KINDS[c.kind][0].replace("#", "*").replace("@", "*") for c in channels)
     return ", ".join(patterns)

@@ -1,4 +1,4 @@
-"""Single channels: dead ones, declared noise that cannot be, a room nobody works in."""
+"""Single channels: dead ones, implausible declared noise, an implausible room temperature."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,15 +22,18 @@ from twin.prediction.prepared import ROOM_TEMPERATURE, Inputs
 
 
 def outputs(case: Case) -> Iterator[Suspicion]:
-    """Outputs that stand still where the robot as described moves."""
+    """Yield outputs that do not move where the robot as described moves."""
     found = [case.prepared.outputs[j].channel.name for j in case.dead()]
     if found:
-        words = f"{', '.join(found)}: one value all day, but for noise, and the robot as described moves there"
+        words = f"{', '.join(found)}: one value in all trials, but for noise, where the robot as described moves"
         yield Suspicion("dead channel", words, f"remove the [[channel]] {', '.join(found)}, or log again")
 
 
 def lost_markers(case: Case) -> Iterator[Suspicion]:
-    """Markers that stand at exactly 0, 0, 0 in some rows and elsewhere in most: trackers write that for a marker they have lost."""
+    """Yield markers at exactly 0, 0, 0 in some rows and elsewhere in most.
+
+    Trackers write zeros for a marker that they have lost.
+    """
     y, found = np.concatenate(case.prepared.measured), []
     for marker in dict.fromkeys(o.index for o in case.prepared.outputs if o.group == "marker"):
         columns = [j for j, o in enumerate(case.prepared.outputs) if o.group == "marker" and o.index == marker]
@@ -39,12 +42,12 @@ def lost_markers(case: Case) -> Iterator[Suspicion]:
         if len(columns) == 3 and 0 < at_zero.sum() < 0.5 * known.sum():
             found.append(f"{case.prepared.outputs[columns[0]].channel.name.rpartition('_')[0]} in {at_zero.sum()} rows")
     if found:
-        words = f"{', '.join(found)}: exactly 0, 0, 0, and elsewhere in all others, as trackers write a marker they have lost"
+        words = f"{', '.join(found)}: exactly 0, 0, 0, and elsewhere in all others: trackers write this for a lost marker"
         yield Suspicion("lost markers", words, "leave these cells empty in the trials' files")
 
 
 def inputs(case: Case) -> Iterator[Suspicion]:
-    """A drive that never changes, though the robot moves as if it did."""
+    """Yield a drive that never changes although the robot moves as if it did."""
     if case.predicted is None or not case.few():
         return
     command = np.concatenate([i.command for i in case.prepared.inputs])
@@ -79,7 +82,7 @@ def inputs(case: Case) -> Iterator[Suspicion]:
 
 
 def noise(case: Case) -> Iterator[Suspicion]:
-    """Declared noise beside what neighbouring readings scatter by, and beside all that is seen."""
+    """Yield declared noise far from the scatter of neighbouring readings, or larger than everything seen."""
     odd: list[tuple[Channel, float]] = []
     for j, o in enumerate(case.prepared.outputs):
         if case.predicted is not None:
@@ -87,7 +90,7 @@ def noise(case: Case) -> Iterator[Suspicion]:
             left = [y - p for y, p in zip(read, shown, strict=True)]
             least = min(_white(read), _white(left)) - NOMINAL_MOTION_ERROR * _white(
                 shown
-            )  # the robot's errors, where it moves from row to row
+            )  # less the robot's errors, where it moves from row to row
             odd += _odd(o.channel, least, _scatter(left, 0.5), HIDING_NOISE_RATIO * rms(np.concatenate(left)))
     for i, c in enumerate(case.prepared.drivers):
         read = [x.command[:, i] / case.prepared.pull[i] for x in case.prepared.inputs]
@@ -95,33 +98,38 @@ def noise(case: Case) -> Iterator[Suspicion]:
     for unit in dict.fromkeys(c.unit for c, _ in odd):
         alike = [(c, s) for c, s in odd if c.unit == unit]
         one = alike[0][0].scale.without_offset().to_si(1.0)
-        said, seen = np.median([c.noise or np.nan for c, _ in alike]) / one, np.median([s for _, s in alike]) / one
+        declared, seen = np.median([c.noise or np.nan for c, _ in alike]) / one, np.median([s for _, s in alike]) / one
         names = called([c for c, _ in alike])
-        words = f"noise of {names} is declared as {said:.3g} {unit}, and neighbouring readings scatter by {seen:.3g} {unit}"
+        words = f"noise of {names} is declared as {declared:.3g} {unit}, and neighbouring readings scatter by {seen:.3g} {unit}"
         yield Suspicion("declared noise", words, f"noise = {seen:.2g} for {names} (one standard deviation, in {unit})")
 
 
 def _odd(channel: Channel, least: float, scatter: float, most: float) -> list[tuple[Channel, float]]:
-    """The channel and its scatter (SI), where its declared noise is far below the `least` that it can be, or far above its scatter
-    and the `most` that it may be."""
-    said = channel.noise
-    if said is None:
+    """Return the channel and its scatter (SI), where its declared noise is implausible.
+
+    That is far below the `least` that it can be, or far above its scatter and the `most` that it may be.
+    """
+    declared = channel.noise
+    if declared is None:
         return []
-    if least > UNDERSTATED_NOISE_RATIO * said:
+    if least > UNDERSTATED_NOISE_RATIO * declared:
         return [(channel, least)]
-    return [(channel, scatter)] if said > max(most, SUSPECT_NOISE_RATIO * scatter) else []
+    return [(channel, scatter)] if declared > max(most, SUSPECT_NOISE_RATIO * scatter) else []
 
 
 def _white(columns: list[np.ndarray]) -> float:
-    """Standard deviation of white noise on a motion: its second differences turn from row to row, those of a smooth motion keep
-    their sign. Minus the product of two neighbours has a median of 1.480 sigma^2 (of 4 million draws)."""
+    """Return the standard deviation of white noise on a motion.
+
+    The second differences of white noise change sign from row to row, those of a smooth motion keep theirs. Minus the product of
+    two neighbours has a median of 1.480 sigma^2 (of 4 million draws).
+    """
     product = np.concatenate([(d := np.diff(c, n=2))[1:] * d[:-1] for c in columns])
     product = product[np.isfinite(product)]
     return float(np.sqrt(max(0.0, -np.median(product)) / 1.480)) if product.size else 0.0
 
 
 def _scatter(columns: list[np.ndarray], quantile: float) -> float:
-    """Standard deviation of white noise whose second differences have this quantile."""
+    """Return the standard deviation of white noise whose second differences have this quantile."""
     second = np.concatenate([np.abs(np.diff(c, n=2)) for c in columns])
     second = second[np.isfinite(second)]
     normal = {0.5: 0.6745, 0.25: 0.3186}[quantile]  # quantiles of |x|, x standard normal
@@ -129,7 +137,7 @@ def _scatter(columns: list[np.ndarray], quantile: float) -> float:
 
 
 def room(case: Case) -> Iterator[Suspicion]:
-    """A room temperature at which nobody works."""
+    """Yield a room temperature at which nobody works."""
     low, high = ROOM_TEMPERATURE_RANGE
     recording = case.prepared.recording
     for channel in (c for c in recording.channels if c.kind == "ambient_temperature"):
@@ -139,7 +147,7 @@ def room(case: Case) -> Iterator[Suspicion]:
             own = channel.scale
             read = (seen - own.offset) * own.denominator / own.numerator
             fit = [u for u in others(channel) if low < unit_scale(u, "K").to_si(read) < high]
-            words = f"{channel.name} is {read:.4g} {channel.unit}, and nobody works in a room of {seen - 273.15:.0f} degC"
+            words = f"{channel.name} is {read:.4g} {channel.unit}, which means a room of {seen - 273.15:.0f} degC"
             change = f'unit = "{fit[0]}" instead of "{channel.unit}" for {channel.name}' if fit else f"correct {channel.name}"
             yield Suspicion("temperature unit", words, change)
     odd = {t.name: float(t.conditions.get("ambient_temperature", ROOM_TEMPERATURE)) for t in recording.trials}

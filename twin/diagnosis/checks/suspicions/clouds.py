@@ -1,4 +1,4 @@
-"""Point clouds: in another unit than metres, of another body, and away from the markers of the same instant."""
+"""Point clouds: in another unit than metres, of another body, or away from the markers of the same instant."""
 
 from collections.abc import Iterator
 
@@ -14,9 +14,9 @@ KIND = "point clouds"
 
 
 def clouds(case: Case) -> Iterator[Suspicion]:
-    """Clouds as large as no robot of this kind, or that stand off the markers: of another frame or another robot.
+    """Yield clouds of implausible size, or away from the markers: in another frame or of another robot.
 
-    A marker on the skin that the camera sees is as near to a point of the cloud as these are to each other.
+    A visible marker on the skin is as near to a point of the cloud as these are to each other.
     """
     of = {t.name: t.clouds for t in case.prepared.recording.trials}
     seen = {k: c for k in case.trials if (c := of[case.prepared.inputs[k].name]) is not None and len(c.points)}
@@ -27,7 +27,7 @@ def clouds(case: Case) -> Iterator[Suspicion]:
     if not 1.0 / UNIT_MISTAKE_RATIO < size / robot < UNIT_MISTAKE_RATIO:
         unit, factor = ("mm", 1e-3) if size > robot else ("km", 1e3)
         words = f"the clouds are {size:.3g} m across and the robot {robot:.2g} m"
-        yield Suspicion(KIND, words, f"write `points` in metres: as they stand they would be {unit} (times {factor:g})")
+        yield Suspicion(KIND, words, f"write `points` in metres: as written they would be {unit} (times {factor:g})")
         return
     yield from _width(case)
     names, columns = case.points()
@@ -37,7 +37,7 @@ def clouds(case: Case) -> Iterator[Suspicion]:
     off, spacing = (np.concatenate([n[part] for n in near]) for part in (0, 1))
     if off.size and np.median(off) > CLOUD_DISTANCE_RATIO * np.median(spacing):
         words = (
-            f"markers {names[0]} to {names[-1]} stand {1e3 * np.median(off):.1f} mm off the nearest of their clouds, whose points "
+            f"markers {names[0]} to {names[-1]} are {1e3 * np.median(off):.1f} mm off the nearest of their clouds, whose points "
             f"are {1e3 * np.median(spacing):.1f} mm apart (medians)"
         )
         change = "give clouds and markers in the base frame, both of this robot and by the trial's own clock, or leave out `cloud`"
@@ -45,7 +45,7 @@ def clouds(case: Case) -> Iterator[Suspicion]:
 
 
 def _width(case: Case) -> Iterator[Suspicion]:
-    """Clouds that are compared, of a body thicker or thinner near its base, where it hardly moves, than the one described."""
+    """Yield clouds of a body thicker or thinner than described near its base, where it hardly moves."""
     near = [j for j in case.columns("skin") if case.prepared.outputs[j].index < N_PATCHES // N_BANDS]
     if case.predicted is None or not near:
         return
@@ -55,12 +55,15 @@ def _width(case: Case) -> Iterator[Suspicion]:
         return
     stands, described = float(np.median(seen[there])), float(np.median(shown[there]))
     if not 1.0 / CLOUD_WIDTH_RATIO < stands / described < CLOUD_WIDTH_RATIO:
-        words = f"near the base the clouds stand {1e3 * stands:.1f} mm off the axis, and the robot's skin {1e3 * described:.1f} mm"
+        words = f"near the base the clouds are {1e3 * stands:.1f} mm off the axis, and the robot's skin {1e3 * described:.1f} mm"
         yield Suspicion(KIND, words, "give clouds in the base frame, of this robot, or leave out `cloud`")
 
 
 def _nearest(markers: np.ndarray, time: np.ndarray, clouds: Clouds) -> tuple[np.ndarray, np.ndarray]:
-    """Distances (m) of markers (n, m, 3), at the row next to each frame, from its nearest point; and of its points from theirs."""
+    """Return the distances (m) of markers from the nearest point of a frame, and of its points from each other.
+
+    Markers (n, m, 3) count at the row nearest in time to each frame.
+    """
     off, spacing = [np.empty(0)], [np.empty(0)]
     for t, a, b in zip(clouds.time, clouds.offsets[:-1], clouds.offsets[1:], strict=True):
         points, there = clouds.points[a:b], markers[np.argmin(np.abs(time - t))]

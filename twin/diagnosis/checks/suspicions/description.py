@@ -1,4 +1,4 @@
-"""The description: a length or a modulus of robot.toml that is off by a thousand."""
+"""The description: a length or a modulus in robot.toml off by a factor of a thousand."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from twin.diagnosis.thresholds import LEFT_BY_FILE_CHANGE
 
 
 def parameters(case: Case) -> Iterator[Suspicion]:
-    """Where nothing moves as described: each parameter a thousand times larger, and smaller."""
+    """Yield a parameter whose value times a thousand, or a thousandth, would explain a motion that the description does not."""
     columns, few = case.columns(case.group), case.few()
     before = case.error(columns, case.as_is(), few)
     if before < LEFT_BY_FILE_CHANGE * case.motion(columns):

@@ -10,7 +10,7 @@ from twin.diagnosis.thresholds import LARGEST_CAMERA_SHIFT, LARGEST_CAMERA_TURN,
 
 
 def frame(case: Case) -> Iterator[Suspicion]:
-    """The rigid motion, mirrored or not, that brings the predicted markers onto the measured ones."""
+    """Yield the rigid motion, mirrored or not, that brings the predicted markers onto the measured ones."""
     names, columns = case.points()
     if case.predicted is None or case.unregistered or not len(names):
         return
@@ -25,11 +25,11 @@ def frame(case: Case) -> Iterator[Suspicion]:
     flip, moved = registration(p @ mirror, y)
     flip = flip @ mirror
     mirrored = rms(y - p @ flip.T - moved)
-    bar = min(before, case.motion(columns.ravel().tolist()))
-    if mirrored < LEFT_BY_FILE_CHANGE * min(bar, turned):
+    error = min(before, case.motion(columns.ravel().tolist()))
+    if mirrored < LEFT_BY_FILE_CHANGE * min(error, turned):
         change = f"export the markers in the right-handed base frame: {_axes(flip)} (or check which tendon is which)"
         yield Suspicion("mirrored frame", f"the markers move as in a mirror: {_axes(flip)}", change, mirrored / before, "marker")
-    elif turned < LEFT_BY_FILE_CHANGE * bar:
+    elif turned < LEFT_BY_FILE_CHANGE * error:
         angle, size = np.degrees(Rotation.from_matrix(turn).magnitude()), float(np.abs(p).max())
         if angle > LARGEST_CAMERA_TURN:
             words = f"the markers move as in a frame turned by {angle:.0f} degrees against the base frame: {_axes(turn)}"
@@ -44,14 +44,14 @@ def frame(case: Case) -> Iterator[Suspicion]:
 
 
 def _axes(turn: np.ndarray) -> str:
-    """Which axis of the base frame each axis of the file is, where the turn (3, 3) is near such an exchange."""
+    """Return which axis of the base frame each axis of the file is, where the turn (3, 3) is near such an exchange."""
     nearest = np.round(turn)
     if not np.allclose(np.abs(nearest).sum(axis=0), 1.0):
         vector = Rotation.from_matrix(turn * np.sign(np.linalg.det(turn))).as_rotvec()
         return f"rotation vector {np.round(np.degrees(vector)).tolist()} deg"
     named = ("x", "y", "z")
-    said = []
+    axes = []
     for row, axis in zip(nearest, named, strict=True):
         at = int(np.argmax(np.abs(row)))
-        said.append(f"{axis} of the file is {'-' if row[at] < 0 else ''}{named[at]}")
-    return ", ".join(said)
+        axes.append(f"{axis} of the file is {'-' if row[at] < 0 else ''}{named[at]}")
+    return ", ".join(axes)

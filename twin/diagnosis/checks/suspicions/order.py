@@ -11,12 +11,14 @@ from twin.diagnosis.checks.suspicions.case import Case, Suspicion, rms
 from twin.diagnosis.checks.suspicions.units import best
 from twin.diagnosis.thresholds import LEFT_BY_FILE_CHANGE
 
-BUILT = ("sensor",)  # readings whose level and gain every built robot has its own of
+BUILT = ("sensor",)  # readings whose level and gain differ from robot to robot
 
 
 def tendons(case: Case) -> Iterator[Suspicion]:
-    """Two driving channels exchanged, or all of them counted from another one; not where the robot as described bends as measured,
-    for one that bends another way is off by as much as it bends."""
+    """Yield two driving channels exchanged, or all of them counted from another one.
+
+    Not where the robot as described bends as measured: one that bends another way is off by as much as it bends.
+    """
     n, columns = case.prepared.n_tendon, case.columns(case.group)
     if case.error(columns, case.as_is(), case.few()) < LEFT_BY_FILE_CHANGE * case.motion(columns):
         return
@@ -25,8 +27,8 @@ def tendons(case: Case) -> Iterator[Suspicion]:
     names = [c.name for c in case.prepared.drivers]
     if len(set(names)) < n:
         return  # one drive for several tendons
-    tried = [(_said(names, order), lambda i, o=order: replace(i, command=i.command[:, o])) for order in ways]
-    words = "the robot as described would bend another way than measured under these commands"
+    tried = [(_reordering(names, order), lambda i, o=order: replace(i, command=i.command[:, o])) for order in ways]
+    words = "the robot as described would bend in another direction than measured under these commands"
     yield from best(case, "tendon order", words, "{}", tried)
 
 
@@ -36,12 +38,12 @@ def _swap(n: int, i: int, j: int) -> np.ndarray:
     return order
 
 
-def _said(names: list[str], order: np.ndarray) -> str:
+def _reordering(names: list[str], order: np.ndarray) -> str:
     return ", ".join(f"the column {names[o]} as {names[i]}" for i, o in enumerate(order) if i != o)
 
 
 def markers(case: Case) -> Iterator[Suspicion]:
-    """Points, or scalar channels of a group, that each follow another one's prediction."""
+    """Yield points, or scalar channels of a group, that each follow the prediction of another one."""
     if case.predicted is None:
         return
     names, columns = case.points()
@@ -65,19 +67,19 @@ def markers(case: Case) -> Iterator[Suspicion]:
         before, after = (rms(cost[moved, x]) for x in (moved, of[moved]))
         if after < LEFT_BY_FILE_CHANGE * before:
             change = ", ".join(f"the column{'s' if group == 'marker' else ''} {names[i]} as {names[of[i]]}" for i in moved)
-            words = f"{', '.join(names[i] for i in moved)} each stand where another of them should"
+            words = f"{', '.join(names[i] for i in moved)} each are where another of them should be"
             yield Suspicion(
                 "marker order" if group == "marker" else "channel order", words, change, after / before, f"{group} order"
             )
 
 
 def _left(y: np.ndarray, p: np.ndarray) -> float:
-    """RMS of what a prediction leaves of readings."""
+    """Return the RMS of what a prediction leaves of readings."""
     return rms(y - p)
 
 
 def _followed(y: np.ndarray, p: np.ndarray) -> float:
-    """RMS of what the best rising straight line in a prediction leaves of readings, both about their means."""
+    """Return the RMS that the best rising straight line in a prediction leaves of readings, both about their means."""
     y, p = y[:, 0], p[:, 0]
     known = np.isfinite(y)
     y, p = y[known] - y[known].mean(), p[known] - p[known].mean()

@@ -1,4 +1,4 @@
-"""Signs and directions: displacements paid out for pulled in, readings negated, gravity that points elsewhere or counts in g."""
+"""Signs and directions: displacements of the opposite sign, readings negated, gravity in another direction or in g."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,7 +13,7 @@ from twin.prediction.prepared import Inputs
 
 
 def outputs(case: Case) -> Iterator[Suspicion]:
-    """Scalar outputs, channel by channel: the negated one fits. (Positions are looked at as a frame.)"""
+    """Yield scalar outputs that fit if negated, channel by channel. (Positions are checked as a frame.)"""
     nominal = case.as_is()
     if nominal is None:
         return
@@ -33,7 +33,7 @@ def outputs(case: Case) -> Iterator[Suspicion]:
 
 
 def displacements(case: Case) -> Iterator[Suspicion]:
-    """Commanded displacements or angles of the other sign: as they stand no tendon ever pulls, or the wrong one does."""
+    """Yield commanded displacements or angles of the opposite sign: as they are no tendon ever pulls, or the wrong one."""
     of = np.array([d is Drive.DISPLACEMENT for d in case.prepared.drives])
     if not of.any():
         return
@@ -42,11 +42,11 @@ def displacements(case: Case) -> Iterator[Suspicion]:
     pulls = "no tendon ever pulls: none is drawn in beyond the straight robot" if most <= 0 else "the wrong tendons pull"
     change = f"the columns {called(channels)} with the other sign (positive is pulled in)"
     tried = [("", lambda i: replace(i, command=np.where(of, -i.command, i.command)))]
-    yield from best(case, "sign", f"with {called(channels)} as they stand {pulls}", change, tried)
+    yield from best(case, "sign", f"with {called(channels)} as written {pulls}", change, tried)
 
 
 def size(case: Case) -> Iterator[Suspicion]:
-    """Gravity in g, or in another unit."""
+    """Yield gravity in g, or in another unit."""
     sizes = np.array([np.linalg.norm(i.loads.gravity) for i in case.prepared.inputs])
     odd = sizes[(sizes > 0) & ((sizes < GRAVITY_RANGE[0]) | (sizes > GRAVITY_RANGE[1]))]
     if odd.size:
@@ -55,7 +55,7 @@ def size(case: Case) -> Iterator[Suspicion]:
 
 
 def gravity(case: Case) -> Iterator[Suspicion]:
-    """Gravity along another axis or way."""
+    """Yield gravity along another axis or with the opposite sign."""
     loads = [i.loads.gravity for i in case.prepared.inputs]
     if any(not np.allclose(g, loads[0]) for g in loads):
         ways = [("the other sign in every gravity", lambda i: replace(i, loads=replace(i.loads, gravity=-i.loads.gravity)))]

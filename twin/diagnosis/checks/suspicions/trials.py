@@ -1,4 +1,4 @@
-"""Trials: the same one twice, one of another robot, clocks that overlap, times that are not seconds."""
+"""Trials: the same one twice, one of another robot, clocks that overlap, times that are not in seconds."""
 
 import itertools
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from twin.diagnosis.thresholds import (
 
 
 def duplicates(case: Case) -> Iterator[Suspicion]:
-    """Two trials whose readings agree to far less than their own noise: one export under two names, not a repeat."""
+    """Yield two trials whose readings agree to far less than their own noise: one export under two names, not a repeat."""
     for a, b in itertools.combinations(case.trials, 2):
         y, z = case.prepared.measured[a], case.prepared.measured[b]
         if y.shape != z.shape:
@@ -37,14 +37,14 @@ def duplicates(case: Case) -> Iterator[Suspicion]:
 
 
 def _noise(y: np.ndarray) -> np.ndarray:
-    """(n_output,) the typical second difference of readings (n, n_output), over that of white noise of one: sqrt(6)."""
+    """Return the typical second difference (n_output,) of readings (n, n_output), over that of white noise of one: sqrt(6)."""
     with np.errstate(invalid="ignore"):
         second = np.abs(np.diff(y, n=2, axis=0))
     return np.array([np.nanmedian(s) / np.sqrt(6.0) if np.isfinite(s).any() else np.nan for s in second.T])
 
 
 def robots(case: Case) -> Iterator[Suspicion]:
-    """Distances from marker to marker, against the described robot and from trial to trial."""
+    """Yield marker distances unlike the described robot's, or that differ from trial to trial."""
     names, columns = case.points()
     if case.predicted is None or len(columns) < 2:
         return
@@ -64,8 +64,10 @@ def robots(case: Case) -> Iterator[Suspicion]:
 
 
 def _spacing(y: np.ndarray, p: np.ndarray, columns: np.ndarray) -> tuple[float, float]:
-    """Median of measured over predicted distances from each marker to the next, and its standard error: 1.25 of that of the mean of
-    normal ones, whose deviation is 1.48 of their median one."""
+    """Return the median ratio of measured to predicted distances between neighbouring markers, and its standard error.
+
+    The error is 1.25 of that of the mean of normal numbers, whose deviation is 1.48 of their median deviation.
+    """
     measured, shown = (np.linalg.norm(np.diff(v[:, columns], axis=1), axis=2) for v in (y, p))
     found = (measured / np.maximum(shown, 1e-12))[np.isfinite(measured)]
     if not found.size:
@@ -79,12 +81,12 @@ def _way(ratio: float) -> str:
 
 
 def clocks(case: Case) -> Iterator[Suspicion]:
-    """Trials that begin before the one before is over, or of which some say no start."""
+    """Yield trials that begin before the previous one ends, or of which only some have a start."""
     trials = case.prepared.recording.trials
-    silent = [t.name for t in trials if t.start is None]
-    if silent and len(silent) < len(trials):
-        words = f"{_few(silent)} {'has' if len(silent) == 1 else 'have'} no start, and the other trials have one"
-        yield Suspicion("missing start", words, f"start = ... (s since the first trial) in the [[trial]] of {_few(silent)}")
+    unstarted = [t.name for t in trials if t.start is None]
+    if unstarted and len(unstarted) < len(trials):
+        words = f"{_few(unstarted)} {'has' if len(unstarted) == 1 else 'have'} no start, and the other trials have one"
+        yield Suspicion("missing start", words, f"start = ... (s since the first trial) in the [[trial]] of {_few(unstarted)}")
     for (start, lasts, name), (then, _, other) in _overlaps(case):
         words = f"{other} begins at {then:g} s, before {name} is over (at {start + lasts:g} s)"
         yield Suspicion("overlapping trials", words, f"correct start of {other} or {name}, or their times: both are in seconds")
@@ -95,22 +97,24 @@ Timed = tuple[float, float, str]  # start (s), how long (s), name
 
 
 def _overlaps(case: Case) -> list[tuple[Timed, Timed]]:
-    """Trials that begin before the one before is over."""
+    """Return pairs of trials of which the second begins before the first ends."""
     trials = case.prepared.recording.trials
     timed = sorted((t.start, float(t.time[-1] - t.time[0]), t.name) for t in trials if t.start is not None)
     return [(a, b) for a, b in itertools.pairwise(timed) if a[0] + a[1] > b[0] + START_TIME_ROUNDING]
 
 
 def _slow(case: Case) -> bool:
-    """Whether a clock beside the trials' own says that they are slow: every trial has a start, none before the one before is over,
-    and all is done within `LONGEST_SESSION`."""
+    """Return whether the starts of the trials show that they are slow.
+
+    Every trial has a start, none begins before the previous one ends, and all fit into `LONGEST_SESSION`.
+    """
     starts = [t.start for t in case.prepared.recording.trials]
     timed = [s for s in starts if s is not None]
     return len(timed) == len(starts) > 1 and not _overlaps(case) and max(timed) - min(timed) < LONGEST_SESSION
 
 
 def times(case: Case) -> Iterator[Suspicion]:
-    """Milliseconds read as seconds, and the reverse."""
+    """Yield milliseconds read as seconds, and the reverse."""
     inputs = [i for i in case.prepared.inputs if len(i.time) > 1]
     step = float(np.median(np.concatenate([np.diff(i.time) for i in inputs])))
     total = sum(float(i.time[-1] - i.time[0]) for i in inputs)

@@ -1,4 +1,4 @@
-"""Units: readings, commands and payloads that fit if their numbers are in another unit than the file says."""
+"""Units: readings, commands and payloads that would fit in another unit than the file declares."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,7 +15,7 @@ CONFUSABLE_UNITS = {  # SI unit -> units that are mistaken for each other
     "m": ("m", "cm", "mm", "um"), "N": ("N", "mN", "kN"), "rad": ("rad", "deg"), "K": ("K", "degC", "degF"), "A": ("A", "mA"),
     "V": ("V", "mV"), "ohm": ("ohm", "mohm", "kohm"), "N*m": ("N*m", "N*mm"),
 }  # fmt: skip
-LEVELS = ("ohm",)  # quantities that are never near zero, and of which a built robot has its own: their level tells a unit
+LEVELS = ("ohm",)  # quantities that are never near zero, and differ from robot to robot: their level shows a wrong unit
 UNIT_SUSPICIONS = {
     "m": "length unit", "N": "force unit", "rad": "angle unit", "K": "temperature unit", "A": "current unit", "V": "voltage unit",
     "ohm": "resistance unit", "N*m": "torque unit",
@@ -23,7 +23,7 @@ UNIT_SUSPICIONS = {
 
 
 def outputs(case: Case) -> Iterator[Suspicion]:
-    """Each group of outputs in each unit that its dimension has: positions in mm under m, degrees under rad, K under degC."""
+    """Yield groups of outputs that fit in another unit of their dimension: mm under m, degrees under rad, K under degC."""
     nominal = case.as_is()
     if nominal is None:
         return
@@ -48,8 +48,11 @@ def outputs(case: Case) -> Iterator[Suspicion]:
 
 
 def commands(case: Case) -> Iterator[Suspicion]:
-    """The same of what drives the robot: tensions, displacements, currents, angles. Larger ones are tried only where the robot as
-    described moves too little, smaller ones where it moves too much or has no equilibrium, and none where it moves as measured."""
+    """Yield drives that fit in another unit: tensions, displacements, currents, angles.
+
+    Larger values are tried only where the robot as described moves too little, smaller ones where it moves too much or has no
+    equilibrium, and none where it moves as measured.
+    """
     columns, nominal = case.columns(case.group), case.as_is()
     if case.error(columns, nominal) < LEFT_BY_FILE_CHANGE * case.motion(columns):
         return
@@ -75,7 +78,7 @@ def commands(case: Case) -> Iterator[Suspicion]:
 
 
 def torques(case: Case) -> Iterator[Suspicion]:
-    """The same of torque that loads the robot."""
+    """Yield torques on the robot that fit in another unit."""
     loads = case.twin.robot.build().load_channels
     for channel in (c for c in case.prepared.recording.inputs() if loads.get(c.name) == "torque"):
         ratios = {o: _ratio(o, channel.unit, "N*m") for o in others(channel)}
@@ -87,7 +90,7 @@ def torques(case: Case) -> Iterator[Suspicion]:
 
 
 def payloads(case: Case) -> Iterator[Suspicion]:
-    """Grams for kilograms, or the reverse."""
+    """Yield grams for kilograms, or the reverse."""
     most = max(i.loads.payload for i in case.prepared.inputs)
     if most > 0.0:
         tried = [
@@ -99,7 +102,7 @@ def payloads(case: Case) -> Iterator[Suspicion]:
 
 
 def best(case: Case, kind: str, words: str, change: str, tried: list) -> Iterator[Suspicion]:
-    """The best of the ways (name, change of inputs) in which a file may be meant otherwise, where one explains far more."""
+    """Yield the best of the changes (name, change of inputs), where one explains far more."""
     columns, few = case.columns(case.group), case.few()
     before, found = case.error(columns, case.as_is(), few), []
     if case.floor(columns) >= LEFT_BY_FILE_CHANGE * before:
@@ -114,13 +117,13 @@ def best(case: Case, kind: str, words: str, change: str, tried: list) -> Iterato
 
 
 def others(channel: Channel) -> list[str]:
-    """Units that people mistake the channel's for."""
+    """Return the units that are easily mistaken for the channel's."""
     own = channel.scale
     return [u for u in CONFUSABLE_UNITS[channel.si_unit] if unit_scale(u, channel.si_unit) != own]
 
 
 def _centred(case: Case, columns: list[int]) -> np.ndarray:
-    """The predicted columns of the fitted trials about their means."""
+    """Return the predicted columns of the fitted trials about their means."""
     p = np.concatenate([(case.predicted or ())[k][:, columns] for k in case.trials])
     return p - p.mean(axis=0)
 
@@ -130,7 +133,7 @@ def _ratio(other: str, unit: str, si: str) -> float:
 
 
 def _reread(case: Case, columns: list[int], unit: str, other: str, si: str) -> Case:
-    """The case with the numbers of these columns read in another unit."""
+    """Return the case with the numbers of these columns read in another unit."""
     declared, meant = unit_scale(unit, si), unit_scale(other, si)
     measured = [y.copy() for y in case.prepared.measured]
     for y in measured:
@@ -139,13 +142,13 @@ def _reread(case: Case, columns: list[int], unit: str, other: str, si: str) -> C
 
 
 def _typical(case: Case, columns: list[int], values: object, unit: str) -> float:
-    """RMS of the columns of the fitted trials, in the file's unit."""
+    """Return the RMS of the columns of the fitted trials, in the file's unit."""
     scale = case.prepared.outputs[columns[0]].channel.scale
     y = np.concatenate([values[k][:, columns] for k in case.trials])  # type: ignore[index]
     return rms((y - scale.offset) * scale.denominator / scale.numerator)
 
 
 def _level(case: Case, columns: list[int]) -> float:
-    """Measured over predicted, the median of both over the columns of the fitted trials."""
+    """Return the ratio of measured to predicted, each the median over the columns of the fitted trials."""
     read, shown = (np.concatenate([v[k][:, columns] for k in case.trials]) for v in (case.prepared.measured, case.predicted or ()))
     return float(np.nanmedian(np.abs(read)) / np.nanmedian(np.abs(shown)))
