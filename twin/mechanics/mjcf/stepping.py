@@ -1,0 +1,108 @@
+"""A trial by MuJoCo's steps, with the laws between them, compiled: a step of three joints and three tendons takes 5 to 8 us."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.foundation.compiled import jit
+from twin.mechanics.mjcf.friction import joint_forces, slide_joints, tendon_forces
+from twin.mechanics.mujoco_symbols import mj_fwd_actuation, mj_step1, mj_step2
+
+REST_RATE = 1e-7  # rad/s or m/s: slower than this in all coordinates for `REST_STEPS` steps a body has settled
+REST_STEPS = 30
+LARGEST_RATE = 1e5  # rad/s or m/s: faster bodies have diverged
+
+
+class Views(NamedTuple):
+    """Views of a data's and a model's arrays."""
+
+    ctrl: np.ndarray
+    qpos: np.ndarray
+    qvel: np.ndarray
+    applied: np.ndarray  # qfrc_applied
+    effort: np.ndarray  # qfrc_actuator
+    force: np.ndarray  # actuator_force
+    damping: np.ndarray  # dof_damping of the model
+    shown: tuple  # arrays that are recorded after positions are known, in the order of the solver's columns
+
+
+class Laws(NamedTuple):
+    """All laws between the steps; `pull` (ntendon, nu) is the tension per force of each actuator."""
+
+    joints: object
+    tendon: tuple  # mu, presliding (m)
+    tree: object
+    paths: object
+    pull: np.ndarray
+
+
+class Memory(NamedTuple):
+    """What the laws remember from step to step."""
+
+    z: np.ndarray  # (n_joint,)
+    before: np.ndarray  # (n_joint,)
+    slip: object
+    started: np.ndarray  # (1,) whether tendons' paths are those of a step before
+
+
+@jit
+def run(model, data, views, laws, memory, h, commands, rows, out):
+    """Step through commands (n, nu), one a step of h s, the state before step i being that at command i.
+
+    Where rows[i] >= 0 the shown arrays go to out[rows[i]], with the mean of the rates before and after (the steps are a leapfrog), so
+    that all belong to that moment. With `rows` empty it settles under commands[0] until it is at rest. Returns the number of steps.
+    """
+    nv, nt = views.qvel.size, laws.pull.shape[0]
+    own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
+    mu = laws.tendon[0]
+    settling = rows.size == 0
+    done = commands.shape[0]
+    for i in range(commands.shape[0]):
+        for k in range(nv):
+            views.applied[k] = 0.0
+            views.damping[k] = own[k] + raised[k]
+            raised[k] = 0.0
+        joint_forces(laws.joints, memory.z, h, views.qvel, views.effort, views.applied, views.damping)
+        for k in range(views.ctrl.size):
+            views.ctrl[k] = commands[i, k]
+        mj_step1(model, data)
+        row = -1 if settling else rows[i]
+        if mu > 0.0 or row >= 0:
+            mj_fwd_actuation(model, data)
+        if mu > 0.0:
+            for t in range(nt):
+                T = 0.0
+                for k in range(views.force.size):
+                    T += laws.pull[t, k] * views.force[k]
+                tendon_forces(
+                    t, T, laws.tendon, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised
+                )
+            memory.started[0] = True
+        if row >= 0:
+            at = 0
+            for array in views.shown:
+                for k in range(array.size):
+                    out[row, at] = array[k]
+                    at += 1
+            for k in range(nv):
+                out[row, at + k] = 0.5 * views.qvel[k]
+        mj_step2(model, data)
+        fastest = 0.0
+        for k in range(nv):
+            fastest = max(fastest, abs(views.qvel[k])) if math.isfinite(views.qvel[k]) else np.inf
+        if row >= 0:
+            for k in range(nv):
+                out[row, at + k] += 0.5 * views.qvel[k]
+        slide_joints(laws.joints, memory.z, memory.before, views.qpos)
+        if not fastest < LARGEST_RATE:
+            done = i
+            break
+        slow = slow + 1 if fastest < REST_RATE else 0
+        if settling and slow > REST_STEPS:
+            break
+    for k in range(nv):
+        views.damping[k] = own[k]
+    return done
