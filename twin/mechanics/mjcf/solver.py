@@ -16,8 +16,8 @@ from twin.mechanics.mjcf.stepping import Laws, Memory, Views, run
 
 LONGEST_STEP = 2e-3  # s: for a finger of 30 g on winches of 2 N/mm a hundredth of a degree from the limit of short steps
 MOST_LOADED_MODELS = 8
-_SHOWN = ("qpos", "qfrc_actuator", "actuator_length", "actuator_velocity", "actuator_force", "ten_length", "ten_velocity",
-          "site_xpos", "sensordata")  # fmt: skip
+_SHOWN = ("qpos", "qfrc_actuator", "actuator_length", "actuator_force", "ten_length", "site_xpos", "sensordata")
+_RATES = ("qvel", "actuator_velocity", "ten_velocity")
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,13 @@ class ModelSolver:
         none, empty = np.empty(0, np.int64), np.empty((0, 0))
         settled = run(model, data, now.views, laws, memory, h, np.repeat(commands[:1], still, axis=0), none, empty)
         out = np.full((len(time) if rows is None else len(problem.time), _width(now)), np.nan)
-        each = np.arange(len(time)) if rows is None else rows
+        each = np.append(np.arange(len(time)) if rows is None else rows, -1)
+        commands = np.vstack([commands, commands[-1:]])
         stopped = settled < still and bool(not np.abs(now.data.qvel).max() < 1.0)
         done = 0 if stopped else run(model, data, now.views, laws, memory, h, commands, each, out)
         if rows is None:
             out = np.stack([np.interp(problem.time, time, column) for column in out.T], axis=1)
-        return self._solution(out, now, done == len(time))
+        return self._solution(out, now, done == len(commands))
 
     def _under(self, loads: Loads) -> _Compiled:
         """Return the model with the loads' gravity, payloads and force."""
@@ -90,13 +91,12 @@ class ModelSolver:
         """Return the recorded columns as signals by group."""
         model, at = now.model, 0
         found = {}
-        for name, array in zip(_SHOWN, now.views.shown, strict=True):
+        for name, array in zip((*_SHOWN, *_RATES), (*now.views.shown, *now.views.rates), strict=True):
             found[name] = out[:, at : at + array.size]
             at += array.size
-        rate = out[:, at:]
         joints = np.arange(model.njnt)
         dof, qpos = model.jnt_dofadr[joints], model.jnt_qposadr[joints]
-        angle, speed, effort = found["qpos"][:, qpos], rate[:, dof], found["qfrc_actuator"][:, dof]
+        angle, speed, effort = found["qpos"][:, qpos], found["qvel"][:, dof], found["qfrc_actuator"][:, dof]
         length, force = found["actuator_length"], found["actuator_force"]
         others = {"joint angle": angle, "joint shift": angle, "joint rate": speed, "joint speed": speed, "joint torque": effort}
         others |= {"joint force": effort, "actuator angle": length, "actuator length": length}
@@ -121,10 +121,16 @@ def _own_tension(model: mujoco.MjModel, found: dict[str, np.ndarray]) -> np.ndar
 
 
 def _compile(model: mujoco.MjModel, data: mujoco.MjData) -> _Compiled:
-    shown = tuple(np.asarray(getattr(data, name)).reshape(-1) for name in _SHOWN)
+    shown, rates = (tuple(np.asarray(getattr(data, name)).reshape(-1) for name in names) for names in (_SHOWN, _RATES))
+    before = sum(array.size for array in shown[: _SHOWN.index("actuator_force")])
+    affine = (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)) & (model.actuator_delay <= 0.0)
+    limits = np.where(model.actuator_forcelimited[:, None] != 0, model.actuator_forcerange, [-np.inf, np.inf])
     views = Views(
-        data.ctrl, data.qpos, data.qvel, data.qfrc_applied, data.qfrc_actuator, data.actuator_force, model.dof_damping, shown
-    )
+        data.ctrl, data.qpos, data.qvel, data.qfrc_applied, data.qfrc_actuator, data.actuator_force, model.dof_damping, shown,
+        rates, before, np.where(affine, model.actuator_biasprm[:, 2], 0.0), limits,
+        (data.moment_rownnz, data.moment_rowadr, data.moment_colind, data.actuator_moment.reshape(-1)),
+        (-0.5, 0.5 if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_EULER) else -0.5),
+    )  # fmt: skip
     last = np.full(model.nbody, -1, np.int64)
     for k in range(model.nbody):
         own = model.body_dofnum[k] > 0
@@ -145,7 +151,7 @@ def _compile(model: mujoco.MjModel, data: mujoco.MjData) -> _Compiled:
 
 
 def _width(now: _Compiled) -> int:
-    return sum(array.size for array in now.views.shown) + now.model.nv
+    return sum(array.size for array in (*now.views.shown, *now.views.rates))
 
 
 def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.foundation.compiled import jit
+from twin.foundation.compiled import jit, jit_internal
 from twin.mechanics.mjcf.friction import joint_forces, slide_joints, tendon_forces
 from twin.mechanics.mujoco_symbols import mj_fwd_actuation, mj_step1, mj_step2
 
@@ -26,7 +26,13 @@ class Views(NamedTuple):
     effort: np.ndarray  # qfrc_actuator
     force: np.ndarray  # actuator_force
     damping: np.ndarray  # dof_damping of the model
-    shown: tuple  # arrays that are recorded after positions are known, in the order of the solver's columns
+    shown: tuple  # arrays that are recorded in every row, in the order of the solver's columns
+    rates: tuple  # (qvel, velocities of actuators, of tendons), recorded after those
+    force_column: int  # of `actuator_force` among the columns
+    slope: np.ndarray  # (nu,) of an actuator's force over its velocity
+    forcerange: np.ndarray  # (nu, 2), infinite where it is not limited
+    moment: tuple  # of actuators: rownnz, rowadr, colind, values
+    centring: tuple  # share of the last change of joints' damping, and of actuators', that is added ahead
 
 
 class Laws(NamedTuple):
@@ -48,17 +54,57 @@ class Memory(NamedTuple):
     started: np.ndarray  # (1,) whether tendons' paths are those of a step before
 
 
+@jit_internal
+def center_damping(views, own, before, now, applied):
+    """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step, and not at those after it
+    (implicit integrators) or before it (Euler): half of its change, extrapolated from the step before. Steps are then of second order.
+    """
+    rownnz, rowadr, colind, values = views.moment
+    av = views.rates[1]
+    for k in range(now.size):
+        now[k] = -views.centring[0] * own[k] * views.qvel[k]
+    for k in range(av.size):
+        f = views.centring[1] * views.slope[k] * av[k]
+        low, high, force = views.forcerange[k, 0], views.forcerange[k, 1], views.force[k]
+        if f != 0.0 and low < force < high:
+            for e in range(rowadr[k], rowadr[k] + rownnz[k]):
+                now[colind[e]] += values[e] * f
+    for k in range(now.size):
+        applied[k] += now[k] - before[k]
+        before[k] = now[k]
+
+
+@jit_internal
+def center_rates(views, out):
+    """Replace the rates of a row, those before it, by the mean with those now, and its actuators' forces by those at that mean."""
+    at = 0
+    for array in views.shown:
+        at += array.size
+    for j in range(3):
+        array = views.rates[j]
+        for k in range(array.size):
+            change = 0.5 * (array[k] - out[at])
+            out[at] += change
+            if j == 1:
+                force, low, high = out[views.force_column + k], views.forcerange[k, 0], views.forcerange[k, 1]
+                if low < force < high:
+                    out[views.force_column + k] = min(high, max(low, force + views.slope[k] * change))
+            at += 1
+
+
 @jit
 def run(model, data, views, laws, memory, h, commands, rows, out):
     """Step through commands (n, nu), one a step of h s, the state before step i being that at command i.
 
-    Where rows[i] >= 0 the shown arrays go to out[rows[i]], with the mean of the rates before and after (the steps are a leapfrog), so
-    that all belong to that moment. With `rows` empty it settles under commands[0] until it is at rest. Returns the number of steps.
+    Where rows[i] >= 0 the shown arrays go to out[rows[i]], and the rates after them. The steps are a leapfrog: rates belong to the
+    moments between the steps, so that their means before and after a row are shown, and forces are corrected for that. The last row
+    needs one step more. With `rows` empty it settles under commands[0] until it is at rest. Returns the number of steps.
     """
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
+    damped, damped_now = np.zeros(nv), np.zeros(nv)
     mu = laws.tendon[0]
-    settling = rows.size == 0
+    settling, last = rows.size == 0, -1
     done = commands.shape[0]
     for i in range(commands.shape[0]):
         for k in range(nv):
@@ -69,7 +115,10 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
         for k in range(views.ctrl.size):
             views.ctrl[k] = commands[i, k]
         mj_step1(model, data)
+        if last >= 0:
+            center_rates(views, out[last])
         row = -1 if settling else rows[i]
+        last = row
         if mu > 0.0 or row >= 0:
             mj_fwd_actuation(model, data)
         if mu > 0.0:
@@ -81,21 +130,24 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
                     t, T, laws.tendon, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised
                 )
             memory.started[0] = True
+        center_damping(views, own, damped, damped_now, views.applied)
+        if i == 0:  # no step before
+            for k in range(nv):
+                views.applied[k] -= damped[k]
         if row >= 0:
             at = 0
             for array in views.shown:
                 for k in range(array.size):
                     out[row, at] = array[k]
                     at += 1
-            for k in range(nv):
-                out[row, at + k] = 0.5 * views.qvel[k]
+            for array in views.rates:
+                for k in range(array.size):
+                    out[row, at] = array[k]
+                    at += 1
         mj_step2(model, data)
         fastest = 0.0
         for k in range(nv):
             fastest = max(fastest, abs(views.qvel[k])) if math.isfinite(views.qvel[k]) else np.inf
-        if row >= 0:
-            for k in range(nv):
-                out[row, at + k] += 0.5 * views.qvel[k]
         slide_joints(laws.joints, memory.z, memory.before, views.qpos)
         if not fastest < LARGEST_RATE:
             done = i
