@@ -117,7 +117,7 @@ def is_of_sensors(law: type[Effect]) -> bool:
 
 def is_of_antagonists(law: type[Effect]) -> bool:
     """Whether it needs two tendons that pull against each other on a joint."""
-    return "antagonists" in law.needs
+    return "friction of joints" in law.needs
 
 
 def is_of_springs(law: type[Effect]) -> bool:
