@@ -85,6 +85,7 @@ class EffectChain:
         return Route(
             mu=friction.mu,
             presliding=friction.presliding,
+            mu_shares=friction.mu_shares,
             stretch=sum(r.stretch for r in routes),
             bedding=bedding.bedding,
             bedding_tension=bedding.bedding_tension,

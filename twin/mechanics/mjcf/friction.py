@@ -31,6 +31,8 @@ from twin.foundation.compiled import jit_internal
 MUJOCO_PULLEY, MUJOCO_SITE = 2, 3  # mjtWrap
 PULLEY_POINT, SITE_POINT = -2, -1  # of mjData.wrap_obj; others are geoms
 LARGEST_LOSS = 40.0  # exponents of a capstan: beyond it nothing is left of a pull
+# Of the damping that would make a step implicit in the springs of what sticks: steps are stable from a quarter on.
+JOINT_SHARE, TENDON_SHARE = 1.0, 0.4
 
 
 class JointLaws(NamedTuple):
@@ -87,7 +89,7 @@ def joint_forces(laws, z, h, qvel, effort, applied, damping):
         F = laws.torque[j] + laws.breakaway[j] * math.exp(-r * r) + laws.load[j] * abs(effort[i])
         s = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
         applied[i] -= F * z[j]
-        damping[i] += h * F * (1.0 - z[j] * s) / laws.presliding
+        damping[i] += JOINT_SHARE * h * F * (1.0 - z[j] * s) / laws.presliding
 
 
 @jit_internal
@@ -172,14 +174,14 @@ def tendon_forces(t, T, law, tree, paths, slip, gradient, h, started, applied, d
             extra[k, 0] = math.acos(min(1.0, max(-1.0, dot)))
         travel = slip.beyond[t, k] - beyond if started else 0.0
         slip.beyond[t, k] = beyond
-        reached = slip.z[t, k] + travel / presliding
-        slip.z[t, k] = min(1.0, max(-1.0, reached))
-        if T > 0.0 and mu > 0.0 and abs(reached) < 1.0:
+        s = 1.0 if travel > 0.0 else -1.0 if travel < 0.0 else 0.0
+        slip.z[t, k] = s + (slip.z[t, k] - s) * math.exp(-abs(travel) / presliding)
+        if T > 0.0 and mu > 0.0:
             size = 0.0
             for i in range(nv):
                 size += abs(gradient[i])
             for i in range(nv):
-                damping[i] += h * T * mu * extra[k, 0] / presliding * abs(gradient[i]) * size
+                damping[i] += TENDON_SHARE * h * T * mu * extra[k, 0] * (1.0 - s * slip.z[t, k]) / presliding * abs(gradient[i]) * size
     lost = 0.0
     for k in range(1, n - 1):
         lost += mu * slip.z[t, k] * extra[k, 0]

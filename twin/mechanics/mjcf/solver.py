@@ -164,7 +164,8 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
     model.dof_damping[dof] = body.model.dof_damping[dof] + each[3]
     torque, breakaway, load = (x[rubs] for x in each[:3])
     law = JointLaws(qpos[rubs], dof[rubs], torque, breakaway, load, float(rub.stribeck), float(rub.presliding))
-    return Laws(law, (float(route.mu), float(route.presliding)), now.tree, now.paths, now.pull)
+    mu = route.mu * np.ones(model.ntendon) * (route.mu_shares or 1.0)
+    return Laws(law, mu, float(route.presliding), now.tree, now.paths, now.pull)
 
 
 def _memory(now: _Compiled, laws: Laws) -> Memory:

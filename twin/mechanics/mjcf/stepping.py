@@ -39,7 +39,8 @@ class Laws(NamedTuple):
     """All laws between the steps; `pull` (ntendon, nu) is the tension per force of each actuator."""
 
     joints: object
-    tendon: tuple  # mu, presliding (m)
+    mu: np.ndarray  # (ntendon,) of capstan friction
+    presliding: float  # m, of tendons
     tree: object
     paths: object
     pull: np.ndarray
@@ -103,7 +104,7 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
     damped, damped_now = np.zeros(nv), np.zeros(nv)
-    mu = laws.tendon[0]
+    mu = laws.mu.max() if nt else 0.0
     settling, last = rows.size == 0, -1
     done = commands.shape[0]
     for i in range(commands.shape[0]):
@@ -126,8 +127,9 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
                 T = 0.0
                 for k in range(views.force.size):
                     T += laws.pull[t, k] * views.force[k]
+                law = (laws.mu[t], laws.presliding)
                 tendon_forces(
-                    t, T, laws.tendon, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised
+                    t, T, law, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised
                 )
             memory.started[0] = True
         center_damping(views, own, damped, damped_now, views.applied)
