@@ -33,3 +33,8 @@ class Loads:
     push: Push | None = None
     payloads: tuple[tuple[str, float], ...] = ()  # kg at sites or bodies of these names
     payload_at_zero: float = 0.0  # kg that hung on silicone when its tendons' lengths were set to zero
+
+    @property
+    def hung(self) -> float:
+        """The mass (kg) of all payloads, wherever they hang."""
+        return self.payload + sum(mass for _, mass in self.payloads)

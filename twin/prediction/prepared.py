@@ -43,6 +43,13 @@ class Inputs:
     clouds: Patches | None = None
     smooth: bool = True
     start: Start = field(default_factory=Start)
+    home: np.ndarray | None = None  # (n_tendon,) of controls, whose zero means nothing: where they begin
+    reach: np.ndarray | None = None  # (n_tendon,) of controls: how far they go from there
+
+    @property
+    def pull(self) -> np.ndarray:
+        """(n, n_tendon) how much is pulled: the command; of controls their way from home, over the farthest."""
+        return self.command if self.home is None or self.reach is None else (self.command - self.home) / self.reach
 
     @property
     def signals(self) -> Signals:
@@ -99,20 +106,16 @@ class PreparedRecording:
     @property
     def reading(self) -> np.ndarray:
         """(n_tendon,) typical resolution of the driving channels, N, m or A; of a control a share of its range."""
-        typical = np.array([d.typical_noise for d in self.drives])
-        return np.where(np.isnan(typical), CONTROL_RESOLUTION * self.span, typical)
+        reach = self.inputs[0].reach
+        if reach is not None:
+            return CONTROL_RESOLUTION * reach
+        return np.array([d.typical_noise for d in self.drives])
 
     @property
-    def span(self) -> np.ndarray:
-        """(n_tendon,) range of the commands over all trials, above zero."""
-        low, high = (f([f(i.command, axis=0) for i in self.inputs], axis=0) for f in (np.min, np.max))
-        return np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
-
-    @property
-    def centre(self) -> np.ndarray:
-        """(n_tendon,) command from which others count: the middle of its range of a control, whose zero means nothing, else 0."""
-        low, high = (f([f(i.command, axis=0) for i in self.inputs], axis=0) for f in (np.min, np.max))
-        return np.where(self.driven_by(Drive.CONTROL), 0.5 * (low + high), 0.0)
+    def pull_resolution(self) -> np.ndarray:
+        """(n_tendon,) the same of `Inputs.pull`."""
+        reach = self.inputs[0].reach
+        return self.reading if reach is None else self.reading / reach
 
     @property
     def n_sample(self) -> int:
@@ -166,6 +169,11 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         )  # fmt: skip
         columns = [trial.values[o.channel.name][:, None] for o in outputs if o not in skin]
         measured.append(np.hstack([*columns, seen.at(trial.time)] if seen else columns))
+    if set(drives) == {Drive.CONTROL}:
+        home = np.median([i.command[0] for i in inputs], axis=0)
+        reach = np.max([np.abs(i.command - home).max(axis=0) for i in inputs], axis=0)
+        reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
+        inputs = [replace(i, home=home, reach=reach) for i in inputs]
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
 

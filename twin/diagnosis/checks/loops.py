@@ -70,9 +70,9 @@ def loops(prepared: PreparedRecording) -> Loops:
     """Of the output that stands for the twin: of points the one that moves most."""
     group = headline_group([o.group for o in prepared.outputs if o.group != "skin"] or ["skin"])  # clouds are too few to come back
     name, columns = _largest(prepared, group)
-    top = np.max([np.abs(i.command).max(axis=0) for i in prepared.inputs], axis=0)
+    top = np.max([np.abs(i.pull).max(axis=0) for i in prepared.inputs], axis=0)
     top = np.where(top > 0.0, top, 1.0)
-    found = [_loop(k, i, i.command / top, prepared.measured[k][:, columns]) for k, i in enumerate(prepared.inputs)]
+    found = [_loop(k, i, i.pull / top, prepared.measured[k][:, columns]) for k, i in enumerate(prepared.inputs)]
     return Loops(group, name, tuple(loop for loop in found if loop is not None))
 
 
