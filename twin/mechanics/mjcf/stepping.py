@@ -56,23 +56,25 @@ class Memory(NamedTuple):
 
 
 @jit_internal
-def center_damping(views, own, before, now, applied):
+def center_damping(views, own, before, before_act, started, applied):
     """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step, and not at those after it
     (implicit integrators) or before it (Euler): half of its change, extrapolated from the step before. Steps are then of second order.
+
+    `before` (nv,) and `before_act` (nu,) are the rates a step before. An actuator at its limit has no damping.
     """
     rownnz, rowadr, colind, values = views.moment
     av = views.rates[1]
-    for k in range(now.size):
-        now[k] = -views.centring[0] * own[k] * views.qvel[k]
+    for k in range(before.size):
+        if started:
+            applied[k] -= views.centring[0] * own[k] * (views.qvel[k] - before[k])
+        before[k] = views.qvel[k]
     for k in range(av.size):
-        f = views.centring[1] * views.slope[k] * av[k]
+        f = views.centring[1] * views.slope[k] * (av[k] - before_act[k])
+        before_act[k] = av[k]
         low, high, force = views.forcerange[k, 0], views.forcerange[k, 1], views.force[k]
-        if f != 0.0 and low < force < high:
+        if started and f != 0.0 and low < force < high:
             for e in range(rowadr[k], rowadr[k] + rownnz[k]):
-                now[colind[e]] += values[e] * f
-    for k in range(now.size):
-        applied[k] += now[k] - before[k]
-        before[k] = now[k]
+                applied[colind[e]] += values[e] * f
 
 
 @jit_internal
@@ -103,7 +105,7 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
     """
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
-    damped, damped_now = np.zeros(nv), np.zeros(nv)
+    before, before_act = np.zeros(nv), np.zeros(views.ctrl.size)
     mu = laws.mu.max() if nt else 0.0
     settling, last = rows.size == 0, -1
     done = commands.shape[0]
@@ -132,10 +134,7 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
                     t, T, law, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised
                 )
             memory.started[0] = True
-        center_damping(views, own, damped, damped_now, views.applied)
-        if i == 0:  # no step before
-            for k in range(nv):
-                views.applied[k] -= damped[k]
+        center_damping(views, own, before, before_act, i > 0, views.applied)
         if row >= 0:
             at = 0
             for array in views.shown:
