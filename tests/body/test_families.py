@@ -20,7 +20,9 @@ from twin.robots import Family, Robot, family_names, load, load_family, robot_na
 # Every robot that ships: a family without one fails below.
 robots = pytest.mark.parametrize("name", robot_names())
 N = 40
-SMALL = {Drive.TENSION: 1.0, Drive.DISPLACEMENT: 1e-3, Drive.CURRENT: 0.5}  # N, m, A: what every robot here can take
+SMALL = {
+    Drive.TENSION: 1.0, Drive.DISPLACEMENT: 1e-3, Drive.CURRENT: 0.5, Drive.CONTROL: 2e-3,
+}  # fmt: skip  # N, m, A, m or rad: what every robot here can take
 
 
 def through(robot: Robot) -> tuple[Body, tuple[Drive, ...], np.ndarray]:
@@ -51,10 +53,11 @@ def test_its_ports_are_channels_of_the_contract(name: str) -> None:
     for ports in body.ports:
         for port in ports:
             assert len(port.tendon_gains) == body.n_tendon
-            assert Channel(port.channel, "input", units[port.channel.rpartition("_")[2]]).kind
+            unit = "m" if port.drive is Drive.CONTROL else units[port.channel.rpartition("_")[2]]
+            assert Channel(port.channel, "input", unit).kind
     units |= {"marker": "m", "temperature": "K", "resistance": "ohm", "sensor": "ohm"}
     for channel, sense in body.senses.items():
-        assert Channel(channel, "output", units[sense.group]).kind, channel
+        assert Channel(channel, "output", sense.unit or units[sense.group]).kind, channel
     for channel, field in body.load_channels.items():
         assert Channel(channel, "input", units[channel.rpartition("_")[2]]).kind
         assert field in Loads.__dataclass_fields__

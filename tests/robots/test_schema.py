@@ -91,7 +91,7 @@ REFUSED = {
     "brackets 5,000 deep": (WIRE, RADIUS, RADIUS.replace("0.4", "[" * 5000 + "]" * 5000), ["not TOML"]),
     "a title that steers a terminal": (WIRE, 'title  = "', 'title  = "\\u001b[31m', ["title", "control characters"]),
     **{
-        f"family {name!r}": (WIRE, 'family = "continuum"', f'family = "{name}"', ["no family", "hand, soft, transmission"])
+        f"family {name!r}": (WIRE, 'family = "continuum"', f'family = "{name}"', ["no family", "hand, mjcf, soft, transmission"])
         for name in ("..", "continuum.x", "robot", "schema", "continuum_schema", "continuum_flex", "os", "")
     },
 }  # fmt: skip

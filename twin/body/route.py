@@ -57,7 +57,7 @@ class Route:
 
     mu: float = 0.0  # friction coefficient
     presliding: float = 4e-4  # m of travel, from sticking to sliding
-    mu_shares: tuple[float, ...] = ()  # of the tendons of an MJCF, each times mu; () is 1 for all
+    mu_shares: tuple[float, ...] = ()  # of the tendons of an MJCF, in shares of mu; () is 1 for all
     stretch: float = 0.0  # m/N
     bedding: float = 0.0  # m by which a tendon beds in
     bedding_tension: float = 1.0  # N over which it beds in

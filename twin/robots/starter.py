@@ -42,6 +42,8 @@ def write_starter(name: str, family: str, place: Path) -> Path:
         (draft / FIRST_SET).mkdir(parents=True)
         try:
             (draft / "robot.toml").write_text(robot_text(name, robot), "utf-8")
+            if load_family(family).SCHEMA.model_file is not None:
+                shutil.copy(str(robot.structure["model"]), draft)
             (draft / "README.md").write_text(readme_text(name), "utf-8")
             write_set(draft / FIRST_SET, robot)
             draft.rename(folder)
@@ -67,9 +69,12 @@ def robot_text(name: str, robot: Robot) -> str:
         "",
         "[structure]",
     ]
+    own = {**robot.structure, "model": Path(str(robot.structure["model"])).name} if schema.model_file else robot.structure
     for key, field in schema.structure.model_fields.items():
+        if schema.model_file and key == "tendons":
+            continue
         given = key in robot.structure
-        text = toml_lines({key: robot.structure[key]})[0] if given else f"# {key} ="
+        text = toml_lines({key: own[key]})[0] if given else f"# {key} ="
         head.append(f"{text}  # {field.description}")
     body = ["", "[parameters]"]
     for line in file_entries(robot):

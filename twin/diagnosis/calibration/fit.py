@@ -31,6 +31,8 @@ from twin.robots import Robot
 DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end of it, it stands there
+MOST_RENEWALS = 2  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
+LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 MOST_FIT_STEPS = 12  # at most, of a fit
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: what two codes of one law make of it. On 69 days of `tools.benchmarks.diagnosis.attribution` they were
@@ -115,6 +117,15 @@ class Objective:
     def __init__(self, prepared: PreparedRecording, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
         self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
+
+    @property
+    def bends(self) -> bool:
+        """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
+        return Drive.CONTROL in self.prepared.drives
+
+    def smallest_fall(self, fall: float) -> float:
+        """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
+        return min(fall, LARGEST_LAST_FALL) if self.bends else fall
 
     def of(self, which: Sequence[int]) -> Objective:
         """The same of some of its trials alone, by their positions."""
@@ -346,13 +357,14 @@ def fit(
         return float(e.z @ e.z) + besides(e.model.vector())
 
     at = objective.evaluate(model, near.traces if near else None)
+    renewals = MOST_RENEWALS if objective.bends else 0
     fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
     if J is not None:
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
-    now, damping = cost(at), 1e-4
+    now, damping, own, moved = cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
     for left in range(MOST_FIT_STEPS - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
@@ -362,7 +374,7 @@ def fit(
             D[:, i] = (cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
         H = columns.T @ columns + D.T @ D + np.diag(weight)
         g = columns.T @ at.z + D.T @ cut + weight * (x - prior)
-        better, whole, enough = None, damping, max(tolerance * now, worth)
+        better, whole, enough = None, damping, max(objective.smallest_fall(tolerance * now), worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
             foretold = -float(2.0 * g @ d + d @ H @ d)
@@ -370,13 +382,17 @@ def fit(
                 break
             better = _improved(objective, at, x + d, now - besides(x + d))
             damping *= 1.0 if better else 10.0
-        if better is None:
-            break
-        fall, at, now = now - cost(better), better, cost(better)
-        if fall > TRUSTED_FALL_SHARE * foretold:
-            damping = max(0.1 * damping, 1e-6)
-        if fall < enough or now - left * fall > beat:
-            break
+        fall = 0.0 if better is None else now - cost(better)
+        if better is not None:
+            at, now, moved = better, cost(better), True
+            if fall > TRUSTED_FALL_SHARE * foretold:
+                damping = max(0.1 * damping, 1e-6)
+            if now - left * fall > beat:
+                break
+        if better is None or fall < enough:
+            if not (renewals and moved and left):
+                break
+            columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))
     return Fit(at, columns, float(at.z @ at.z) + believed(at.model.vector()))

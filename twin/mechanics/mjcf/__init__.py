@@ -8,7 +8,7 @@ friction.py  joints and tendons that rub
 
 from twin.mechanics.mjcf.body import ModelBody, element_senses, payload_places, tip_site
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
-from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit
+from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, half_step
 
 __all__ = [
@@ -26,5 +26,6 @@ __all__ = [
     "load_model",
     "payload_places",
     "si_unit",
+    "slides",
     "tip_site",
 ]

@@ -1,7 +1,7 @@
 """The numbers of a compiled model by address, KIND.NAME.ATTRIBUTE: joint.pip.damping, site.x.pos, actuator.index.kp.
 
-An inertia is one number, the largest principal moment, and all components change by one factor. kp of a servo is gainprm[0] and
--biasprm[1] together, kv is -biasprm[2].
+An inertia is one number, the largest principal moment, and all components change by one factor. kp of a servo is -biasprm[1], and
+gainprm[0] and biasprm[0] change by the same factor; of a motor it is gainprm[0]. kv is -biasprm[2].
 """
 
 from __future__ import annotations
@@ -63,13 +63,17 @@ def _write_inertia(model: mujoco.MjModel, k: int, value: np.ndarray) -> None:
 
 
 def _read_kp(model: mujoco.MjModel, k: int) -> np.ndarray:
-    return np.array([model.actuator_gainprm[k, 0]])
+    servo = float(model.actuator_biasprm[k, 1])
+    return np.array([-servo if servo else model.actuator_gainprm[k, 0]])
 
 
 def _write_kp(model: mujoco.MjModel, k: int, value: np.ndarray) -> None:
-    if model.actuator_biasprm[k, 1] != 0.0:
+    if servo := float(model.actuator_biasprm[k, 1]):
+        model.actuator_gainprm[k, 0] *= value[0] / -servo
+        model.actuator_biasprm[k, 0] *= value[0] / -servo
         model.actuator_biasprm[k, 1] = -value[0]
-    model.actuator_gainprm[k, 0] = value[0]
+    else:
+        model.actuator_gainprm[k, 0] = value[0]
 
 
 def _read_kv(model: mujoco.MjModel, k: int) -> np.ndarray:

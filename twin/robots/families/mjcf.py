@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from copy import copy
 from functools import lru_cache
 
+import mujoco
 import numpy as np
 
 from twin.body import Body, Counts, Drive, Port, Sense
@@ -40,11 +41,12 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Model
     known = _known(loaded, structure)
     return ModelBody(
         spec=loaded.spec.copy(),
-        n_tendon=Counts.of(model.nu, known.joint_names),
+        n_tendon=Counts.of(model.nu, known.joint_names, loaded.names("tendon")),
         features=known.features,
         ports=known.ports,
         senses=known.senses,
         dynamic_drives=frozenset({Drive.CONTROL}),
+        tendon_sites=known.tendon_sites,
         marker_sites=loaded.names("site"),
         payload_places=known.places,
         loaded=loaded,
@@ -81,10 +83,21 @@ class _Known:
             (Port(f"actuator.{name}.ctrl", Drive.CONTROL, tuple(np.eye(model.nu)[k])),)
             for k, name in enumerate(loaded.names("actuator"))
         )
+        self.tendon_sites = tendon_sites(loaded)
         features = {"controls", "start", "servos", "joints", "encoders", "friction of joints", "load friction", "markers"}
         if np.linalg.norm(model.opt.gravity) > 0.0:
             features |= {"weight"}
         self.features = frozenset(features)
+
+
+def tendon_sites(loaded: LoadedModel) -> tuple[tuple[str, ...], ...]:
+    """Return the sites that each spatial tendon passes, for drawing."""
+    model, names = loaded.model, loaded.names("site")
+    found = []
+    for t in range(model.ntendon):
+        wraps = range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+        found.append(tuple(names[model.wrap_objid[w]] for w in wraps if model.wrap_type[w] == int(mujoco.mjtWrap.mjWRAP_SITE)))
+    return tuple(sites for sites in found if sites)
 
 
 @lru_cache(maxsize=32)

@@ -16,14 +16,19 @@ from twin.foundation.errors import DataError, TwinError, did_you_mean, short_rep
 from twin.foundation.file_schema import TableSchema, TextLine, validate_table
 from twin.foundation.parameters import Parameter
 from twin.foundation.units import Scale, unit_scale
-from twin.mechanics.mjcf import ATTRIBUTES, LONGEST_STEP, SCALAR_JOINTS, Attribute, LoadedModel, applies, load_model, si_unit
+from twin.mechanics.mjcf import ATTRIBUTES, LONGEST_STEP, SCALAR_JOINTS, Attribute, LoadedModel, applies, load_model, si_unit, slides
 from twin.measurements.parsing.quantity_strings import parse_number
 from twin.robots.schema import BOUND_STDS, ModelFile, Row, Schema, Structure
 
 LEAST_SHARE = 1e-3  # of its own value: the lower bound of a number that cannot be negative, where nothing else is written
 DEFAULT_SOURCE = "not written: usual of its kind"
 MJCF_DIAGRAM = """\
-     The model's own frames: the base frame is its world. Joints, tendons, actuators, sites and sensors have the model's names.
+     robot.toml ---- [structure] model = "leg.xml" ----> the MJCF beside it
+     z ^
+       |             The base frame is the model's world. Bodies, joints, tendons, actuators, sites and sensors have the model's
+       o----> x      names; a parameter is called KIND.NAME.ATTRIBUTE (joint.knee.damping, site.guide.pos, actuator.*.kp), and its
+      /              value, if it is left out, is the model's own. Gravity, too, is the model's unless [gravity] says otherwise.
+     y
 """
 
 
@@ -33,6 +38,7 @@ class ModelStructure(Structure):
     model: TextLine = Field(description="the MJCF, relative to this folder")
     tip: TextLine | None = Field(None, description="site that a tip payload hangs at; left out: the last with 'tip' in its name")
     timestep: float = Field(LONGEST_STEP, gt=0.0, le=0.1, description="s, longest step of a simulation")
+    tendons: int | None = Field(None, description="not written: the number of the model's actuators")
 
     def located(self, folder: Path) -> dict[str, object]:
         """Return the structure with the model's whole path and the names of its joints. Raises DataError for an unusable model."""
@@ -45,7 +51,7 @@ class ModelStructure(Structure):
             raise DataError(f"structure: tip {self.tip!r} is no site of the model; it has {', '.join(there)}")
         return {
             **self.model_dump(exclude_none=True), "model": str(path),
-            "tendons": Counts.of(loaded.model.nu, tuple(loaded.names("joint")[j] for j in scalar_joints(loaded))),
+            "tendons": Counts.of(loaded.model.nu, tuple(loaded.names("joint")[j] for j in scalar_joints(loaded)), loaded.names("tendon")),
         }  # fmt: skip
 
 
@@ -213,6 +219,19 @@ def _bounds(attribute: Attribute, entry: NumberEntry, value: float, std: float, 
     return low, high
 
 
+def usual_channels(loaded: LoadedModel) -> list[tuple[str, str, str, float]]:
+    """Return what is usually logged: controls, and positions of joints."""
+    model, found = loaded.model, []
+    for k, name in enumerate(loaded.names("actuator")):
+        servo = model.actuator_biasprm[k, 1] != 0.0
+        sliding = slides(model, "actuator", k)
+        found.append((f"actuator.{name}.ctrl", "input", ("m" if sliding else "rad") if servo else "N" if sliding else "N*m", 1e-6))
+    for k in scalar_joints(loaded):
+        sliding = slides(model, "joint", k)
+        found.append((f"joint.{loaded.names('joint')[k]}.position", "output", "mm" if sliding else "deg", 0.1))
+    return found
+
+
 def model_gravity(structure: Mapping[str, object]) -> np.ndarray:
     """Return the model's own gravity (3,) m/s^2."""
     return np.array(load_model(str(structure["model"])).model.opt.gravity, float)
@@ -233,7 +252,7 @@ MJCF_SCHEMA = Schema(
     rows=(),
     accuracy=Row("accuracy", "m", "mm", "what the description is believed to be good for: no smaller effect is claimed", 1e-9, 0.1),
     find_conflicts=lambda structure, values: [],
-    usual_channels=lambda structure: [],
+    usual_channels=lambda structure: usual_channels(load_model(structure.model)),
     diagram=MJCF_DIAGRAM,
     model_file=ModelFile(ModelStructure.located, model_parameters, model_gravity, model_notices),
 )
