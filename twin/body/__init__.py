@@ -12,7 +12,18 @@ from twin.body.counts import Counts
 from twin.body.loads import Loads, Push
 from twin.body.route import Bearing, Creep, Route, Rubbing
 from twin.body.signals import Drive, Drives, Signals, drive_mask, interpolate_commands
-from twin.body.solver import BY_CONTINUATION, DIRECT, NOT_FOUND, SOLVE_TOLERANCE, Heating, Problem, Solution, Solver, Start, array_hash
+from twin.body.solver import (
+    BY_CONTINUATION,
+    DIRECT,
+    NOT_FOUND,
+    SOLVE_TOLERANCE,
+    Heating,
+    Problem,
+    Solution,
+    Solver,
+    Start,
+    array_hash,
+)
 
 __all__ = [
     "BY_CONTINUATION",

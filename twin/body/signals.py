@@ -15,8 +15,8 @@ from scipy.interpolate import PchipInterpolator, PPoly
 class Drive(StrEnum):
     """The drive of a tendon: by tension (N), by displacement at its motor (m), or by the current (A) of its SMA spring.
 
-    An actuator of an MJCF is driven by its control, in the unit that its model gives it. Controls are known without noise, and their
-    zero means nothing.
+    An actuator of an MJCF is driven by its control, in the unit that its model gives it. Controls are known exactly, and their zero
+    means nothing.
     """
 
     TENSION = "tension"
@@ -86,7 +86,7 @@ class Signals:
         return np.where(self.driven_by_length, self.displacement, np.where(self.driven_by_current, self.current, self.tension))
 
     def with_commands(self, change: Callable[[np.ndarray], np.ndarray], **others: np.ndarray) -> Signals:
-        """Return a copy whose tensions, displacements and controls, where these drive, are `change` of them; `others` are replaced."""
+        """Return a copy whose tensions, displacements and controls, where these drive, are `change` of them; `others` replaced."""
         control = change(self.control) if self.driven_by_control.any() else self.control
         return replace(self, tension=change(self.tension), displacement=change(self.displacement), control=control, **others)
 

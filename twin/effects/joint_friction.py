@@ -18,8 +18,8 @@ class JointFriction(Effect):
     v the rate (rad/s) of its drive, which is the joint's own unless it sticks. The extended law has more friction near rest, until
     a lubricating film forms, and again at high rates, where the film is sheared; only runs at different rates show it.
 
-    Each joint of an MJCF has its own torque (a slide's is a force, N); breakaway and viscous parts are in shares of it, the same for
-    all. There the slip state follows Dahl's law as it stands: z' = s + (z - s) exp(-|turn| / presliding), f = F(v) z.
+    Each joint of an MJCF has its own torque (a slide's is a force, N); breakaway and viscous parts are in shares of it, the same
+    for all. There the slip state follows Dahl's law as it stands: z' = s + (z - s) exp(-|turn| / presliding), f = F(v) z.
 
     The torque is constant. The capstan's loss (`tendon_friction`) is proportional to the sum of both tensions, which is twice the
     pretension until one tendon is slack, and grows with the load from there. Below that load data cannot separate the two effects,

@@ -109,8 +109,8 @@ def pattern_of(kind: str) -> str:
 class Channel:
     """One measured quantity: its name, role, unit in the file, and standard deviation in SI.
 
-    The name is the column's. It says what the column is unless `quantity` does. A reading counts as reading * `factor` + `offset`, in
-    `unit`.
+    The name is the column's. It says what the column is unless `quantity` does. A reading counts as reading * `factor` + `offset`,
+    in `unit`.
 
     Raises DataError for a name outside the grammar, an unknown role or unit, and noise that is not positive.
     """
@@ -126,7 +126,9 @@ class Channel:
     def __post_init__(self) -> None:
         parse_channel_name(self.means)
         if not (math.isfinite(self.factor) and self.factor != 0.0 and math.isfinite(self.offset)):
-            raise DataError(f"scale {self.factor!r}, offset {self.offset!r} of {self.name}; finite numbers are needed, no scale of 0")
+            raise DataError(
+                f"scale {self.factor!r}, offset {self.offset!r} of {self.name}; finite numbers are needed, no scale of 0"
+            )
         if self.role not in get_args(Role):
             raise DataError(f"role {short_repr(self.role)} of {self.name}; allowed: {', '.join(get_args(Role))}")
         unit_scale(self.unit, self.si_unit)  # raises for a unit of another dimension

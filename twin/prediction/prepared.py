@@ -158,7 +158,9 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         readings, note = _columns(trial, names)
         notices += note
         start, unknown_conditions = _start(trial, body)
-        notices += [f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in unknown_conditions]
+        notices += [
+            f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in unknown_conditions
+        ]
         loads = _loads(recording, trial, robot, body)
         seen = cut_patches(trial.clouds, camera) if skin else None
         inputs.append(

@@ -177,7 +177,8 @@ class RobotFile(TableSchema):
     structure: dict[str, Any] = Field(description="whole numbers and choices")
     parameters: dict[str, Any] | None = Field(None, description="every number with unit and source")
     gravity: dict[str, Any] | None = Field(
-        None, description="value = [x, y, z] in the base frame, unit, source; a measurement set may say otherwise; an MJCF has its own"
+        None,
+        description="value = [x, y, z] in the base frame, unit, source; a measurement set may say otherwise; an MJCF has its own",
     )
     accuracy: dict[str, Any] = Field(description="value, unit, source: the description's own error; no smaller effect is claimed")
     effect: list[Any] = Field([], description="laws the robot is known to have, as in twin.toml; a std makes a parameter uncertain")

@@ -74,8 +74,8 @@ class Structure(TableSchema):
 class ModelFile:
     """How a family reads a robot whose numbers are those of a model beside its robot.toml.
 
-    `located` returns the structure with the model's place, given the folder; `parameters` reads [parameters] of that, adding problems;
-    `gravity` is the model's own; `notices` says what was assumed.
+    `located` returns the structure with the model's place, given the folder; `parameters` reads [parameters] of that, adding
+    problems; `gravity` is the model's own; `notices` says what was assumed.
     """
 
     located: Callable[[Any, Path], dict[str, object]]

@@ -59,8 +59,8 @@ class FitStart:
 class Effect(ABC):
     """Base of all effects. A subclass declares its data and overrides the places it acts in; the base's places change nothing.
 
-    `parameters` exist once, `per_tendon` parameters once per tendon or actuator, as name_1, name_2, ..., `per_joint` parameters once
-    per joint of an MJCF, as name_JOINT.
+    `parameters` exist once, `per_tendon` parameters once per tendon or actuator, as name_1, name_2, ..., `per_joint` parameters
+    once per joint of an MJCF, as name_JOINT.
     `inactive_when_off`: parameters without meaning while the effect is OFF, such as the time constant of no creep.
     `extended_parameters`: parameters of an extended law, which stay OFF until the plain law is accepted.
     `confusable_with`: effects that look so much like this one that both are never claimed together.

@@ -18,7 +18,8 @@ from twin.mechanics.mjcf.numbers import slides
 SPRING_SWING = 0.5  # rad (or a tenth of that in m): the deflection of a spring that gives a joint its scale of torque
 # group of signals of what turns, of what slides or pulls, and their SI units
 _JOINT_GROUPS = {
-    "position": ("joint angle", "joint shift"), "velocity": ("joint rate", "joint speed"), "torque": ("joint torque", "joint force"),
+    "position": ("joint angle", "joint shift"), "velocity": ("joint rate", "joint speed"),
+    "torque": ("joint torque", "joint force"),
 }  # fmt: skip
 _ACTUATOR_GROUPS = {
     "position": ("actuator angle", "actuator length"), "velocity": ("actuator rate", "actuator speed"),

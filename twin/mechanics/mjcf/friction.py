@@ -181,7 +181,9 @@ def tendon_forces(t, T, law, tree, paths, slip, gradient, h, started, applied, d
             for i in range(nv):
                 size += abs(gradient[i])
             for i in range(nv):
-                damping[i] += TENDON_SHARE * h * T * mu * extra[k, 0] * (1.0 - s * slip.z[t, k]) / presliding * abs(gradient[i]) * size
+                damping[i] += (
+                    TENDON_SHARE * h * T * mu * extra[k, 0] * (1.0 - s * slip.z[t, k]) / presliding * abs(gradient[i]) * size
+                )
     lost = 0.0
     for k in range(1, n - 1):
         lost += mu * slip.z[t, k] * extra[k, 0]

@@ -70,7 +70,9 @@ def why_unsupported(model: mujoco.MjModel) -> str:
         return "it has plugins, which are not simulated here; leave them out"
     if model.nflex:
         return "it has deformable bodies (flex), which are not simulated here; leave them out"
-    free = [model.joint(j).name or f"joint_{j + 1}" for j in range(model.njnt) if model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_FREE)]
+    free = [
+        model.joint(j).name or f"joint_{j + 1}" for j in range(model.njnt) if model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_FREE)
+    ]
     if free and model.nkey == 0:
         return f"joint {free[0]!r} leaves a body free and no keyframe says where it starts; add a <keyframe>, or fix the body"
     if model.njnt == 0:

@@ -53,9 +53,7 @@ def _rest(model: mujoco.MjModel, command: np.ndarray) -> np.ndarray:
     return qpos
 
 
-def add_masses(
-    model: mujoco.MjModel, masses: Iterable[tuple[str, float]], places: Mapping[str, tuple[int, np.ndarray]]
-) -> None:
+def add_masses(model: mujoco.MjModel, masses: Iterable[tuple[str, float]], places: Mapping[str, tuple[int, np.ndarray]]) -> None:
     """Hang point masses (kg) at sites or bodies, whose `places` are (body, place in its frame); inertias by the parallel axes.
 
     Raises DataError for a name that is neither.

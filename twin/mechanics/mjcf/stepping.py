@@ -57,8 +57,10 @@ class Memory(NamedTuple):
 
 @jit_internal
 def center_damping(views, own, before, before_act, started, applied):
-    """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step, and not at those after it
-    (implicit integrators) or before it (Euler): half of its change, extrapolated from the step before. Steps are then of second order.
+    """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step.
+
+    Else it acts at those after it (implicit integrators) or before it (Euler). It is half of the change in the step before, by which
+    steps become of second order.
 
     `before` (nv,) and `before_act` (nu,) are the rates a step before. An actuator at its limit has no damping.
     """
@@ -130,9 +132,7 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
                 for k in range(views.force.size):
                     T += laws.pull[t, k] * views.force[k]
                 law = (laws.mu[t], laws.presliding)
-                tendon_forces(
-                    t, T, law, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised
-                )
+                tendon_forces(t, T, law, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised)
             memory.started[0] = True
         center_damping(views, own, before, before_act, i > 0, views.applied)
         if row >= 0:

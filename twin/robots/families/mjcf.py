@@ -22,7 +22,7 @@ from twin.mechanics.mjcf import (
     tip_site,
 )
 from twin.robots.families.mjcf_schema import MJCF_SCHEMA as SCHEMA
-from twin.robots.families.mjcf_schema import Address, addresses, scalar_joints
+from twin.robots.families.mjcf_schema import Address, addresses, joint_names, scalar_joints
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
@@ -75,7 +75,7 @@ class _Known:
     def __init__(self, loaded: LoadedModel, tip: str | None) -> None:
         model = loaded.model
         self.joints = scalar_joints(loaded)
-        self.joint_names = tuple(loaded.names("joint")[j] for j in self.joints)
+        self.joint_names = joint_names(loaded)
         self.senses: Mapping[str, Sense] = element_senses(loaded)
         self.tip = tip_site(loaded, tip)
         self.places = frozenset(payload_places(loaded))

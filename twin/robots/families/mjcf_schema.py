@@ -16,8 +16,18 @@ from twin.foundation.errors import DataError, TwinError, did_you_mean, short_rep
 from twin.foundation.file_schema import TableSchema, TextLine, validate_table
 from twin.foundation.parameters import Parameter
 from twin.foundation.units import Scale, unit_scale
-from twin.mechanics.mjcf import ATTRIBUTES, LONGEST_STEP, SCALAR_JOINTS, Attribute, LoadedModel, applies, load_model, si_unit, slides
 from twin.measurements.parsing.quantity_strings import parse_number
+from twin.mechanics.mjcf import (
+    ATTRIBUTES,
+    LONGEST_STEP,
+    SCALAR_JOINTS,
+    Attribute,
+    LoadedModel,
+    applies,
+    load_model,
+    si_unit,
+    slides,
+)
 from twin.robots.schema import BOUND_STDS, ModelFile, Row, Schema, Structure
 
 LEAST_SHARE = 1e-3  # of its own value: the lower bound of a number that cannot be negative, where nothing else is written
@@ -51,13 +61,18 @@ class ModelStructure(Structure):
             raise DataError(f"structure: tip {self.tip!r} is no site of the model; it has {', '.join(there)}")
         return {
             **self.model_dump(exclude_none=True), "model": str(path),
-            "tendons": Counts.of(loaded.model.nu, tuple(loaded.names("joint")[j] for j in scalar_joints(loaded)), loaded.names("tendon")),
+            "tendons": Counts.of(loaded.model.nu, joint_names(loaded), loaded.names("tendon")),
         }  # fmt: skip
 
 
 def scalar_joints(loaded: LoadedModel) -> tuple[int, ...]:
     """Return the joints that turn or slide about one axis."""
     return tuple(j for j in range(loaded.model.njnt) if loaded.model.jnt_type[j] in SCALAR_JOINTS)
+
+
+def joint_names(loaded: LoadedModel) -> tuple[str, ...]:
+    """Return the names of those."""
+    return tuple(loaded.names("joint")[j] for j in scalar_joints(loaded))
 
 
 class NumberEntry(TableSchema):
@@ -242,8 +257,8 @@ def model_notices(structure: Mapping[str, object], table: Mapping[str, Any]) -> 
     if table:
         return ()
     return (
-        "robot.toml declares no [parameters]: masses, inertias, springs, dampers and gains are taken to differ as is usual of their "
-        "kind (3 to 30 %)",
+        "robot.toml declares no [parameters]: masses, inertias, springs, dampers and gains are taken to differ as is usual of "
+        "their kind (3 to 30 %)",
     )
 
 
