@@ -59,8 +59,8 @@ class Memory(NamedTuple):
 def center_damping(views, own, before, before_act, started, applied):
     """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step.
 
-    Else it acts at those after it (implicit integrators) or before it (Euler). It is half of the change in the step before, by which
-    steps become of second order.
+    Else it acts at those after it (implicit integrators) or before it (Euler). It is half of the change in the step before;
+    steps become of second order by it.
 
     `before` (nv,) and `before_act` (nu,) are the rates a step before. An actuator at its limit has no damping.
     """
