@@ -3,8 +3,6 @@
 python -m tools.figures
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -144,6 +144,7 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background ignore it, and so would this
     )  # fmt: skip
     assert running.stdout is not None
+    assert "bundled sample" in running.stdout.readline()
     assert "Before any fit" in running.stdout.readline()  # the calibration begins
     running.send_signal(signal.SIGINT)
     _, said = running.communicate(timeout=60)
@@ -162,7 +163,7 @@ def test_the_seed_asked_for_is_the_seed_used(command: str, monkeypatch: pytest.M
         raise DataError("far enough")
 
     monkeypatch.setattr(diagnosis, "diagnose", stop)
-    monkeypatch.setattr(diagnosis, "calibration", stop)
+    monkeypatch.setattr(diagnosis, "calibrated_fit", stop)
     monkeypatch.setattr(cli, "_leave", sys.exit)  # which ends the interpreter at once, and the tests with it
     monkeypatch.setattr(sys, "argv", ["twin", command, str(SAMPLE), "--seed", "41", "--jobs", "3", "--out", str(tmp_path / "out")])
     with pytest.raises(SystemExit):

@@ -286,7 +286,7 @@ def test_the_noise_is_read_from_a_first_rough_fit(plan: PreparedRecording, monke
     monkeypatch.setattr(
         objective, "Whitener", lambda noise, measured, G, command, taut=None: (noise, G, len(measured), len(command), taut)
     )
-    monkeypatch.setattr(objective, "fit", lambda of, model, tolerance: start)
+    monkeypatch.setattr(objective, "fit", lambda of, model, stop: start)
     asked: list[Any] = []
 
     def sensitivity_by_hand(bench: PreparedRecording, trials: Any, twin: Any, predicted: Any, near: Any) -> list[np.ndarray]:
@@ -376,7 +376,7 @@ class Piped:
         monkeypatch.setattr(
             pipeline,
             "_reported",
-            lambda recording, looked, twin, found, parts, settings: self.reported.append((found, parts, settings)),
+            lambda recording, looked, found, parts, settings: self.reported.append((found, parts, settings)),
         )
 
     def conclude(self, bench: Any, twin: Any, sealed: Any, nominal: Any, settings: Settings, progress: Any) -> str:

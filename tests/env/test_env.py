@@ -216,11 +216,11 @@ def test_a_machine_that_cannot_draw_says_so_each_time() -> None:
     """In a process of its own: asked a second time, OpenGL without a screen ended it."""
     code = """
 import mujoco
-from twin.env.rendering import Picture
+from twin.env.rendering import FrameRenderer
 from twin.foundation.errors import TwinError
 for _ in range(2):
     try:
-        Picture(mujoco.MjSpec(), 0.1)
+        FrameRenderer(mujoco.MjSpec(), 0.1)
     except TwinError as told:
         print(told)
 """

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from tests.command_line import twin
-from tools import reference
+from tools.site import reference
 from twin.foundation.errors import DataError, UnknownNameError
 from twin.measurements import read
 from twin.prediction.storage import read_twin, robot_reference, twin_table, write_twin
 from twin.prediction.twin import Twin
 from twin.report.robot_page import draw_robot
 from twin.robots import load, robot_names
-from twin.robots.family import family_names
+from twin.robots.family import family_names, load_family
 from twin.robots.starter import FIRST_SET, write_starter
 
 
@@ -132,9 +132,15 @@ def test_a_robot_of_ones_own_is_not_taken_for_a_shipped_one(tmp_path: Path) -> N
     assert robot_reference(load("continuum"), tmp_path) == "continuum"
 
 
-def test_the_reference_page_is_the_schemas() -> None:
-    """After a change of a schema: python -m tools.reference."""
-    assert reference.PAGE.read_text("utf-8") == reference.page()
+def test_every_number_of_a_robot_file_is_on_a_page_of_its_family() -> None:
+    """And on the generated reference."""
+    whole = reference.page()
+    for family in family_names():
+        pages = [(load(name).folder / "README.md").read_text("utf-8") for name in robot_names() if load(name).family == family]
+        pages += [(load("finger").folder / "README.md").read_text("utf-8")] if family == "hand" else []  # of fingers alike
+        for row in load_family(family).SCHEMA.rows:
+            assert any(f"`{row.name}" in page for page in pages), (family, row.name)
+            assert row.name in whole
 
 
 def test_names_cannot_steer_the_terminal(tmp_path: Path) -> None:

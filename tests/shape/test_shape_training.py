@@ -125,7 +125,7 @@ def test_a_history_is_felt_along_the_chain(shapes: Path, monkeypatch: pytest.Mon
     np.testing.assert_allclose(way[:, 0], [s[5], (s[5] + s[4]) / 2, s[4], (s[4] + s[3]) / 2], atol=1e-12)
     np.testing.assert_allclose(way[:, 1], [s[1], s[0], s[0], s[0]], atol=1e-12)
     np.testing.assert_allclose(way[:, 2], np.tile(s[0], (4, 1)), atol=1e-12)
-    for name in ("GAIN_NOISE", "OFFSET_NOISE"):
+    for name in ("GAIN_ERROR_STD", "ZERO_ERROR_STD"):
         monkeypatch.setattr(f"twin.shape.training.samples.{name}", 0.0)
     monkeypatch.setattr("tools.benchmarks.shape.baselines.folding.STRAIN_NOISE_STD", 0.0)
     pick = np.arange(CHAIN_LENGTH - 4, CHAIN_LENGTH).repeat(50)
@@ -165,7 +165,7 @@ def felt_as_learned(shapes: Path, name: str) -> tuple[Any, Any, np.ndarray, Any,
     net, pick = lively(lesson), np.arange(CHAIN_LENGTH, CHAIN_LENGTH + 6)
     strain, displacement = data.strain[pick], 1e-3 * np.random.default_rng(0).normal(size=(len(pick), data.displacement.shape[1]))
     follows = np.arange(len(pick)) > 0
-    seen = law(Twin.of(robot), lesson.export_arrays(net)).moved(SensorReadings(strain, displacement, False, follows))  # type: ignore[attr-defined]
+    seen = law(Twin.of(robot), lesson.export_arrays(net)).folded(SensorReadings(strain, displacement, False, follows))  # type: ignore[attr-defined]
     past = history_features(strain, previous_strains(strain, follows, ROWS_BACK), displacement, False)
     x = past if name == "folding" else network_features(strain, displacement, False)
     return lesson, net, pick, torch.from_numpy(x.astype(np.float32)), seen

@@ -38,7 +38,7 @@ def track(**changed: np.ndarray) -> ObjectTrack:
         "place": np.tile([0.0, 0.0, 0.09], (151, 1)),
         "turn": np.tile([1.0, 0.0, 0.0, 0.0], (151, 1)),
         "touching": 9 * (time > 1.0),
-        "others": np.empty((151, 0, 3)),
+        "other_places": np.empty((151, 0, 3)),
     }
     return ObjectTrack(time, **{**still, **changed})
 
@@ -137,7 +137,7 @@ def test_what_is_poured_is_judged_by_where_it_lies() -> None:
     lying = np.array([[x, y, 0.1385] for x in (-0.04, -0.02) for y in (-0.01, 0.01)])
     for first, outcome in ((lying[0], "success"), (balls[0].place, "not reached"), ([0.0, 0.06, 0.1385], "dropped")):
         there = np.tile(np.vstack([first, lying[1:]]), (151, 1, 1))
-        assert pour.judge(track(place=place, others=there)).value == outcome
+        assert pour.judge(track(place=place, other_places=there)).value == outcome
 
 
 def test_a_person_leaves_fingers_alone_that_are_given_no_force() -> None:
@@ -177,7 +177,7 @@ def test_a_stop_in_between_changes_no_byte(shown: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
     with pytest.raises(Stopped):
         demonstrate(ORDER, again, 1, stop)
-    with pytest.raises(DataError, match="not whole"):
+    with pytest.raises(DataError, match="are incomplete"):
         read_order(again)
     demonstrate(ORDER, again, 1)
     names = sorted(p.relative_to(shown) for p in shown.rglob("*") if p.is_file())
@@ -241,7 +241,9 @@ def test_alike_shapes_look_alike_on_another_built_hand() -> None:
     ]
     for k in range(3):
         rest = eyes[0].estimators[k].points.rest
-        one, other = (eye.points(each)[k] - rest @ t.T for eye, each, t in zip(eyes, z, (e.turns[k] for e in eyes), strict=True))
+        one, other = (
+            eye.points(each)[k] - rest @ t.T for eye, each, t in zip(eyes, z, (e.rotations[k] for e in eyes), strict=True)
+        )
         c, s = np.cos(0.1), np.sin(0.1)
         expected = one @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         # the modes hold a turned shape but for what 24 of them leave, below 0.1 mm in the mean
@@ -309,7 +311,7 @@ def test_what_a_policy_did_is_kept_beside_what_was_shown(shown: Path, tmp_path: 
 
 def test_trials_of_other_orders_have_other_names() -> None:
     names = [
-        Imitate(Path("x"), **words)._name(1)  # type: ignore[arg-type]
+        Imitate(Path("x"), **words)._folder_name(1)  # type: ignore[arg-type]
         for words in ({}, {"train_seed": 1}, {"way": "bend"}, {"seed": 1}, {"drift": 0.1}, {"drift": 0.1, "checked": True},
                       {"drift": 0.1, "trials": 5}, {"policy": "nearest"}, {"policy": "cloning"})
     ]  # fmt: skip
@@ -325,9 +327,9 @@ def test_trials_of_other_orders_have_other_names() -> None:
     ("words", "said"),
     [
         (["demonstrate", "holt", "--n", "1", "--out", "x"], "did you mean 'hold'"),
-        (["demonstrate", "hold", "--n", "0", "--out", "x"], "n and jobs from 1 on"),
+        (["demonstrate", "hold", "--n", "0", "--out", "x"], "n and jobs must be 1 or more"),
         (["imitate", "x"], "make them with twin demonstrate"),
-        (["imitate", "x", "--drift", "1.5"], "a share from 0 to below 1"),
+        (["imitate", "x", "--drift", "1.5"], "must be from 0 to below 1"),
     ],
 )
 def test_bad_words_are_said_in_one_line(

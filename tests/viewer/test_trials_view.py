@@ -111,7 +111,7 @@ def test_persons_come_first_and_one_set_is_a_folder_too(folder: Path) -> None:
 
 
 def test_what_is_no_trial_is_said(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="holds no trials to look at; twin demonstrate"):
+    with pytest.raises(DataError, match="holds no stored trials; twin demonstrate"):
         episode_sets(tmp_path)
     (tmp_path / "000.parquet").write_bytes(b"PAR1")
     with pytest.raises(DataError, match=r"000.parquet is no trial of this program \(twin-trial/1\)"):
@@ -237,7 +237,7 @@ def test_a_folder_without_trials_and_one_with_a_robot_are_refused(folder: Path, 
     with pytest.raises(DataError, match="trials of tasks cannot be combined"):
         View(what=(str(folder), "finger")).run()
     (tmp_path / EPISODES_FOLDER).mkdir()
-    with pytest.raises(DataError, match="holds no trials to look at"):
+    with pytest.raises(DataError, match="holds no stored trials"):
         View(what=(str(tmp_path),)).run()
     with pytest.raises(DataError, match="no such twin"):
         View(what=(str(tmp_path / EPISODES_FOLDER / "none"),)).run()

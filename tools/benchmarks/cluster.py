@@ -1,7 +1,5 @@
 """Where work that is shared out runs: in processes of this machine, or on a Ray cluster (extra `cluster`)."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

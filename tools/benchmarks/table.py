@@ -1,7 +1,5 @@
 """Markdown tables, shares of cases, and rows kept as JSON lines so that a long run goes on where it stopped."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

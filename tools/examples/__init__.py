@@ -1,1 +1,1 @@
-"""Short scripts, one a capability; each writes a page to look at."""
+"""Short scripts, one a capability, each to be read from top to bottom: python -m tools.examples.NAME."""

@@ -1,18 +1,17 @@
 """Currents heat the three springs in turn; the loop of tension against temperature, from a simulated recording.
 
-python -m tools.examples.heat heat.html
+python -m tools.examples.heated_springs
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
 
-from twin.measurements import Channel, Recording, Trial
-from twin.prediction.twin import Twin
+from twin import Recording, Twin
+from twin.measurements import Channel, Trial
 
 UNITS = {"temperature": "degC", "tension": "N"}
 
@@ -41,9 +40,9 @@ def figure(recording: Recording) -> go.Figure:
     )
 
 
-def main(out: Path, seconds: float = 240.0) -> None:
+def main(out: Path = Path("heat.html"), seconds: float = 240.0) -> None:
     figure(Twin.of("continuum").predict(turns(seconds))).write_html(out)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -24,8 +24,9 @@ def main(folder: Path = Path("snake")) -> None:
     pull = np.linspace(0.0, 1.0, 21)
     commands = twin.commands(described, {"tendon_1_tension": pull}, rate=1.0)
     for name, robot in (("as described", described), ("10 % stiffer", stiffer)):
-        tip = robot.predict(commands).trials[0]
-        print(f"{name}: the tip bends to {1e3 * max(abs(v[-1]) for k, v in tip.values.items() if k.startswith('tip_')):.1f} mm")
+        values = robot.predict(commands).trials[0].values
+        last = [column for channel, column in values.items() if channel.endswith("_x")][-1]
+        print(f"{name}: the last disk moves by {1e3 * abs(last[-1] - last[0]):.1f} mm towards x")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """See the package's docstring."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import tomllib

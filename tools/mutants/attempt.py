@@ -1,7 +1,5 @@
 """One mutant in a copy of the tree: its tests run in a process that has the libraries loaded and nothing of the program."""
 
-from __future__ import annotations
-
 import ast
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """Changes that a suite of tests once did not see, by what they break."""
 
-from __future__ import annotations
-
 from tools.mutants.mutant import Mutant
 
 CHANGES = (  # (file, what a line holds, what it is to hold)
@@ -40,8 +38,8 @@ CHANGES = (  # (file, what a line holds, what it is to hold)
     # markers on the other side of their disks
     ("twin/robots/families/continuum.py", "pos=[*offset[:2], at + offset[2]]", "pos=[*offset[:2], at - offset[2]]"),
     # the noise model's bar and what it takes out
-    ("twin/diagnosis/noise/estimate.py", "sure = CLEAR * spread", "sure = 0.1 * CLEAR * spread"),
-    ("twin/diagnosis/noise/estimate.py", "sure = CLEAR * spread", "sure = 10.0 * CLEAR * spread"),
+    ("twin/diagnosis/noise/estimate.py", "sure = CLEAR_CORRELATION * spread", "sure = 0.1 * CLEAR_CORRELATION * spread"),
+    ("twin/diagnosis/noise/estimate.py", "sure = CLEAR_CORRELATION * spread", "sure = 10.0 * CLEAR_CORRELATION * spread"),
     ("twin/diagnosis/noise/estimate.py", "return out - moved @ np.linalg.lstsq", "return out - 0.0 * moved @ np.linalg.lstsq"),
     ("twin/diagnosis/noise/estimate.py", "both -= basis[ok] @", "both -= 0.0 * basis[ok] @"),
     # machine code numbered, as numba does

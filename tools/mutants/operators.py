@@ -3,8 +3,6 @@
 Left alone: docstrings, annotations, decorators, imports, and what only words an error message.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from itertools import pairwise

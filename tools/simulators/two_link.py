@@ -10,8 +10,6 @@ in it that the description of `models/two_link` does not know, or nothing. Sourc
     python -m tools.simulators.two_link OUT --effect tendon_friction --seed 3
 """
 
-from __future__ import annotations
-
 import csv
 import sys
 from collections.abc import Callable
@@ -29,10 +27,6 @@ REST_UNDER_LOADS = 5.0  # s before that, under the loads alone
 SIDEWAYS = 0.5 * np.pi
 EASE = 8.0  # s over which the first tensions come on, before the log starts
 SIGMA = {"angle": np.deg2rad(0.1), "tip": 2e-4, "tension": 0.01}
-EFFECTS = (
-    "tendon_friction", "load_cell_gain", "load_cell_bias", "load_cell_drift", "load_cell_crosstalk", "tip_payload", "base_tilt",
-    "time_delay", "actuator_saturation", "temperature_softening",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,19 @@ Collects the README pages, makes an API page for each package and every effect, 
 
 from __future__ import annotations
 
+import argparse
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+from tools.site import reference
 from twin.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "build" / "site_pages"
+PICTURES = ("tools/figures/*.*g", "models/*/*.svg")
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:|#)([^)#\s]+)(#[^)]*)?\)")
 API = (  # module, what stands on its page
     ("twin", "The public names"),
@@ -40,9 +43,11 @@ def main(serve: bool) -> None:
     for name, effect in catalogue().items():
         _write(f"effects/{name}.md", f"# {name}\n\n::: {effect.__module__}\n")
     _write("effects/index.md", "# Effects\n\n" + "\n".join(f"- [{name}]({name}.md)" for name in catalogue()) + "\n")
-    for picture in ROOT.glob("tools/figures/*"):
-        (PAGES / "tools/figures").mkdir(parents=True, exist_ok=True)
-        shutil.copy(picture, PAGES / "tools/figures" / picture.name)
+    _write("reference.md", reference.page())
+    for picture in (p for folder in PICTURES for p in ROOT.glob(folder)):
+        copy = PAGES / picture.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(picture, copy)
     verb = ["serve"] if serve else ["build", "--strict", "--quiet"]
     subprocess.run(
         [sys.executable, "-m", "mkdocs", *verb, "--config-file", str(Path(__file__).with_name("mkdocs.yml"))], check=True
@@ -86,4 +91,6 @@ def _write(target: str, text: str) -> None:
 
 
 if __name__ == "__main__":
-    main("--serve" in sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--serve", action="store_true", help="show the site in a browser while pages are edited")
+    main(parser.parse_args().serve)

@@ -1,7 +1,5 @@
 """A slender elastic body as a chain of MuJoCo joints, with the joints' and sites' names for effects and solvers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

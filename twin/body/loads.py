@@ -1,7 +1,5 @@
 """The loads on a body during one trial: gravity, payload, forces, obstacles."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

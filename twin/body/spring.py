@@ -1,7 +1,5 @@
 """The parameters of the SMA springs that drive a robot, one array entry a spring."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ Simulation, calibration and estimators all convert strain and resistance here.
 Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078), appendix: sqrt(R/R0) - 1 = kappa strain.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 Exit codes: 0 done; 1 stopped (Ctrl-C) or a fault of the program; 2 bad input, reported in one line.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from typing import NoReturn

@@ -1,7 +1,5 @@
 """What libraries warn of and log: one plain line each on the terminal, or nothing."""
 
-from __future__ import annotations
-
 import logging
 import os
 import sys

@@ -1,7 +1,5 @@
 """Load the measurement set and the twin of a command."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

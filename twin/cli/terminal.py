@@ -1,7 +1,5 @@
 """The terminal: two consoles, a spinner with the present step, and output in any encoding."""
 
-from __future__ import annotations
-
 import codecs
 import io
 import os

@@ -12,8 +12,6 @@ upper one:
     T_up(s, e) - MARGIN <= T <= T_low(s, e) + MARGIN          where s is below the austenite line E_A e, which no heat exceeds
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body.spring import Spring

@@ -7,8 +7,6 @@ With K the tangent of the equilibrium, P (n, t) the force of a unit tension on t
 K is the one that Newton's method inverted last: near this shape, not at it, as long as its steps still shrink with it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@
 Conditional integration: Astrom and Hagglund, PID Controllers, 1995, section 3.5.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

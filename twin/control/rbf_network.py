@@ -6,8 +6,6 @@ e is the error that u should remove. Published are the form and the Gaussian; ce
 bounded (the sigma modification of Ioannou and Kokotovic, 1984) are ours.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -19,8 +19,6 @@ tools.benchmarks.control.baselines); the tangent, the limits and the residual ar
 1995, as in scipy.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Control of strains instead of shape, with the steps and limits of `ShapeController`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.control.shape_controller import SensedShape, ShapeController

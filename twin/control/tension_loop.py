@@ -14,8 +14,6 @@ controller can only anticipate, or counter with the other springs.
 Source: RBF compensation Peng et al. 2025 (Eqs 11-12); the inverse of the loop is that of a play operator (Kuhnen 2003), ours here.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body.spring import Spring

@@ -15,8 +15,6 @@ cooled. Hot, it pulls at most E_A times its elongation, which shrinks while it b
 bounds the bend at some 0.4 rad (tip 24 mm off the axis, less with a payload that hangs).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 

@@ -4,8 +4,6 @@ A tip (rho, z) of a bend of constant curvature: rho = L (1 - cos theta)/theta, z
 rho and direction; a payload moves the surface by tenths of a millimetre, which no controller can follow.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Time for a search: when it is up nothing more is tried, and what was not is said."""
 
-from __future__ import annotations
-
 import math
 import time
 

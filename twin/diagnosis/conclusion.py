@@ -1,7 +1,5 @@
 """What a diagnosis concludes before the sealed trials are opened."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from twin.diagnosis.calibration.objective import noise_under

@@ -1,7 +1,5 @@
 """What a diagnosis finds: the types that reports are made from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What every stage works on: the fitted trials, what they are compared by, and whom to tell how far things are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

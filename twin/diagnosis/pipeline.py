@@ -4,8 +4,6 @@ look -> calibrate -> screen -> search -> choose -> lateness -> gate -> judge -> 
 then the seal is opened.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -77,7 +75,7 @@ def _sealed(recording: Recording, preview: DataPreview, twin: Twin, settings: Se
     prepared, nominal = preview.prepared, preview.nominal
     if n >= FEWEST_TRIALS_FOR_HELD_OUT:
         found = conclude(prepared, twin, preview.held_out, nominal, settings, progress)
-        return _reported(recording, preview, twin, found, [(found, preview.held_out)], settings)
+        return _reported(recording, preview, found, [(found, preview.held_out)], settings)
     parts, share = [], replace(settings, budget=settings.budget and settings.budget / (n + 1))
     for k in range(n):
 
@@ -86,7 +84,7 @@ def _sealed(recording: Recording, preview: DataPreview, twin: Twin, settings: Se
 
         parts.append((conclude(prepared, twin, [k], nominal, share, told), [k]))
     found = conclude(prepared, twin, [], nominal, share, lambda words: progress(f"all {n} trials: {words}"))
-    return _reported(recording, preview, twin, found, parts, settings)
+    return _reported(recording, preview, found, parts, settings)
 
 
 def conclude(
@@ -110,7 +108,6 @@ def conclude(
 def _reported(
     recording: Recording,
     preview: DataPreview,
-    twin: Twin,
     found: Conclusion,
     parts: Sequence[tuple[Conclusion, Sequence[int]]],
     settings: Settings,
@@ -119,7 +116,6 @@ def _reported(
     prepared, nominal = preview.prepared, preview.nominal
     context, judged, limits = found.context, found.judged, found.screening.limits
     final, base = judged.final, found.found.base
-    seen = loops(context.prepared)
     said = describe(context, found.found, found.gated, judged, limits)
     experiment = _experiment(found, settings)
     opened = HeldOut.of(prepared, nominal, parts)
@@ -161,7 +157,7 @@ def _reported(
         fitted_trials=tuple(context.trials),
         held_out_trials=tuple(opened.trials),
         folds=folds if len(parts) > 1 else (),
-        loops=seen,
+        loops=loops(context.prepared),
         suspicions=preview.suspicions,
         predictions=_predictions(prepared, found, opened, nominal),
         notices=(*prepared.notices, *found.notices, *jumped(prepared, final.fit), *_anew(found, opened), *said.notices),

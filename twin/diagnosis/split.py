@@ -1,7 +1,5 @@
 """Which trials are sealed: about a quarter, by what was done in them and the seed, never by what was measured."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace

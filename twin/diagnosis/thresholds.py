@@ -4,8 +4,6 @@ Evidence is a command that reproduces it, a derivation, or "judgement" where it 
 benchmark's table (`python -m tools.benchmarks.diagnosis.attribution`) holds with it; it was not searched for.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypeVar
 

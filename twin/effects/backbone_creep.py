@@ -25,7 +25,7 @@ class BackboneCreep(Effect):
     Source: standard linear solid (Kelvin-Voigt chain). Polymers creep by 5-50 % over seconds to hours; a NiTi wire by a few per
     cent.
 
-    >>> round(retard(0.0, 1.0, 0.3, 10.0, 10.0), 4)   # 0.3 (1 - 1/e)
+    >>> round(delayed_strain(0.0, 1.0, 0.3, 10.0, 10.0), 4)   # 0.3 (1 - 1/e)
     0.1896
     """
 

@@ -2,14 +2,17 @@
 
 `gymnasium.make("twin.env:twin/ContinuumReach-v0")` imports it; gymnasium 1.x loads no plugins.
 
-continuum.py             twin/ContinuumReach-v0, twin/ContinuumTrack-v0 finger.py                twin/FingerShape-v0 hand.py
-twin/HandReorient-v0 base.py                  what all of them share: copies, pickles, saved states batch.py                 many
-environments in threads, for `gymnasium.make_vec` dm.py                    the continuum tasks as dm_env domain_randomisation.py
-twins drawn from the uncertainty of a diagnosis validation.py            options and actions, checked rendering.py
-frames by MuJoCo's renderer plants/                  robots stepped in time under commands, with their effects
+continuum.py             twin/ContinuumReach-v0, twin/ContinuumTrack-v0
+finger.py                twin/FingerShape-v0
+hand.py                  twin/HandReorient-v0
+base.py                  what all of them share: copies, pickles, saved states
+batch.py                 many environments in threads, for `gymnasium.make_vec`
+dm.py                    the continuum tasks as dm_env
+domain_randomisation.py  twins drawn from the uncertainty of a diagnosis
+validation.py            options and actions, checked
+rendering.py             frames by MuJoCo's renderer
+plants/                  robots stepped in time under commands, with their effects
 """
-
-from __future__ import annotations
 
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Base of the environments on a twin: options, drawn twins, saved states, copies and pickles."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@ Each environment has its own twin, random numbers and motion, so that its result
 threads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

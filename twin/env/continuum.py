@@ -1,7 +1,5 @@
 """Reaching and tracking with the tip of a backbone pulled by tendons."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -9,8 +9,6 @@ Observations are the parts of the gymnasium environment's, by name. An episode i
 where its time is up.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Parameters are drawn jointly, normal about their values with the standard errors
 beside it (independently without a report), and clipped to their bounds.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

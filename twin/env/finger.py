@@ -1,7 +1,5 @@
 """Bringing a soft finger to a wanted shape by its servos."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Turning a thing between the three fingers of a soft hand."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

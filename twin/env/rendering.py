@@ -1,7 +1,5 @@
 """Render frames of a robot and its goal by MuJoCo's own renderer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

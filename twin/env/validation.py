@@ -1,7 +1,5 @@
 """Check options and actions of an environment: unknown options are refused, actions clipped or refused."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, TypeVar

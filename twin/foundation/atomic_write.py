@@ -1,7 +1,5 @@
 """Whole-or-nothing writing of files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Decorators that compile functions with numba, with one set of floating-point rules and one disk cache."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import stat

@@ -1,7 +1,5 @@
 """Identifiers as words for people."""
 
-from __future__ import annotations
-
 ABBREVIATIONS = {"sma": "SMA"}  # words that are abbreviations
 
 

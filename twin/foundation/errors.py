@@ -1,7 +1,5 @@
 """The errors a user sees: each names what came, what is allowed and the way out."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

@@ -3,8 +3,6 @@
 pydantic checks them in strict mode: `true` is not a number, a number is not text, an unknown key is refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Safe reading of files: which may be opened, how much is read, and where a fault is."""
 
-from __future__ import annotations
-
 import codecs
 import tomllib
 from collections.abc import Iterator

@@ -8,8 +8,6 @@
 A task is a whole rollout, a shard of samples or a set to diagnose. Work inside a fit stays in threads, which share its arrays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Linear algebra in one thread: the systems here are small, and trials are solved in parallel instead."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from functools import cache
 

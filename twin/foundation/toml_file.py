@@ -1,7 +1,5 @@
 """TOML files of a declared format, whose errors name the file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -10,8 +10,6 @@ Indices count from 1, base to tip, and are written without leading zeros. A chan
 its `quantity`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Point clouds in NPZ files of plain arrays. Sizes are checked before unpacking, and pickled objects are refused."""
 
-from __future__ import annotations
-
 import io
 import math
 import struct

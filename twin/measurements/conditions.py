@@ -1,7 +1,5 @@
 """Conditions of a trial: known ones in SI, other ones as written."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Notices about a set that is otherwise in order, one sentence for each kind of finding."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 

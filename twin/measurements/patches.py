@@ -6,8 +6,6 @@ the median of its points along its outward direction, 45 degrees to the left or 
 median distance of the same points to the predicted skin. The cut depends on the data only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

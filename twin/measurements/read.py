@@ -3,8 +3,6 @@
 Nothing is changed or repaired silently: trials left out, missing values and unknown keys become notices.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writing of a measurement set, whole or not at all, in the units its channels declare."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Mapping

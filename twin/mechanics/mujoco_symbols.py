@@ -3,8 +3,6 @@
 They are bound by name, not by address. Numba's disk cache of the functions that call them then stays valid in the next process.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import llvmlite.binding as llvm

@@ -1,7 +1,5 @@
 """The error of a given twin on given data. Nothing is fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any

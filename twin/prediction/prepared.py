@@ -1,7 +1,5 @@
 """A recording prepared for prediction: driving inputs, loads and clocks per trial, measured outputs as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

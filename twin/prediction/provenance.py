@@ -1,7 +1,5 @@
 """The origin of a result: versions, seed, data hash, command, date."""
 
-from __future__ import annotations
-
 import platform
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version

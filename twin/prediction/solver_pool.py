@@ -1,7 +1,5 @@
 """A pool of compiled bodies and solvers: neighbours in a fit differ mostly in what is done to the same robot."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager

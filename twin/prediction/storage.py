@@ -1,7 +1,5 @@
 """`twin.toml`: the robot, the calibrated parameters and the effects in force, all that a prediction needs."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """report.json, for other programs. Its keys and units are a contract (`twin-report/1`); positions are in mm."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

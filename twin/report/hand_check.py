@@ -1,7 +1,5 @@
 """Check the sensors of a finger on trials with a hand on it, which no fit uses."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 from twin.diagnosis import Diagnosis

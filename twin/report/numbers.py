@@ -1,7 +1,5 @@
 """Format numbers for people: as many digits as the error allows, in units of everyday size."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -3,8 +3,6 @@
 Scripts, styles and figures are inside; a content security policy forbids to load anything else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The origin of a diagnosis: that of any result, and the settings."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

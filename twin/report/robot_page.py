@@ -1,7 +1,5 @@
 """A picture of a described robot, straight in its base frame, so that a wrong unit or sign is seen before any data."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mujoco

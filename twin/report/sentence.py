@@ -1,7 +1,5 @@
 """Write the verdict as one plain sentence."""
 
-from __future__ import annotations
-
 import math
 
 from twin.diagnosis import Claim, Diagnosis

@@ -1,7 +1,5 @@
 """Write a report: all three files under temporary names first, then renamed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

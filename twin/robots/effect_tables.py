@@ -1,7 +1,5 @@
 """[[effect]] tables of robots and twins: an identifier and the values of its parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

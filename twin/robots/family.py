@@ -1,7 +1,5 @@
 """Families of bodies: modules that build bodies from a `robot.toml` and provide their solvers."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping

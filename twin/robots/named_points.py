@@ -1,7 +1,5 @@
 """Named points of a robot's body: `points.csv` beside its robot.toml, rows of name, x_mm, y_mm, z_mm, skin (1 on the skin)."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A robot's numbers as in its file: in the file's units, with lists together."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

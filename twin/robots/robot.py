@@ -1,7 +1,5 @@
 """Robots as data: the numbers of a `robot.toml`, each with unit and source, and the name of the family that builds it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

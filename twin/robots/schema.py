@@ -3,8 +3,6 @@
 Each family declares a `Schema`; the check of a file, the reference page and the starter of `twin new` all use it.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

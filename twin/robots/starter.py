@@ -3,8 +3,6 @@
 The numbers are those of a robot of the same family that ships with the twin, each with the explanation from its schema.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Estimate the shapes of a recording: named points of every trial, their uncertainty and the skin, in the base frame."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

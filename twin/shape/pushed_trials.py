@@ -6,8 +6,6 @@ and the resistances are read through a twin's sensor law and effects (`sensing.p
 checks a diagnosis and is no part of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

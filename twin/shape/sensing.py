@@ -4,8 +4,6 @@ Effects of the sensors that the twin has (drift, gain, hysteresis) are inverted:
 they reported, by R <- R + (reported - sense(R)).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Grasp an object that stands on a table and keep it when the table sinks, as if the palm were lifted."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

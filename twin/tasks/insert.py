@@ -1,7 +1,5 @@
 """Push a round plug over a table into its socket."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

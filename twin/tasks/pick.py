@@ -1,7 +1,5 @@
 """Pick up a thin disc from a table, at its rim."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

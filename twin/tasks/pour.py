@@ -1,7 +1,5 @@
 """Tip a hinged cup over, so that its balls come to lie in a tray."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Run one trial of a task step by step: by a person's hand on slack fingers, or by tendons."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.foundation.errors import SolveError

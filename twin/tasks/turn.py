@@ -1,7 +1,5 @@
 """Grasp a cylinder that stands on a table and turn it about its axis, without losing it."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Turn a bayonet cap out from under its hooks, and keep it when the neck that it closed sinks."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

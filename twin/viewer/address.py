@@ -1,7 +1,5 @@
 """Where the viewer is served: a host and a free port, checked before the server starts."""
 
-from __future__ import annotations
-
 import errno
 import getpass
 import ipaddress

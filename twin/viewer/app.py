@@ -1,7 +1,5 @@
 """The panel of twins: by hand, or replaying the trials of a set."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 

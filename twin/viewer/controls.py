@@ -1,7 +1,5 @@
 """The sliders of a robot by hand: pulls, loads, and a push."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The shape of a robot under sliders: static, with friction's history, or heated by currents over time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body import Drive, Loads

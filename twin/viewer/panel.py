@@ -3,8 +3,6 @@
 Callbacks only record what is wanted; one loop solves and draws, since a solver serves one thread.
 """
 
-from __future__ import annotations
-
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """The trials of a measurement set and a twin's predictions of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The controls of a replay: trial, time, speed; plots of the error over time and over the pull."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One of the shown twins: its switches, its place in the scene, its shape by hand or in a trial."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -3,8 +3,6 @@
 The plot is SVG, since viser's charts need one increasing abscissa for all lines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

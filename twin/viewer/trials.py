@@ -1,7 +1,5 @@
 """The panel of recorded trials of a hand's tasks: trial, time, speed and outcome."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -16,7 +16,7 @@ from tests.recorded_days import half, recorded_day
 from tools.simulators.rod.nuisance import built
 from twin.diagnosis import Settings, calibrated_fit
 from twin.diagnosis.calibration.fisher_information import solve, unidentifiable
-from twin.diagnosis.calibration.fit import Evaluation, Fit, Free, Model, Objective, fit, prior_weight
+from twin.diagnosis.calibration.fit import Evaluation, Fit, Free, Model, Objective, StopRule, fit, prior_weight
 from twin.diagnosis.checks.fit_warnings import strained, unlikely
 from twin.diagnosis.evidence.ranking import projected
 from twin.diagnosis.noise.model import Noise
@@ -465,8 +465,9 @@ def test_a_linear_bench_on_which_two_numbers_are_all_but_alike_is_fitted_to_the_
     true = np.array([3.0, -2.0])
     found = fit(Linear(A, A @ true), Model(Twin.of(ROBOT), FREE[2:]))
     np.testing.assert_allclose(found.model.vector(), true, atol=1e-4)
-    once = fit(Linear(A, A @ true), Model(Twin.of(ROBOT), FREE[2:]), worth=1e9)  # a step that falls by less is the last
-    rough = fit(Linear(A, A @ true), Model(Twin.of(ROBOT), FREE[2:]), worth=0.1)
+    last = StopRule(worth=1e9)  # a step that falls by less is the last
+    once = fit(Linear(A, A @ true), Model(Twin.of(ROBOT), FREE[2:]), stop=last)
+    rough = fit(Linear(A, A @ true), Model(Twin.of(ROBOT), FREE[2:]), stop=StopRule(worth=0.1))
     assert once.cost > 2.0 * rough.cost > 0.0
     assert 0.1 > rough.cost > 4.0 * found.cost
 
@@ -484,7 +485,7 @@ def test_a_step_that_failed_is_shortened_only_as_long_as_it_may_be_worth_it(wort
             return super().within(most, model, near) if near is None else None
 
     bench = Stuck(np.ones((1, 1)), np.ones(1))
-    found = fit(bench, Model(Twin.of(ROBOT), FREE[2:3]), tolerance=0.0, worth=worth)
+    found = fit(bench, Model(Twin.of(ROBOT), FREE[2:3]), stop=StopRule(0.0, worth))
     assert bench.steps == tried
     assert found.cost == 1.0
 

@@ -56,7 +56,7 @@ def day(monkeypatch: pytest.MonkeyPatch) -> tuple[Line, Any]:
     objective = Line(rng.normal(size=(sum(ROWS), 2)), rng.normal(size=sum(ROWS)) + 3.0, list(range(len(ROWS))))
     asked: list[np.ndarray] = []
 
-    def refit(part: Line, model: Any, *, near: Any, J: np.ndarray, tolerance: float, worth: float) -> Any:
+    def refit(part: Line, model: Any, *, near: Any, J: np.ndarray, stop: Any) -> Any:
         np.testing.assert_array_equal(J, objective.J[part.mine][:, :1])  # the robot's own alone, of the rows that are fitted
         asked.append(J)
         x = part.solved()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from twin.diagnosis.calibration.fit import StopRule
 from twin.diagnosis.evidence import left_out as stage
 from twin.diagnosis.evidence.left_out import LeftOut, left_out, proven
 from twin.diagnosis.thresholds import FIRST_ORDER_LIMIT, HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE
@@ -76,11 +77,11 @@ def test_trials_a_step_throws_far_off_are_fitted_again(monkeypatch: pytest.Monke
 
         return SimpleNamespace(trials=trials, evaluate=evaluate)
 
-    def refit(objective: Any, model: Any, *, near: Any, J: np.ndarray, tolerance: float, worth: float) -> Any:
+    def refit(objective: Any, model: Any, *, near: Any, J: np.ndarray, stop: StopRule) -> Any:
         asked.append(objective.trials)
         (k,) = set(range(3)) - set(objective.trials)
         np.testing.assert_array_equal(J, np.delete(fitted.J[:, :1], slice(ends[k], ends[k + 1]), axis=0))
-        assert (near, tolerance, worth) == (fitted.evaluation, HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE)
+        assert (near, stop) == (fitted.evaluation, StopRule(HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE))
         return SimpleNamespace(model=f"without {k}")
 
     study.objective.of = of

@@ -11,7 +11,7 @@ from scipy import stats
 
 from tests.recorded_days import recorded_day
 from twin.diagnosis import Settings
-from twin.diagnosis.calibration.fit import fit
+from twin.diagnosis.calibration.fit import StopRule, fit
 from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.evidence.first_order import dictionary
@@ -55,8 +55,8 @@ def test_noise_alone_stays_below_the_thresholds(calibrated: Any) -> None:
     bars = acceptance_limits(calibrated.context, calibrated.base, calibrated.patterns, 0)
     d = [draws(calibrated.context, calibrated.base, calibrated.patterns, seed) for seed in range(5)]
     for name, bar, floor in (
-        ("gain", bars.accept, LEAST_EVIDENCE), ("moved", bars.material, LEAST_CONTRIBUTION), ("left", bars.left, STRUCTURE_AS_BUILT),
-        ("line", bars.line, LARGEST_SPECTRAL_LINE),
+        ("gain", bars.accept, LEAST_EVIDENCE), ("moved", bars.material, LEAST_CONTRIBUTION),
+        ("left", bars.left, STRUCTURE_AS_BUILT), ("line", bars.line, LARGEST_SPECTRAL_LINE),
     ):  # fmt: skip
         x = np.concatenate([getattr(one, name) for one in d])
         assert len(x) == 5 * NO_EFFECT_DRAWS
@@ -82,6 +82,8 @@ def test_a_fit_that_cannot_win_is_not_finished(calibrated: Any) -> None:
     """From parameters a standard deviation off; a cost that no fit beats ends it after a step, one that it may beat does not."""
     objective, base = calibrated.context.objective, calibrated.base
     start = base.model.at(base.model.vector() + 1.0)
-    whole, hopeless, hopeful = (fit(objective, start, tolerance=1e-9, beat=beat) for beat in (np.inf, -np.inf, 2.0 * base.cost))
+    whole, hopeless, hopeful = (
+        fit(objective, start, stop=StopRule(1e-9, beat=beat)) for beat in (np.inf, -np.inf, 2.0 * base.cost)
+    )
     assert hopeless.cost > whole.cost
     assert hopeful.cost == whole.cost

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from twin.diagnosis.budget import Budget
-from twin.diagnosis.calibration.fit import Model
+from twin.diagnosis.calibration.fit import Model, StopRule
 from twin.diagnosis.evidence import scored_model as stage
 from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, score_model, with_effect_added, with_extended_law
 from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
@@ -85,7 +85,7 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     ((model, how),) = fits.asked
     assert model.twin.effects[-1]["mu"] == 0.1
     assert [f.label for f in model.free[len(member.fit.model.free) :]] == ["tendon_friction.mu"]
-    assert how == {"near": HERE, "J": member.fit.J, "tolerance": REFIT_TOLERANCE, "worth": REFIT_SCORE_TOLERANCE, "beat": 7.0}
+    assert how == {"near": HERE, "J": member.fit.J, "stop": StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, 7.0)}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
 
@@ -112,10 +112,10 @@ def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: p
     (first, how), (whole, then) = fits.asked
     assert [f.label for f in first.free[len(member.fit.model.free) :]] == [f"{drift}.rate_1", f"{drift}.rate_2"]
     assert first.twin.effects[-1].values == {**effect_class(drift)({}, 3).values, **start.values}
-    assert how == {"near": HERE, "J": member.fit.J, "worth": np.inf}  # a fit that ends with its first step
+    assert how == {"near": HERE, "J": member.fit.J, "stop": StopRule(worth=np.inf)}  # a fit that ends with its first step
     assert [f.label for f in whole.free[len(member.fit.model.free) :]] == [f"{drift}.{n}" for n in start.free]
     assert whole.twin.effects[-1].values == {**effect_class(drift)({}, 3).values, **start.values, **stepped}
-    assert then == {"near": after, "J": member.fit.J, "tolerance": REFIT_TOLERANCE, "worth": REFIT_SCORE_TOLERANCE, "beat": 7.0}
+    assert then == {"near": after, "J": member.fit.J, "stop": StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, 7.0)}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, drift, start) is None
     for effect, begun in (

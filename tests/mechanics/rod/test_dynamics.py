@@ -237,7 +237,7 @@ def test_creep_in_steps_is_creep_in_statics() -> None:
 def test_effects_act_alike_in_steps_and_statics(effect: tuple[str, dict[str, float]]) -> None:
     t, T, _ = ramps([(0, 0, 0), (2.0, 0.5, 0)], ramp=2.0, hold=2.0, rate=4.0)
     rest = log("rest", t, T)
-    twin = Twin(load("continuum"), {"damping.time": 0.03}, (catalogue()[effect[0]](effect[1]),))
+    twin = Twin(load("continuum"), {"damping.time": 0.03}, (catalogue()[effect[0]](effect[1], 3),))
     by_steps, by_statics = (twin.predict(rest, dynamic=d).trials[0].values for d in (True, False))
     for channel in rest.outputs():
         # m: at the end of two seconds of rest: a swing of some 0.1 mm, damped by 30 ms, is gone but for the static solve's 1e-7 rad

@@ -62,7 +62,7 @@ def test_the_flex_is_the_lattice() -> None:
     weight = body.density * body.lattice.quadrature[1].sum()
     clamped = body.density * body.lattice.quadrature[1].sum() - body.density * body.lattice.volume.sum()
     np.testing.assert_allclose(made.model.body_mass.sum(), weight - clamped, rtol=1e-9)
-    np.testing.assert_allclose(made.bodies[0].metric.mass.sum(), 3.0 * (weight - clamped), rtol=1e-9)
+    np.testing.assert_allclose(made.bodies[0].effective_mass.mass.sum(), 3.0 * (weight - clamped), rtol=1e-9)
     # it lies on the cone, but for the depth at which the mesh is put, at facets' corners
     x = made.data.flexvert_xpos[np.hypot(*made.data.flexvert_xpos[:, :2].T) > 1e-3]
     np.testing.assert_allclose(np.hypot(x[:, 0], x[:, 1]), body.cone.radius(x[:, 2]) - 5e-4, atol=1e-6)
@@ -111,7 +111,7 @@ def test_half_a_step_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem(time, command, Loads(HANGING), Route(mu=0.3), drives=HELD)
     step = motion_step(finger())
     whole = moved(problem)
-    monkeypatch.setattr(moving, "step_for", lambda body: 0.5 * step)
+    monkeypatch.setattr(moving, "motion_step", lambda body: 0.5 * step)
     half = moved(problem)
     assert np.ptp(whole.markers[:, -1, 0]) > 0.02
     # m: second order but for where tendons become taut

@@ -232,7 +232,7 @@ def test_a_step_among_contacts_is_the_one_mujoco_solves() -> None:
     off = mujoco.mjtDisableBit
     model.opt.disableflags &= ~(off.mjDSBL_SPRING | off.mjDSBL_DAMPER)
     b = moving.resting[0].body.damping
-    model.flex_stiffness[:] = np.concatenate([-limb.metric.damping.ravel() / (h * b) for limb in moving.bodies])
+    model.flex_stiffness[:] = np.concatenate([-limb.effective_mass.damping.ravel() / (h * b) for limb in moving.bodies])
     model.flex_damping[:] = b - h
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = before.qpos, before.qvel
@@ -243,9 +243,9 @@ def test_a_step_among_contacts_is_the_one_mujoco_solves() -> None:
         J[r, data.efc_J_colind[entry]] = data.efc_J[entry]
     inverse = np.diag(1.0 / data.M[model.M_rowadr + model.M_rownnz - 1])
     for limb in moving.bodies:
-        U = np.triu(limb.metric.upper, 1) + np.diag(1.0 / np.diag(limb.metric.upper))
+        U = np.triu(limb.effective_mass.upper, 1) + np.diag(1.0 / np.diag(limb.effective_mass.upper))
         inverse[np.ix_(limb.dof, limb.dof)] = np.linalg.inv(U.T @ U)
-        force = -limb.room.f + limb.force - limb.tension @ limb.room.pulled.pull
+        force = -limb.work.f + limb.force - limb.tension @ limb.work.tendons.pull
         data.qfrc_applied[limb.dof] = force - data.qfrc_spring[limb.dof]
     hard = 1.0 / h + damping + h * spring * impedance
     W = (J @ inverse @ J.T)[::3, ::3].diagonal()

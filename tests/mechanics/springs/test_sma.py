@@ -521,9 +521,9 @@ def test_a_draught_and_a_wider_loop_do_what_they_say() -> None:
     names = [o.channel.name for o in bench.outputs]
     T, pulls = names.index("sma_1_temperature"), names.index("tendon_1_tension")
     plain = predicted()
-    windy = predicted(effect_class("sma_cooling")(factor=1.5))
+    windy = predicted(effect_class("sma_cooling")({"factor": 1.5}, 3))
     assert (windy[1:, T] < plain[1:, T]).all()
-    late = predicted(effect_class("sma_hysteresis")(shift=5.0, width=0.0))
+    late = predicted(effect_class("sma_hysteresis")({"shift": 5.0, "width": 0.0}, 3))
     np.testing.assert_allclose(late[:, T], plain[:, T], atol=3.0)  # K: it cools a little otherwise at another elongation
     assert late[:40, pulls].max() < plain[:40, pulls].max() - 0.1  # N: it needs more heat
 

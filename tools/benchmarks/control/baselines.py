@@ -1,7 +1,5 @@
 """Baselines that the controllers of `twin.control` are compared with: a PI loop of tension, two laws of shape control."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.control.heating_guard import HeatingGuard

@@ -8,8 +8,6 @@ back of one, two and three tendons from noisy load cells; errors are against the
 same twin less its friction; "tip wrench" the paper's own rod, told the same numbers.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from pathlib import Path

@@ -8,8 +8,6 @@ that bends unequally, load cells off by per cents, noise, and a payload that nob
 All but "PI only" know where the path goes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

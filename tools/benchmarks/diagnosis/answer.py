@@ -1,7 +1,5 @@
 """What a diagnosis answers on one measurement set, as a row that can be kept as JSON."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Any

@@ -25,7 +25,7 @@ from joblib import delayed
 from tools.benchmarks import cluster
 from tools.benchmarks.diagnosis.answer import answer
 from tools.benchmarks.diagnosis.attribution_table import table
-from tools.benchmarks.diagnosis.compared import COMPARED, SAME_LAW_ERROR, distance
+from tools.benchmarks.diagnosis.compared import COMPARED, SAME_LAW, distance
 from tools.benchmarks.table import append_row, read_rows
 from tools.simulators.rod.day import MISMATCH, Recipe, make_set
 from tools.simulators.rod.effects import all_effects
@@ -120,7 +120,7 @@ def _apart(truth: list[dict], d: Diagnosis) -> dict[str, float]:
         if law is not None and t["id"] in {c.effect for c in d.claims}:
             given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in t["parameters"].items()}
             true, found, tolerance = COMPARED[t["id"]](all_effects()[t["id"]](**given), law.values)
-            if tolerance == SAME_LAW_ERROR:
+            if tolerance == SAME_LAW:
                 out[t["id"]] = distance(true, found)
     return out
 

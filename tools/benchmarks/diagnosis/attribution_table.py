@@ -1,7 +1,5 @@
 """The table of the attribution benchmark: shares of sets, by amplitude and by how far the robot is from its description."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tools.benchmarks.diagnosis.answer import in_words

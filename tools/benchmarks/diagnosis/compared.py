@@ -1,7 +1,5 @@
 """What was true and what was found of each effect, as numbers that can be compared: the bench's parameters are not the twin's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -19,12 +17,6 @@ def _each(values: dict[str, float], name: str) -> list[float]:
 def _across(gravity: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """What a rotation vector does to gravity: the only part of a tilt that shows."""
     return Rotation.from_rotvec(rotation).as_matrix() @ gravity - gravity
-
-
-def _routed(i: int, angle: float, radius: float) -> np.ndarray:
-    out = np.zeros((3, 2))
-    out[i] = angle, radius / 8e-3
-    return out
 
 
 TRAVEL = np.repeat(np.linspace(-6e-3, 1e-2, 33)[:, None], 3, axis=1)  # m, of the bench's motors

@@ -4,8 +4,6 @@ Every mistake leaves a file that reads well and means something else. The table 
 refused it, whether the diagnosis said it before any fit, or whether it was missed.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 import shutil

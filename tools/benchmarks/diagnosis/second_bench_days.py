@@ -7,8 +7,6 @@ day that is there is not run again), and prints each day's truth beside its verd
 trials, in mm of a marker: calibrated / after the effects / noise floor. Effects that such data hardly tell apart count as one.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -11,8 +11,6 @@ Writes OUT/robot and OUT/day, of trials in CSV. Raises DataError for a factor th
 that it does not know how to grow.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import tomllib

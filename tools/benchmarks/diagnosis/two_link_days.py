@@ -7,8 +7,6 @@ to it. Days with either are run too, after the twelve, and should end in the two
 left out: it bends the joints as their springs' rest angles do, which a built finger may be off by.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import tyro

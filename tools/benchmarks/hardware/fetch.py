@@ -7,8 +7,6 @@ FOLDER is compared. Origins and licences: soft tentacle, tud-phi/soromox, MIT; c
 10.1109/PC65047.2025.11047513. Which columns of a tentacle's file are which marker stands in importers/tentacle_points.csv.
 """
 
-from __future__ import annotations
-
 import csv
 import gzip
 import hashlib

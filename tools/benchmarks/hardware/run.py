@@ -9,8 +9,6 @@ FOLDER holds, at any depth, runs of the cable tool that nothing here has seen: e
 the nearest there are) and judged at all others.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Sequence

@@ -7,8 +7,6 @@ Prints the value for BAND_FACTOR in twin/shape/estimators/physics.py, and covera
 moved. The trained estimators find theirs when they are trained, on the same fingers. No simulated day plays a part.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

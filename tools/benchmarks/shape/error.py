@@ -9,8 +9,6 @@ of the others the band's share and the worst frame, and the time a frame takes. 
 declared that may push; --aligned leaves the twin as described out.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from dataclasses import dataclass, replace

@@ -20,8 +20,6 @@ Rows are ROW_RATE a second; the controllers see the wanted shape of the next row
 those of the first second, mm.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace

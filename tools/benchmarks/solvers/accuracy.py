@@ -7,8 +7,6 @@ gravity and payload in its plane. Also printed: RMS over all markers in mm, whic
 before and after the nuisance parameters have absorbed what they can (the twin is always calibrated first).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import tyro
 

@@ -6,8 +6,6 @@ Prints a line a case and a table of errors: tip and centreline in mm, cord strai
 the tip's way; and the time of a warm solve beside that of the simulator. E is drawn from 125 kPa +- 15 %.
 """
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -7,8 +7,6 @@ second; exchanged at their fastest through slack. Hand: closing on a ball, then 
 those of this process (one thread), the best of the repeats: other work on the machine only slows it down.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -7,8 +7,6 @@ springs take depends on it. The bare ones start where the twin's first command l
 Process time, medians of the repeats and of their ratios, since other work on the machine slows both.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

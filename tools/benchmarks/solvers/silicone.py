@@ -10,8 +10,6 @@ law holds up to the largest strain to which no stress is off by more than `HOLDS
 unloading, rate and batch are not in it.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 python -m tools.benchmarks.solvers.statics [--solves 10000]
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from itertools import pairwise

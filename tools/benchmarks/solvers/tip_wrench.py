@@ -9,8 +9,6 @@ Tendons act at the tip alone, on a lever arm L_0, without friction; all mass cou
 is kept for comparison: published errors are against it. Solved as there, by shooting for m(0).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ seed 2000. A cell is a task, a way, a case and a training seed; one file each, w
 with: an interrupted run goes on.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections import Counter

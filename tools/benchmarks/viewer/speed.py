@@ -5,8 +5,6 @@
 Figures belong to the machine and what else it does: report ratios and medians.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
@@ -21,7 +19,7 @@ from twin.robots.robot import models_folder
 from twin.viewer import TwinPanel
 
 SETS = {"continuum": "friday", "finger": "drift"}  # samples bundled with the robots
-PICTURES = 120
+PICTURES_TIMED = 120
 VIEWER_STARTS = 3
 
 
@@ -34,9 +32,9 @@ def pictures(robot: str) -> float:
         app.scrubber.play.value = True
         app.tick()
         began = time.perf_counter()
-        for _ in range(PICTURES):
+        for _ in range(PICTURES_TIMED):
             app.tick()
-        return PICTURES / (time.perf_counter() - began)
+        return PICTURES_TIMED / (time.perf_counter() - began)
     finally:
         server.stop()
 

@@ -4,8 +4,6 @@
 with --edges, two sharp edges hold the finger in its tests where else a hand pushes.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -1,7 +1,5 @@
 """Runs a bench day on a built finger with its effects: every row's equilibrium, in order, since the finger remembers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

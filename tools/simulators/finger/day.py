@@ -1,7 +1,5 @@
 """From a seed to a finger's measurement set on disk; the same arguments give the same bytes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """Single equilibria of the nominal or a built finger, to hold other solvers against; mm, N, MPa."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Section: a square core of `core` x `core` cells and 4 `core` cells around it, ea
 tendons' azimuths. Nodes go plane by plane from base to tip, so that a layer's unknowns lie close together. Lengths in mm.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -3,8 +3,6 @@
 Every trial begins at rest with all tendons just taut. A tendon that shall not pull is paid out by PAID_OUT.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The true shape of a finger's test trials, as a scorer reads it: named points and the whole skin, every half second."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writes a finger day as measurement sets: what a reader gets in plain files, with instrument noise. Truth is for tests only."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass

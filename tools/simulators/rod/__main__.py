@@ -3,8 +3,6 @@
 Several --effect may be given, each scaled to leave --amplitude sigmas by itself; without any the set has no effect.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path

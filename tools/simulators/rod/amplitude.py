@@ -5,8 +5,6 @@ Refitting is linear within plausible bounds: a minimises |e - B a|, |a_p| <= PLA
 of the outputs in sigmas per prior standard deviation of each nuisance parameter; what is left is e - B a.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

@@ -4,8 +4,6 @@ Order of loads in a trial: straight and unloaded; gravity and payload in 4 steps
 the log. The whole ramp takes RAMP_SECONDS seconds before the log's time zero. Slow states live on the day's clock.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,18 +1,16 @@
 """From a seed to a measurement set on disk; the same arguments give the same bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from tyro.conf import Suppress, UseAppendAction, arg
+from tyro.conf import UseAppendAction, arg
 
 from tools.simulators.rod.amplitude import Scale, scaled
 from tools.simulators.rod.bench import run
-from tools.simulators.rod.design import BENCH_DESIGNS, Trial, bench_day
+from tools.simulators.rod.design import BENCH_DESIGNS, bench_day
 from tools.simulators.rod.effects import Effect, all_effects
 from tools.simulators.rod.nuisance import built
 from tools.simulators.rod.sensors import Noise
@@ -34,7 +32,6 @@ class Recipe:
     ambient: bool = False  # also log the ambient temperature
     coloured: bool = False  # marker noise AR(1) 0.4 with Student-t tails, 5 degrees
     mismatch: str = "built"  # how far the robot is from its description: exact, built or rough
-    more: Suppress[tuple[Trial, ...]] = ()  # run when the day is over
 
     def __post_init__(self) -> None:
         """Raise ValueError for a name that is not known."""
@@ -55,7 +52,6 @@ def make_set(folder: Path, recipe: Recipe, progress: Callable[[str], None] = lam
     for name in recipe.effects:
         progress(f"scaling {name}")
         found.append(scaled(known[name].draw(laws), recipe.amplitude, scale))
-    day = replace(day, trials=(*day.trials, *recipe.more))
     chosen = [effect for effect, _ in found]
     rough = recipe.mismatch == "rough"
     unnamed = [replace(known[n].draw(laws), strength=s) for n, s in UNNAMED.items()] if rough else []

@@ -6,8 +6,6 @@ through the day, all in random order. The poor designs each leave one of these o
 heats springs, each alone, in pairs and in turns, with pauses in which they cool.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -7,8 +7,6 @@ A row of the table `fields` (M, 10) is [kind, first disk, point x y z, direction
 Wall and post push with stiffness `strength` (N/m); the force grows quadratically over the first ROUNDED_PENETRATION of penetration.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -7,8 +7,6 @@ pose is advanced by a fourth-order Magnus step on SE(3), Omega = H/2 (x1 + x2) +
 the two Gauss points of the step (Iserles et al., Lie-group methods, Acta Numerica 2000; sign for g' = g x).
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

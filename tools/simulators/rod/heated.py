@@ -4,8 +4,6 @@ The rod is solved with each spring replaced by its tangent, T = s + k (e - e_0),
 of 1/k; the tangent is taken again where the rod went until spring and tendon agree. Where they do not, the row comes in parts.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

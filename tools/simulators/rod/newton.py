@@ -3,8 +3,6 @@
 Everything distal to a bent element turns rigidly about it, which gives the Jacobian in closed form.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ E +-6 %, hole radius +-1.5 %, disk mass +-3 %, spacing +-1 % each with the total
 along the disk's axis, radius taper up to 1 % base to tip. Gaussian numbers are cut at two standard deviations.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -8,8 +8,6 @@ dead loads or fields on the disks, w the backbone's weight per length, p_ik the 
 interval k and t_ik the unit vector along its segment towards the base.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -8,8 +8,6 @@ elastic up to a slip delta_n (W. D. Iwan, J. Appl. Mech. 33, 1966), so inner loo
 The base plate's hole is not counted: the load cell sits right behind it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

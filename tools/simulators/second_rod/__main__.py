@@ -3,8 +3,6 @@
 A day that exists is kept, so that a run that was stopped goes on. The lines printed do not reveal a day's truth.
 """
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -5,8 +5,6 @@ each disk and midway between disks is k w softplus((clearance - distance) / w) a
 is rounded over w.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Equilibrium of the robot under its drive: virtual work balanced by Newton, followed step by step along a trial."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

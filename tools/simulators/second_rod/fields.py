@@ -1,7 +1,5 @@
 """What pushes without touching: a magnet near the tip, a jet of air across the disks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

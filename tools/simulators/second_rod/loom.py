@@ -4,8 +4,6 @@ Each slider's force is k (anchor - tip), no longer than its limit f; beyond, the
 with different limits give the rounded loops of a real cable, and nothing changes while the tip stands still.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

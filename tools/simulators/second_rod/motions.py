@@ -4,8 +4,6 @@ A motion is a bend b(t) in the unit disk, its direction the way the robot is to 
 Sets hold nine kinds at least once, so that slow and quick, loading and unloading, all directions and a long hold are there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

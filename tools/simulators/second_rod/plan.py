@@ -5,8 +5,6 @@ from a shuffled pack, to its end before any comes again: a block takes 26, so al
 driven by displacements where as many can be: some effects show only there, others only with tensions.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

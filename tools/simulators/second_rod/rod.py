@@ -8,8 +8,6 @@ pieces. The residual of virtual work is the exact derivative of this discrete ro
 stationary. Bending and twist: physics.md 1.2, stretch and shear left out as there.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

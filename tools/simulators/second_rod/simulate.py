@@ -1,7 +1,5 @@
 """A day run through, trial after trial on one clock, with its effects or with none at given inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

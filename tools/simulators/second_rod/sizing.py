@@ -4,8 +4,6 @@ The refit is linear about the true robot and bounded by nominal.md's tolerances.
 root mean square over all rows, disks and coordinates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

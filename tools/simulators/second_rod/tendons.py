@@ -9,8 +9,6 @@ far the hole's friction is mobilised: dz/dx = (sign(dx) - z) / delta in the tend
 1 / delta), positive towards the base.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One day as files: a measurement set by measurements.md, and beside it, elsewhere, the truth."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import shutil

@@ -1,7 +1,5 @@
 """`twin diagnose`: find the missing effects and write the report."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`twin evaluate`: compute the error of a twin on a measurement set."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`twin simulate`: write a twin's prediction of a set as a measurement set."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated

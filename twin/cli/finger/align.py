@@ -1,7 +1,5 @@
 """`twin align`: align a soft finger's twin to a built finger."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`twin generate`: simulate shapes of a soft finger to train estimators."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`twin shape`: estimate a finger's shape from its strain sensors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

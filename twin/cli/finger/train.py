@@ -1,7 +1,5 @@
 """`twin train`: train an estimator of a finger's shape."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

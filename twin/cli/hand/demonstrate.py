@@ -1,7 +1,5 @@
 """`twin demonstrate`: simulate demonstrations of a task."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

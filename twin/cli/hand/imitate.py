@@ -1,7 +1,5 @@
 """`twin imitate`: perform a demonstrated task with the tendons."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

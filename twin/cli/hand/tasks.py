@@ -1,7 +1,5 @@
 """`twin tasks`: list the tasks of a hand."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rich.table import Table

@@ -1,7 +1,5 @@
 """`twin effects`: list the effects of the catalogue."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """`twin new`: make a folder to describe a new robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

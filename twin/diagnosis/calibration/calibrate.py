@@ -1,7 +1,5 @@
 """Stage `calibrate`: the noise of the fitted trials, and the robot's own uncertain parameters fitted to them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ What such data tell is solved for, what they cannot tell is left where it is (th
 diagonal) and can be named. Scaled, since units must not decide what is singular.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

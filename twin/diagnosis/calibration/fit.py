@@ -320,42 +320,30 @@ def prior_pull(model: Model) -> np.ndarray:
     return prior_weight(model) ** 2 * (model.vector() - prior)
 
 
+@dataclass(frozen=True)
+class StopRule:
+    """When a fit ends before its last step: where a step falls by less than `tolerance` of its cost or by less than `worth`, and
+    where it would not `beat` a cost though all further steps fell by as much as its last."""
+
+    tolerance: float = 1e-5
+    worth: float = 0.0
+    beat: float = np.inf
+
+
+USUAL_STOP = StopRule()
+
+
 def fit(
     objective: Objective, model: Model, *, near: Evaluation | None = None, J: np.ndarray | None = None, refresh: bool = False,
-    tolerance: float = 1e-5, worth: float = 0.0, beat: float = np.inf,
+    stop: StopRule = USUAL_STOP,
 ) -> Fit:  # fmt: skip
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
     Derivatives for the robot's own parameters, nearly linear, are taken once, or come as `J`, the whitened columns (n, m) of the
     first m free parameters from a neighbouring fit; those for effects are taken anew at every step. `refresh` takes them all again
-    at the solution, for standard errors and screening. A fit ends where a step falls by less than `tolerance` of its cost, or by
-    less than `worth`. One that would not `beat` a cost though all further steps fell by as much
-    as its last ends there. Raises SolveError where the model cannot be solved at its start.
-
-    Laws of load cells are fitted to |z|^2 and the noise that they cut off near slack: else they lean to where tendons at rest fall
-    silent.
+    at the solution, for standard errors and screening. Raises SolveError where the model cannot be solved at its start.
     """
-    steps = np.array([f.parameter.step for f in model.free])
-    low = np.array([f.parameter.low for f in model.free]) / steps
-    high = np.array([f.parameter.high for f in model.free]) / steps
-    prior = np.array([f.parameter.value for f in model.free]) / steps
-    weight = prior_weight(model) ** 2
-    cells = {e.id for e in model.twin.effects if "load cells" in e.needs}
-    silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
-
-    def believed(x: np.ndarray) -> float:
-        return float(weight @ (x - prior) ** 2)
-
-    def cut_off(x: np.ndarray) -> np.ndarray:
-        return objective.cut_off(model.at(x).twin) if silencing else np.zeros(0)
-
-    def besides(x: np.ndarray) -> float:
-        """What is fitted besides |z|^2."""
-        return believed(x) + float(np.sum(cut_off(x) ** 2))
-
-    def cost(e: Evaluation) -> float:
-        return float(e.z @ e.z) + besides(e.model.vector())
-
+    penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
     renewals = MOST_RENEWALS if objective.bends else 0
     fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
@@ -364,30 +352,25 @@ def fit(
     if J is not None:
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
-    now, damping, own, moved = cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
+    now, damping, own, moved = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
     for left in range(MOST_FIT_STEPS - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
-        cut = cut_off(x)
-        D = np.zeros((cut.size, x.size))
-        for i in silencing:
-            D[:, i] = (cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
-        H = columns.T @ columns + D.T @ D + np.diag(weight)
-        g = columns.T @ at.z + D.T @ cut + weight * (x - prior)
-        better, whole, enough = None, damping, max(objective.smallest_fall(tolerance * now), worth)
+        H, g = penalty.normal_equations(x, columns, at.z)
+        better, whole, enough = None, damping, max(objective.smallest_fall(stop.tolerance * now), stop.worth)
         while better is None and damping < 1e4:
-            d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, low - x, high - x)
+            d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, penalty.low - x, penalty.high - x)
             foretold = -float(2.0 * g @ d + d @ H @ d)
             if damping > whole and foretold < enough:  # a step that failed is not shortened until it is worth nothing
                 break
-            better = _improved(objective, at, x + d, now - besides(x + d))
+            better = _improved(objective, at, x + d, now - penalty.besides(x + d))
             damping *= 1.0 if better else 10.0
-        fall = 0.0 if better is None else now - cost(better)
+        fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
-            at, now, moved = better, cost(better), True
+            at, now, moved = better, penalty.cost(better), True
             if fall > TRUSTED_FALL_SHARE * foretold:
                 damping = max(0.1 * damping, 1e-6)
-            if now - left * fall > beat:
+            if now - left * fall > stop.beat:
                 break
         if better is None or fall < enough:
             if not (renewals and moved and left):
@@ -395,7 +378,52 @@ def fit(
             columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))
-    return Fit(at, columns, float(at.z @ at.z) + believed(at.model.vector()))
+    return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))
+
+
+@dataclass(frozen=True)
+class _Penalty:
+    """What is fitted besides |z|^2, of free parameters x (n_free,) in steps: the priors' terms and, of laws of load cells
+    (`silencing`, positions), the noise that they cut off near slack: else they lean to where tendons at rest fall silent."""
+
+    objective: Objective
+    model: Model
+    low: np.ndarray
+    high: np.ndarray
+    prior: np.ndarray
+    weight: np.ndarray
+    silencing: list[int]
+
+    @staticmethod
+    def of(objective: Objective, model: Model) -> _Penalty:
+        steps = np.array([f.parameter.step for f in model.free])
+        low = np.array([f.parameter.low for f in model.free]) / steps
+        high = np.array([f.parameter.high for f in model.free]) / steps
+        prior = np.array([f.parameter.value for f in model.free]) / steps
+        cells = {e.id for e in model.twin.effects if "load cells" in e.needs}
+        silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
+        return _Penalty(objective, model, low, high, prior, prior_weight(model) ** 2, silencing)
+
+    def believed(self, x: np.ndarray) -> float:
+        return float(self.weight @ (x - self.prior) ** 2)
+
+    def cut_off(self, x: np.ndarray) -> np.ndarray:
+        return self.objective.cut_off(self.model.at(x).twin) if self.silencing else np.zeros(0)
+
+    def besides(self, x: np.ndarray) -> float:
+        return self.believed(x) + float(np.sum(self.cut_off(x) ** 2))
+
+    def cost(self, e: Evaluation) -> float:
+        return float(e.z @ e.z) + self.besides(e.model.vector())
+
+    def normal_equations(self, x: np.ndarray, columns: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Half the cost's second derivatives (n_free, n_free) of Gauss and Newton, and half its slope (n_free,)."""
+        cut = self.cut_off(x)
+        D = np.zeros((cut.size, x.size))
+        for i in self.silencing:
+            D[:, i] = (self.cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
+        H = columns.T @ columns + D.T @ D + np.diag(self.weight)
+        return H, columns.T @ z + D.T @ cut + self.weight * (x - self.prior)
 
 
 def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -1,14 +1,12 @@
 """What every fit of a diagnosis minimises: the residual of the fitted trials made white by a noise found from the data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from twin.body import Drive
-from twin.diagnosis.calibration.fit import Evaluation, Model, Objective, fit
+from twin.diagnosis.calibration.fit import Evaluation, Model, Objective, StopRule, fit
 from twin.diagnosis.diagnosis import Settings
 from twin.diagnosis.noise.estimate import estimate_noise
 from twin.diagnosis.noise.model import Noise
@@ -31,7 +29,7 @@ def objective_of(
     first = Noise(rough, np.zeros(prepared.n_tendon), np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, prepared.n_tendon)) for y in measured]
     rough_fit = Objective(prepared, fitted, Whitener(first, measured, none, command), settings.jobs)
-    start = fit(rough_fit, Model.base(twin.robot, twin), tolerance=1e-3)
+    start = fit(rough_fit, Model.base(twin.robot, twin), stop=StopRule(tolerance=1e-3))
     unmeasured = rough_fit.predict(start.model.twin, start.evaluation.traces)[1]
     taut = sensitivity(_unslackened(prepared), fitted, start.model.twin, unmeasured, start.evaluation.traces)
     G = [g * _felt(prepared, k)[:, None, :] for g, k in zip(taut, fitted, strict=True)]

@@ -1,7 +1,5 @@
 """What a fit says against itself, in words."""
 
-from __future__ import annotations
-
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.thresholds import UNLIKELY_PARAMETER_DISTANCE
 

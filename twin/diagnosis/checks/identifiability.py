@@ -9,8 +9,6 @@ An effect that leaves a sigmas (RMS over n samples) is seen at five standard err
 neither below what is material.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

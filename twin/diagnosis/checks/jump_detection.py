@@ -14,8 +14,6 @@ one. A turn about the base alone may be the robot's clamp and is left for the ve
 trials changed too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache

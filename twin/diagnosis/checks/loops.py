@@ -6,8 +6,6 @@ pulled, and keeps more when released. Of pairs whose pull came first the mean of
 lag - drift: where both kinds are there, time and direction come apart; else creep, drift and friction look alike.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ To first order a group G of trials that may move the robot's parameters takes fa
 off its |z|^2. Trials change sides while the sum of both falls grows (a two-means search from several starts).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Stage `look`: the robot as described held against the data, and what they may mean otherwise, before anything is fitted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Marker samples that stand alone: off their neighbours in time, while the markers beside them are not."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Commands that go far from one row to the next: when they do in between is not in the log, and what is late shows that."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,7 +32,8 @@ def undersampled_commands(prepared: PreparedRecording, trials: Sequence[int], fo
     if not dt.size or there < ERROR_AFTER_STEP_RATIO * elsewhere:
         return []
     return [
-        f"{late[0].replace('_', ' ')}: {dt.size} times a command goes more than {100 * COMMAND_STEP_SHARE:.0f} % of its range within "
-        f"one row of {np.median(dt):.2g} s, and what is left in the two rows after is {there / elsewhere:.1f} times what is left elsewhere; "
-        "when the command went is not in the log, and no law makes up for that: log commands as often as the drives get them"
+        f"{late[0].replace('_', ' ')}: {dt.size} times a command goes more than {100 * COMMAND_STEP_SHARE:.0f} % of its range "
+        f"within one row of {np.median(dt):.2g} s, and what is left in the two rows after is {there / elsewhere:.1f} times what is "
+        "left elsewhere; when the command went is not in the log, and no law makes up for that: log commands as often as the "
+        "drives get them"
     ]

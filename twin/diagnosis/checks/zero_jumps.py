@@ -4,8 +4,6 @@ No law of the robot: a nuisance of the recording, fitted beside whatever else is
 the twin that is handed on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, cast

@@ -4,8 +4,6 @@ Smooth errors are sought among what moves with the pose, the past and the time; 
 how large residuals are at all, where trials repeat: two of them agree to the noise, and the twin is off by more.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.diagnosis.evidence.scored_model import ScoredModel

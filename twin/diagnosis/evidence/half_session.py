@@ -1,13 +1,11 @@
 """What a model would do on each half of the session, had it been fitted to the other: how it predicts farther than one trial."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 
-from twin.diagnosis.calibration.fit import fit
+from twin.diagnosis.calibration.fit import StopRule, fit
 from twin.diagnosis.evidence.left_out import LeftOut, left_out
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
@@ -53,14 +51,8 @@ def halves(context: FitContext, weighed: ScoredModel) -> LeftOut:
     for fitted, rest in (parts, parts[::-1]):
         J = found.J[rows[fitted[0]] : rows[fitted[-1] + 1], own]
         try:
-            half = fit(
-                objective.of(fitted),
-                found.model,
-                near=found.evaluation,
-                J=J,
-                tolerance=HALF_SESSION_TOLERANCE,
-                worth=REFIT_SCORE_TOLERANCE,
-            )
+            stop = StopRule(HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE)
+            half = fit(objective.of(fitted), found.model, near=found.evaluation, J=J, stop=stop)
             predicted = objective.of(rest).evaluate(half.model, half.evaluation.traces)
         except SolveError:
             continue

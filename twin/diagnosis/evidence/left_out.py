@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Fit, fit, prior_pull, prior_weight
+from twin.diagnosis.calibration.fit import Fit, StopRule, fit, prior_pull, prior_weight
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.thresholds import (
     FIRST_ORDER_LIMIT,
@@ -106,14 +106,8 @@ def proven(context: FitContext, fitted: Fit, known: LeftOut) -> LeftOut:
         J = np.delete(fitted.J[:, own], slice(a, b), axis=0)
         try:
             others = [j for j in range(len(context.trials)) if j != k]
-            rest = fit(
-                objective.of(others),
-                fitted.model,
-                near=fitted.evaluation,
-                J=J,
-                tolerance=HALF_SESSION_TOLERANCE,
-                worth=REFIT_SCORE_TOLERANCE,
-            )
+            stop = StopRule(HALF_SESSION_TOLERANCE, REFIT_SCORE_TOLERANCE)
+            rest = fit(objective.of(others), fitted.model, near=fitted.evaluation, J=J, stop=stop)
             out[a:b] = objective.of([k]).evaluate(rest.model, fitted.evaluation.traces).z
         except SolveError:
             continue

@@ -8,8 +8,6 @@ effect must exceed. The floors guard against what no simulation from the model k
 Drawn anew in every diagnosis: they depend on the data and the seed, on nothing that another run left behind.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which effects are worth a refit: how much of the residual the first-order pattern of each explains that the model cannot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,12 +1,10 @@
 """A fitted model, what the evidence says of it, and its refits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnosis.calibration.fit import Fit, Model, fit
+from twin.diagnosis.calibration.fit import Fit, Model, StopRule, fit
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.evidence.discrepancy import Discrepancy
 from twin.diagnosis.fit_context import FitContext
@@ -64,14 +62,12 @@ def with_effect_added(
     try:
         if signed := _signed(effect, start, n_tendon):
             amplitudes = model.with_effect(effect, values, signed, n_tendon)
-            begun = fit(context.objective, amplitudes, near=near, J=member.fit.J, worth=np.inf)
+            begun = fit(context.objective, amplitudes, near=near, J=member.fit.J, stop=StopRule(worth=np.inf))
             values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
             model, near = begun.model.without_effect(effect), begun.evaluation
         model = model.with_effect(effect, values, start.free, n_tendon)
-        found = fit(
-            context.objective, model, near=near, J=member.fit.J, tolerance=REFIT_TOLERANCE, worth=REFIT_SCORE_TOLERANCE, beat=beat
-        )
-        return score_model(context, found)
+        stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
+        return score_model(context, fit(context.objective, model, near=near, J=member.fit.J, stop=stop))
     except SolveError:
         return None
 
@@ -111,10 +107,8 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
             values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
             model = plain.fit.model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
-                fuller = score_model(
-                    context,
-                    fit(context.objective, model, J=_own(plain.fit), tolerance=REFIT_TOLERANCE, worth=REFIT_SCORE_TOLERANCE),
-                )
+                stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE)
+                fuller = score_model(context, fit(context.objective, model, J=_own(plain.fit), stop=stop))
             except SolveError:
                 continue
             if fuller.score > max(found.score, plain.score + accept):
@@ -134,7 +128,7 @@ def refit_without(context: FitContext, base: ScoredModel, best: ScoredModel, eff
     as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
     for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
         try:
-            return score_model(context, fit(context.objective, start, J=J, worth=REFIT_SCORE_TOLERANCE))
+            return score_model(context, fit(context.objective, start, J=J, stop=StopRule(worth=REFIT_SCORE_TOLERANCE)))
         except SolveError:
             continue
     return base

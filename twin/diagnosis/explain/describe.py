@@ -1,7 +1,5 @@
 """Stage `describe`: what is left after the verdict, in words, and where to look for it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 All from residuals of the fitted trials, (n, m).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ is left out at once, to first order as single trials are; where a day is only pa
 to the other. An effect that helps on trials left out and harms on levels is named.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ T-optimality (Atkinson and Fedorov 1975): with both models fitted to today's dat
 present covariance, of |W (y_A - y_B)|^2; T = 25 separates them by five standard errors.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

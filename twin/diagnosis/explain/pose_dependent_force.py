@@ -9,8 +9,6 @@ linear least squares beside the robot's own parameters. It is said where it take
 does not, and the evidence is `LEAST_EVIDENCE` after twelve numbers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -8,8 +8,6 @@ C a law's first-order pattern, J the model's derivatives, all of what outputs mo
 the whole says of it, its posterior.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ known effect that comes nearest.
 All from whitened residuals of the fitted trials, (n, m) in sigmas: noise alone is 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

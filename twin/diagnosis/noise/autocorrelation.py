@@ -4,8 +4,6 @@ Smooth noise and a smooth error of the model look alike in one channel. In many 
 markers, in the few ways in which a body moves, and noise is each channel's own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

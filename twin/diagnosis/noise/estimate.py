@@ -1,7 +1,5 @@
 """The noise of a robot's sensors and driving readings, read off measured - predicted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ pulled: laws that move it there are paid for it in |z|^2 though they need not be
 row by row; no closed form tells, so that the twin is shaken by as much noise again.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How large the noise of sensors and of the readings that drive the twin is, and what a perfect twin would leave."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 A hold that is 3 mm elsewhere the next day, read by a camera good for 0.05 mm, has two noises. What a bench declares may be either.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ probed: with w_ij the change of row i's drive by a unit of reading j, sum_j w_ij
 feel alike, sum_j w_ij, is no matter of noise: a gain is taken up by the robot's stiffness.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -73,7 +73,8 @@ class Filter:
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """z (n, m) of x (n, m), in sigmas, zero where nothing was measured."""
-        return _whitened(np.ascontiguousarray(x), self.fade, self.gain, self.scale, self.A, self.F, self.core, self.told)
+        own, shared = (self.fade, self.gain, self.scale), (self.A, self.F, self.core, self.told)
+        return _whitened(np.ascontiguousarray(x), own, shared)
 
 
 @jit
@@ -92,7 +93,9 @@ def _alone(present, share, fade):
 
 
 @jit
-def _whitened(x, fade, gain, scale, A, F, core, told):
+def _whitened(x, own, shared):
+    """z of x by each channel's own noise and by what channels share, as named in `Filter`."""
+    (fade, gain, scale), (A, F, core, told) = own, shared
     n, m = x.shape
     t, q = A.shape[2], F.shape[2]
     z, ahead, w, f = np.empty_like(x), np.zeros(m), np.empty(t), np.empty(q)
@@ -103,20 +106,20 @@ def _whitened(x, fade, gain, scale, A, F, core, told):
             for k in range(q):
                 f[k] += F[i, j, k] * z[i, j]
         for p in range(q):
-            shared = 0.0
+            common = 0.0
             for k in range(q):
-                shared += core[i, p, k] * f[k]
+                common += core[i, p, k] * f[k]
             for j in range(m):
-                z[i, j] += F[i, j, p] * shared
+                z[i, j] += F[i, j, p] * common
         for k in range(t):
             w[k] = 0.0
             for p in range(q):
                 w[k] += told[i, k, p] * f[p]
         for j in range(m):
-            own = x[i, j] - ahead[j]
+            left = x[i, j] - ahead[j]
             for k in range(t):
-                own -= A[i, j, k] * w[k]
-            ahead[j] = fade[j] * ahead[j] + gain[i, j] * own
+                left -= A[i, j, k] * w[k]
+            ahead[j] = fade[j] * ahead[j] + gain[i, j] * left
     return z
 
 

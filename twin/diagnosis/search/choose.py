@@ -1,7 +1,5 @@
 """Stage `choose`: of the sets weighed, the one to go on with, by what it would predict of trials that no fit has seen."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from math import isfinite
 

@@ -7,8 +7,6 @@ share of it from its neighbours: stiff where a command runs evenly, loose where 
 units of a row's interval and of the reading's noise.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stage `screen`: what each effect would do to these data first, what noise alone would show, and what the design can tell."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

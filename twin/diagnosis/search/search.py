@@ -1,7 +1,5 @@
 """Stage `search`: beam search over sets of effects: rank, refit, weigh by evidence, add while it pays, then drop what does not."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

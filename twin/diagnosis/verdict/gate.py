@@ -1,7 +1,5 @@
 """Stage `gate`: drop what is too small, what may be a larger law's fault, what predicts worse, and what cannot be told apart."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stage `judge`: noise, explained, partly explained or unexplained; the claims, how sure they are, and what else it could be."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 

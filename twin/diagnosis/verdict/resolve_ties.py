@@ -5,8 +5,6 @@ off by that much. Which of them it is stays in doubt. Where a day is noise witho
 taken.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from twin.diagnosis.evidence.left_out import left_out

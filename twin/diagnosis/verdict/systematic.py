@@ -10,8 +10,6 @@ all of what is left, along any of its directions alike,
 and the systematic variance is the mean of v over the effects not claimed, each by the start that moves a parameter most.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Effects see the whole episode, as they see a trial: lag, drift and hysteresis co
 the command of then.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

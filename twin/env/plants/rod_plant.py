@@ -3,8 +3,6 @@
 It moves by MuJoCo's steps, or from one static equilibrium to the next, which is ten times faster for a robot moved slowly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple

@@ -5,11 +5,9 @@ from command to command, `twin.control.held_finger`, has no creep and no loads b
 interval of 48 ms took 11 ms this way on a busy machine, an equilibrium 1.5 mm further 7 to 8 ms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -143,7 +141,7 @@ class HandPlant:
     def set_state(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue from a saved state of a hand with the same twin, things and interval."""
         set_motion_state(self.scene.motion, select_arrays(state, "motion"))
-        scene = {name: a.copy() if a.ndim else a.item() for name, a in select_arrays(state, "scene").items()}
+        scene: dict[str, Any] = {name: a.copy() if a.ndim else a.item() for name, a in select_arrays(state, "scene").items()}
         self.state = SceneState(**scene)
         self.scene.restore_shortening(self.state.shortening)
 

@@ -1,7 +1,5 @@
 """Checks that measured numbers must pass."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

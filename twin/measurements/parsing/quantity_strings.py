@@ -1,7 +1,5 @@
 """Quantities as text, such as "10 g" or "[0, 0, 0.1] N", to SI."""
 
-from __future__ import annotations
-
 import math
 import re
 

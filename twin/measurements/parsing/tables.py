@@ -3,8 +3,6 @@
 pyarrow reads a CSV. If it fails, a slow reader finds the row and column to name.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

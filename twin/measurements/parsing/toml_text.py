@@ -1,7 +1,5 @@
 """Writing of plain values as TOML text; Python's tomllib only reads."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -17,8 +17,6 @@ A limit F_b that grows as the jaw comes to rest does not push it: f changes by m
 G falls with y, so the solution is unique. It is found by Newton's method within a bracket that shrinks.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Tensions change together along a straight line from the present to the wanted on
 hinge angles, slip states and distal tendon lengths.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

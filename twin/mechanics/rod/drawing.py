@@ -1,7 +1,5 @@
 """A backbone as it is drawn: MuJoCo's links and disks, tendons from hole to hole, and SMA springs behind the base."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import mujoco

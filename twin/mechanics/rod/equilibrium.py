@@ -1,7 +1,5 @@
 """Static solve of a hinge chain, the base of quasi-static prediction and kinematics."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 

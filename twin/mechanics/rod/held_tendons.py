@@ -12,8 +12,6 @@ to step. Friction's loss along the tendon goes to its segments' motors with the 
 law is linearised at every step, on its present piece, at its present temperature.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

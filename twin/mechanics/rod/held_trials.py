@@ -4,8 +4,6 @@ Springs pull from the beginning, cold: gravity and payload are applied in `START
 advance once a sample, under the current and at the elongation of the sample before. Otherwise as tension_trials.py.
 """
 
-from __future__ import annotations
-
 from twin.foundation.compiled import assign, jit, jit_inline
 from twin.mechanics.rod.balance.lengths import commit_present_slip, held_tangent, interpolate_target, reach_target, single_held_step
 from twin.mechanics.rod.balance.newton import Factors

@@ -1,7 +1,5 @@
 """Tension along each tendon of a chain, for display."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.foundation.compiled import jit

@@ -7,8 +7,6 @@ Within a sample all tensions change together.
 This loop is separate from held_trials.py because it compiles in half the time.
 """
 
-from __future__ import annotations
-
 from twin.foundation.compiled import assign, jit, jit_inline
 from twin.mechanics.rod.balance.newton import is_minimum, single_newton_step
 from twin.mechanics.rod.continuation import next_equilibrium

@@ -1,7 +1,5 @@
 """Steps shared by all static trials: inputs, creep, results, and what happens at each sample."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

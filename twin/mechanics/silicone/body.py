@@ -1,7 +1,5 @@
 """A silicone finger: a cone with tendons and strain-sensing cords through it, clamped at its base."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The tension of tendon t beyond point d is T_t share_td, share = exp(-mu sum_{j<=
 theta_j is the angle it turns at inner point j, z_j the slip state there, which follows the travel past j.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

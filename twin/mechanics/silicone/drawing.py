@@ -1,7 +1,5 @@
 """Silicone as it is drawn: skin, strained along the finger, and the tendons in it; fingers on a palm."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Finger k (from 1) stands at `places[k - 1]`, its frame rotated by `turns[k - 1]`
 finger to finger.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

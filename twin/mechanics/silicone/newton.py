@@ -6,8 +6,6 @@ for tendons that motors hold at a length; for the others T_t is given. A tangent
 from sample to sample. A neighbouring problem's kept inverses serve likewise, at a fraction of the cost of new ones.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ The wall pushes with F = stiffness share max(0, depth) along the normal at each 
 one height add up to one, so that `stiffness` (N/m) is that of one ring pressed all round.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A silicone body's arrays, and work arrays, as the compiled solve takes them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.mechanics.silicone.body import CONTACT_AROUND, SoftBody, skin_points

@@ -1,7 +1,5 @@
 """Static trials of a silicone body: the hanging rest, then all commands in turn, each shape found from the one before."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property

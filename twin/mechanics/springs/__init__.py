@@ -5,8 +5,6 @@ heat.py       current -> temperature
 response.py   temperature and tension of springs along given elongations, without a robot
 """
 
-from __future__ import annotations
-
 from twin.body.spring import Spring, build_springs
 from twin.mechanics.springs.response import spring_response
 

@@ -14,8 +14,6 @@ or slack tendon held at a length, with a compliance of 1/slope.
 Source: Kolyvas and Tzes, J. Intell. Mater. Syst. Struct. 2018, doi 10.1177/1045389X18770880 (their code's operator).
 """
 
-from __future__ import annotations
-
 from twin.foundation.compiled import jit
 
 LEAST_SLOPE_SHARE = 1e-3  # of E_M, the least slope of a plateau

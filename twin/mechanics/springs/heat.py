@@ -11,8 +11,6 @@ Source: Kolyvas and Tzes, J. Intell. Mater. Syst. Struct. 2018, doi 10.1177/1045
 of eight coils.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body.spring import Spring

@@ -1,7 +1,5 @@
 """Temperature and tension of SMA springs along given elongations, without a robot, by the functions of the robot's solve."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body.spring import Spring

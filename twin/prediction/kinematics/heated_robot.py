@@ -4,8 +4,6 @@ It does what a trial of a current-driven recording does (`twin.mechanics.rod.hel
 and environments that choose the next current from the last tension.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body import DIRECT, SOLVE_TOLERANCE, Drive, Loads, Problem

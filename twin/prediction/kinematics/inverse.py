@@ -5,8 +5,6 @@ The reachable tips lie on a surface: two numbers, how far and in which direction
 directions enclose the point. The general search starts there and lets all pull.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Forward kinematics is `pull`: the shape under new tensions, reached from the present ones, since friction depends on the path.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

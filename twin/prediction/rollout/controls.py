@@ -1,7 +1,5 @@
 """Controls: recordings whose inputs drive a twin and whose outputs, all that its robot shows, are still empty."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

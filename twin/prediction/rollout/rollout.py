@@ -1,7 +1,5 @@
 """Rollouts of a twin in parallel. Each starts at rest on its own, so that the number of workers does not change results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

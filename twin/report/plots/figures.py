@@ -1,7 +1,5 @@
 """The style of the figures: light axes, one accent colour, a bounded number of points."""
 
-from __future__ import annotations
-
 import html
 import json
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Plot the width of loops against the load, measured and predicted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

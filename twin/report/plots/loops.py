@@ -1,7 +1,5 @@
 """Describe loops: how far pull and release differ at the same commands, before any effect is fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The predictions a report compares: the robot as described, calibrated, and with the effects found."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Distances go one way, from cloud to skin, because the points of clouds do not correspond.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

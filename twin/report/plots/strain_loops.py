@@ -1,7 +1,5 @@
 """Plot strain loops: strains of the cords in a held-out trial, measured and predicted, against the pull of a tendon."""
 
-from __future__ import annotations
-
 import numpy as np
 import plotly.graph_objects as go
 

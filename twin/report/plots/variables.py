@@ -1,7 +1,5 @@
 """The variables that a residual can be plotted against."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The sections of report.html, in order: one function `section(story)` in each file, with its template."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from twin.report.sections.answer import attribution, before_after, effects, leftover, next_experiment, residual

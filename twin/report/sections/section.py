@@ -1,7 +1,5 @@
 """A section of the page and its input."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

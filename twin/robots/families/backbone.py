@@ -4,8 +4,6 @@
 around its tendons' channels, tapered; it stretches and can be compressed, and its "disks" are points of the channels.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

@@ -8,8 +8,6 @@ A tendon runs straight from hole to hole and ends where it enters its last disk.
 along its axis; the tendon turns at both faces.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -220,12 +218,7 @@ def _add_tendon(spec: mujoco.MjSpec, i: int, sites: list[str]) -> None:
         motor.gear = [-1, 0, 0, 0, 0, 0]
 
 
-def statics(body: HingeChain) -> Equilibrium:
-    return Equilibrium(body)
-
-
-def dynamics(body: HingeChain) -> Dynamics:
-    return Dynamics(body)
+statics, dynamics = Equilibrium, Dynamics
 
 
 def figure(body: HingeChain) -> ChainFigure:

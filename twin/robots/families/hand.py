@@ -4,8 +4,6 @@ Finger k of n is at the angle 2 pi (k - 1) / n. Its x axis, where its tendon 1 i
 palm's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import mujoco
@@ -76,20 +74,9 @@ def _sense(k: int, sense: Sense, shape: Hand) -> Sense:
     return Sense(sense.group, k * count + sense.index, sense.axis)
 
 
-def statics(body: HandBody) -> HandStatics:
-    return HandStatics(body)
-
-
-def dynamics(body: HandBody) -> HandDynamics:
-    return HandDynamics(body)
-
-
-def figure(body: HandBody) -> HandFigure:
-    return HandFigure(body)
-
-
 def hand(body: HandBody) -> HandBody:
     return body
 
 
+statics, dynamics, figure = HandStatics, HandDynamics, HandFigure
 chain = silicone = None

@@ -1,7 +1,5 @@
 """Schema of family "hand": the numbers of its silicone fingers, and the palm's."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated

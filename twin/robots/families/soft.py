@@ -1,7 +1,5 @@
 """Family "soft": a tapered silicone finger bent by tendons, with strain-sensing cords."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import mujoco
@@ -109,20 +107,9 @@ def _drawing_spec(cone: Cone, paths: np.ndarray, cord_paths: np.ndarray, seen: n
     return spec
 
 
-def statics(body: SoftBody) -> SoftStatics:
-    return SoftStatics(body)
-
-
-def dynamics(body: SoftBody) -> SoftDynamics:
-    return SoftDynamics(body)
-
-
-def figure(body: SoftBody) -> SoftFigure:
-    return SoftFigure(body)
-
-
 def silicone(body: SoftBody) -> SoftBody:
     return body
 
 
+statics, dynamics, figure = SoftStatics, SoftDynamics, SoftFigure
 chain = hand = None

@@ -1,7 +1,5 @@
 """Schema of family "soft", in the order of the signal: body, silicone, tendons, sensors, markers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Rows of the SMA springs that pull a robot's tendons; a file has all of them or none."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from twin.body.spring import SPRING_PREFIX, SPRING_UNITS

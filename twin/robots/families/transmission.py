@@ -4,8 +4,6 @@ In MuJoCo the jaw is one hinge with a pulley. Each tendon runs along the shaft a
 its moment arm is the pulley's radius from -90 to +90 deg. Each tendon has a motor, ctrl = tension (N) at the pulley.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -136,9 +134,5 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
     )
 
 
-def statics(body: Jaw) -> Antagonists:
-    return Antagonists(body)
-
-
-dynamics = None  # statics only
+statics, dynamics = Antagonists, None  # statics only
 figure = chain = silicone = hand = None

@@ -1,7 +1,5 @@
 """Schema of family "transmission"."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal
 

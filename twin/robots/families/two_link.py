@@ -10,8 +10,6 @@ T_ij is the tension of tendon i beyond joint j, z_il the slip state of `tendon_f
 a_i sum_{m>=l} r_m q_m. Source: statics of an open chain; capstan law as in `twin.effects.tendon_friction`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -296,9 +294,5 @@ class Statics:
         )  # fmt: skip
 
 
-def statics(body: Finger) -> Statics:
-    return Statics(body)
-
-
-dynamics = None  # statics only: its first mode is some 5 Hz, and it is for slow logs
+statics, dynamics = Statics, None  # statics only: its first mode is some 5 Hz, and it is for slow logs
 figure = chain = silicone = hand = None

@@ -10,8 +10,6 @@
 Every step is smooth and small; `tools/benchmarks/shape/error.py` compares it with a black-box search over all numbers at once.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

@@ -11,8 +11,6 @@ from the training pushes. This holds for the contact of the alignment. A contact
 may hold the finger in ways that no training push does; its band is widened by UNKNOWN_CONTACT_WIDENING.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -10,8 +10,6 @@ point at s_p beyond the rim has probability Phi(-s_p / sigma), and every metre t
 Gauss-Newton steps, correspondences found again in each.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import log_ndtr
 

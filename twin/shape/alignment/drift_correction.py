@@ -10,8 +10,6 @@ line in time, before the first and after the last it stays. A twin with an effec
 strains are those of the finger as described.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Write an alignment to disk: the twin, and a report as text and as JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

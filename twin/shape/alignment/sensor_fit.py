@@ -6,8 +6,6 @@ C couples the sensors: of a shape seen from one side the length is known worst, 
 uses their differences there, and all of them where tendons of known length give the shape.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

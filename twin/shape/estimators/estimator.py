@@ -3,8 +3,6 @@
 A new estimator is one module in this folder with one subclass of `Estimator`; it is found by its file's name.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pkgutil

@@ -1,7 +1,5 @@
 """Inputs of learned estimators: strains, which of them are there, tendon displacements, and whether something may press."""
 
-from __future__ import annotations
-
 import numpy as np
 
 STRAIN_SCALE, DISPLACEMENT_SCALE = 0.04, 5e-3  # strain, and m, that count as one

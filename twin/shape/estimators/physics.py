@@ -16,8 +16,6 @@ show no push, and widens with the push. p(s) is that of the training pushes: fla
 s^-STRENGTH_DECAY beyond.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

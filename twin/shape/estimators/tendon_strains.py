@@ -6,8 +6,6 @@ The network is trained on free motions beside the estimator of `modal.py`, in wh
 out further and nothing moves, so each sample is also shown with some of its slack tendons longer.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

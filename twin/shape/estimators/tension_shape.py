@@ -11,8 +11,6 @@ first) and displacements d:
 Without displacements P stays, and the error bar is that of the uncertain numbers and the load cells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Weights of learned estimators: arrays in an npz file without pickle, and the perceptron that they make."""
 
-from __future__ import annotations
-
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence

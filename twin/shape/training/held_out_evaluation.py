@@ -4,8 +4,6 @@ The band is set on fingers that the network was not trained on, pushed and free 
 by point (errors of mode coordinates cancel at one point and add up at another), so that it holds 90 % of the points.
 """
 
-from __future__ import annotations
-
 import platform
 from dataclasses import dataclass
 from importlib.metadata import version

@@ -4,8 +4,6 @@ Every chain of samples is a finger of its own, with its own E; one chain in ten 
 errors that sensors and their alignment have, anew at each use of a sample.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

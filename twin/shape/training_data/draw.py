@@ -11,8 +11,6 @@ and motors bend by up to some 60 degrees):
     numbers    the robot's uncertain ones (E, phi, R0, kappa) normal with their std, inside their bounds
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

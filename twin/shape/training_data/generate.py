@@ -1,8 +1,6 @@
 """Generate shards in several processes, each from its own seeds, so that the number of processes and interruptions change
 nothing."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

@@ -10,8 +10,6 @@ Columns (SI; the finger's own frame, which `parameter_mounting.angle` turns agai
     parameter_NAME    uncertain numbers of the finger
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Solve the equilibria of a chain, every sample from the one before."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 "tendons.azimuth = 2 deg"     every tendon by a normal draw of its own
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

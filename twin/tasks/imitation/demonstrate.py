@@ -4,8 +4,6 @@ Every attempt has its own random stream, by the seed and its number; attempts ar
 those are stored; the outcomes of all are in `meta/attempts.json`. An interrupted order resumes to the same files.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Callable

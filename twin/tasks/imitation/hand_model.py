@@ -4,8 +4,6 @@ A hand's shape is z (f, k) m: for each finger the coordinates of the estimator's
 finger's mounting angle, so that equal shapes in the palm have equal coordinates at any angle of clamping.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

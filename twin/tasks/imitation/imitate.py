@@ -8,8 +8,6 @@ carry no forces, and a finger at its demonstrated contact position does not pres
 Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078) learns a diffusion policy.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress

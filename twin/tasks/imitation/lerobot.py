@@ -12,8 +12,6 @@ frame.
 Source: huggingface/lerobot, `datasets/io_utils.py` and `dataset_writer.py`.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

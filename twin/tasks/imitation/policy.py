@@ -12,8 +12,6 @@ Sources: Chi et al. 2023 (diffusion policy, arXiv 2303.04137), Song et al. 2021 
 by `diffusers`; sizes are ours.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import cast
 

@@ -8,8 +8,6 @@ hand hung before the trial, followed by strain tracking with the twin as describ
 alignment, strains need none: this is the difference in information between the two.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 import numpy as np

@@ -9,8 +9,6 @@ between minus and plus `drift`. Before a trial the fingers bend and straighten i
 Source: KineSoft (Yoo et al. 2025, arXiv 2503.01078), and `twin/effects/sensor_drift.py`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Map values to colours, and draw the labelled colour bar."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.body.drawable import ColourScale

@@ -1,7 +1,5 @@
 """Recorded task trials as they are drawn: the fingers of the hand and the things around it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path

@@ -3,8 +3,6 @@
 Films are GIF, which Pillow (installed with viser) writes; MP4 would need ffmpeg.
 """
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Sequence

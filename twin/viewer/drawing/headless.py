@@ -1,7 +1,5 @@
 """Take a film of a replay without a window, in headless Chromium."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

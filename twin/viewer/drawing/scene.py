@@ -3,8 +3,6 @@
 mjviser is not used: it draws no flex and gives a tendon one colour.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rigid things as meshes, from the spheres, cylinders and boxes that MuJoCo steps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

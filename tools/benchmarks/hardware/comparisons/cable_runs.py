@@ -5,8 +5,6 @@ showed (`MAKE`); nothing is chosen on the runs judged. The bars are held against
 squares on the same runs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

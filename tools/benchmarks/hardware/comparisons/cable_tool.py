@@ -4,8 +4,6 @@ The bars are held against the calibrated linear transmission, a = a_0 + ratio q 
 twin's own calibrated robot, which has elastic tendons already, is told beside it.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

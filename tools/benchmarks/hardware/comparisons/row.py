@@ -1,7 +1,5 @@
 """One line of the table of bars."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from twin.diagnosis import Settings

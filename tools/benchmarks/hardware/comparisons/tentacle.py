@@ -1,7 +1,5 @@
 """The soft tentacle: leave one hold out, single tendons against both, and the learned remainder."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

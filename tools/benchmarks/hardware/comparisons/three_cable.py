@@ -1,8 +1,6 @@
 """The three-cable robot: alternate sweeps of one block fitted; the other sweeps of that block and the other block tested; and what
 was fitted to the first three quarters of the experiment, on the last one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations

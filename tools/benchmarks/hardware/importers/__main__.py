@@ -1,7 +1,5 @@
 """Write raw data of a published rig as a measurement set:  python -m tools.benchmarks.hardware.importers RIG RAW_FOLDER OUT"""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Literal

@@ -5,8 +5,6 @@ the load's torque keep the sign of their own sensor; the input's cell reads the 
 speed is the power that goes in. It is context: most of it is friction before the tendons, in the bearings of motor and drum.
 """
 
-from __future__ import annotations
-
 import gzip
 from dataclasses import replace
 from pathlib import Path

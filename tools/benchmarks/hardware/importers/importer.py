@@ -1,7 +1,5 @@
 """What importers share: an account of every sample left out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 

@@ -12,8 +12,6 @@ the second are markers 5 to 8.
 Base frame: diag(1, -1, -1) of the authors' robot frame, which is R (p - (base marker + o)).
 """
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

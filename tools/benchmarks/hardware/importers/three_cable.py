@@ -9,8 +9,6 @@ Far to one side, and near the other edge, the camera has two answers for one pos
 them. Nothing in a row says which answer it is, so that a sweep ends before its first such jump.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Train a baseline: python -m tools.benchmarks.shape.baselines folding --data shapes/ --epochs 30 --out folding.npz"""
 
-from __future__ import annotations
-
 import tyro
 
 import tools.benchmarks.shape.baselines  # noqa: F401  # adds the baselines to the estimators

@@ -6,8 +6,6 @@
 tendons, and has no parameter to train.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.prediction.twin import Twin

@@ -66,14 +66,18 @@ class FoldingEstimator(LearnedEstimator):
         return Path(__file__).parent / "weights" / f"{cls.name()}.npz"
 
     def decode(self, felt: SensorReadings) -> tuple[np.ndarray, np.ndarray]:
+        moved = self.folded(felt)
+        moved[:, self.points.rest[:, 2] <= self.body.cone.clamp] = 0.0
+        share, rest = self.arrays["error"]
+        return moved, np.hypot(share * np.linalg.norm(moved, axis=2), rest)
+
+    def folded(self, felt: SensorReadings) -> np.ndarray:
+        """Return displacements (n, P, 3) m of the points as the network has them, the clamped ones too."""
         code, first, second = (unpack_layers(name, self.arrays) for name in ("code", "first", "second"))
         x = history_features(felt.strain, previous_strains(felt.strain, felt.follows, ROWS_BACK), felt.displacement, felt.pushed)
         c = perceptron(x, code, relu)
         place = np.broadcast_to(self.points.rest / PLACE_SCALE, (len(c), *self.points.rest.shape))
-        moved = POINT_DISPLACEMENT_SCALE * _fold(c, _fold(c, place, first), second)
-        moved[:, self.points.rest[:, 2] <= self.body.cone.clamp] = 0.0
-        share, rest = self.arrays["error"]
-        return moved, np.hypot(share * np.linalg.norm(moved, axis=2), rest)
+        return POINT_DISPLACEMENT_SCALE * _fold(c, _fold(c, place, first), second)
 
     @classmethod
     def training_spec(cls, data: TrainingSamples) -> TrainingSpec:

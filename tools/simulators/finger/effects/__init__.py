@@ -1,7 +1,5 @@
 """What a real finger's bench has and the description has not; laws by where they act, found by their `id`."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 

@@ -1,7 +1,5 @@
 """What a real bench has and the robot's description has not; laws by where they act, found by their `id`."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 

@@ -1,7 +1,5 @@
 """Effects between a command and what reaches the tendon or the log: lag, delay, saturation, backlash, an eccentric drum."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

@@ -4,8 +4,6 @@ Every place has a default that changes nothing; an effect overrides the one wher
 when an effect is made as large as a day wants it; the others stay as drawn.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
 

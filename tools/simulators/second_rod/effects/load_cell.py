@@ -1,7 +1,5 @@
 """Effects in the load cells: the tension logged is not the tension."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

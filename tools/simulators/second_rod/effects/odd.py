@@ -1,7 +1,5 @@
 """Effects no catalogue has: a diagnosis should say that something is left, and not put a known name to it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Effects around the robot: a tilted base, a weight, an obstacle, a camera that looks from elsewhere."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, Self
 

@@ -1,7 +1,5 @@
 """Effects in the tendons: friction in the holes, holes elsewhere, stretch."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Self
 

@@ -12,8 +12,6 @@ clouds.py     point clouds in another unit, or away from their markers
 description.py  robot.toml off by a thousand
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np

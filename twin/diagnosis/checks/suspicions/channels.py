@@ -1,7 +1,5 @@
 """Single channels: dead ones, declared noise that cannot be, a room nobody works in."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Point clouds: in another unit than metres, of another body, and away from the markers of the same instant."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

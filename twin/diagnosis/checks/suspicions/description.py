@@ -1,7 +1,5 @@
 """The description: a length or a modulus of robot.toml that is off by a thousand."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

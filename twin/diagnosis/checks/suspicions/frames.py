@@ -1,7 +1,5 @@
 """The markers' frame: mirrored, turned by a quarter or a half, shifted by centimetres."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

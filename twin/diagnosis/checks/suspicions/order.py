@@ -1,7 +1,5 @@
 """Order: tendons or markers exchanged."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Signs and directions: displacements paid out for pulled in, readings negated, gravity that points elsewhere or counts in g."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Trials: the same one twice, one of another robot, clocks that overlap, times that are not seconds."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 

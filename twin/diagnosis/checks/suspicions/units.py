@@ -1,7 +1,5 @@
 """Units: readings, commands and payloads that fit if their numbers are in another unit than the file says."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

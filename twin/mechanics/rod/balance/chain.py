@@ -12,8 +12,6 @@ turning hinge j <= i turns n_i with it. A slide moves along its a_i and turns no
 segment.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

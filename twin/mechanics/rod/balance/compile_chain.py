@@ -1,7 +1,5 @@
 """The chain's arrays, from a compiled MuJoCo model of a hinge chain."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import mujoco

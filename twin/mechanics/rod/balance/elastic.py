@@ -19,8 +19,6 @@ Where tendons run in channels of the body it cannot bow away from them. Neither 
 (hyperelastic.py).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.foundation.compiled import jit_internal

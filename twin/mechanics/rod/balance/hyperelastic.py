@@ -20,8 +20,6 @@ to first order in bending, as A is. A body may be neo-Hookean in part: `stiffeni
 law with a constant section, 1 the one above.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ Newton's method solves shape and tensions at once: dpath_i/dT_j = -A_i J^-1 B_j 
 tangent of the force balance. Which tendons are taut is found on the linear problem.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

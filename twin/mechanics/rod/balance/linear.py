@@ -3,8 +3,6 @@
 The transpose is factorised, A' = L U. Solving A x = b, U' L' x = b, then goes along rows of the stored factors.
 """
 
-from __future__ import annotations
-
 from twin.foundation.compiled import jit_internal
 
 PIVOT_BLOCK = 4  # pivots eliminated together, so that each remaining row is read once for four of them

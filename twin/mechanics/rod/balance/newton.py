@@ -8,8 +8,6 @@ Where Newton fails (a saddle, a fold, a jump), the overdamped motion K q' = -dE/
 committing the slip states of friction at each, until a stable equilibrium is reached.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -15,8 +15,6 @@ shrunk, z = clip(z + change of the path / crossing travel). In between only k = 
 it, and gap = (Y - T)/(slope k).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ kept in the material frame, so that it turns with the body.
 Source: Simo (1987), on a fully three-dimensional finite-strain viscoelastic damage model.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.effects.backbone_creep import delayed_strain

@@ -5,8 +5,6 @@ is Rayleigh's coefficient. Nodes are numbered by height and a cell reaches over 
 within that band.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

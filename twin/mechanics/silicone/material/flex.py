@@ -4,8 +4,6 @@ MuJoCo's own grid of cells is even; here its nodes are moved to those of the lat
 elasticity of its own: forces and damping are those of `stepping.py`.
 """
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from scipy.spatial import KDTree

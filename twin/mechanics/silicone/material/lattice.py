@@ -4,8 +4,6 @@ The cells fill the bounding box of the cone from its clamp to its tip; the clamp
 in z and in r^2 and equal angles, exact for polynomials over a slice of the cone. SI.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 

@@ -9,8 +9,6 @@ state, in which fibres along z may be longer or shorter than drawn, by g: F = (1
 Source: Simo, Taylor and Pister (1985), variational methods for the volume constraint in finite deformation elasto-plasticity.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -13,8 +13,6 @@ a convex function; Newton's method with an exact line search finds them.
 Source: MuJoCo's documentation, Computation, "Constraint model"; Todorov (2014), convex and analytically-invertible dynamics.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

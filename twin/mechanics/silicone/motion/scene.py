@@ -4,8 +4,6 @@ A servo drives a pair of antagonist tendons: it winds the first in by as much as
 things touch each other and the table; fingers do not touch each other. Forces on the skin stand for a person's hand.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ A tendon under a given tension is a force of that size; a held one is a stiff sp
 the travel from step to step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Rigid things that a hand touches, and their poses in MuJoCo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

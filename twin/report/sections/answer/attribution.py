@@ -1,7 +1,5 @@
 """Other explanations: runners-up, explanations that these data cannot distinguish, effects too small to claim."""
 
-from __future__ import annotations
-
 from twin.diagnosis import Claim
 from twin.foundation.display_names import display_name
 from twin.report.numbers import DISPLAY_UNITS, format_column, format_percent, format_with_error

@@ -1,7 +1,5 @@
 """The error on held-out trials: as described, calibrated, with the effects; and the noise floor."""
 
-from __future__ import annotations
-
 import plotly.graph_objects as go
 
 from twin.diagnosis import Diagnosis

@@ -1,7 +1,5 @@
 """The missing effects: parameters, probability, and the error without each."""
 
-from __future__ import annotations
-
 import sys
 
 from twin.diagnosis import Claim

@@ -1,7 +1,5 @@
 """The remaining error in words, and what its smooth part varies with."""
 
-from __future__ import annotations
-
 from twin.diagnosis.evidence.discrepancy import IN_WORDS
 from twin.report.numbers import format_column
 from twin.report.sections.section import Section, Story

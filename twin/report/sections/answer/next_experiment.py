@@ -1,7 +1,5 @@
 """The trial that would best decide between the explanations."""
 
-from __future__ import annotations
-
 from twin.report.contents import describe_experiment
 from twin.report.sections.section import Section, Story
 

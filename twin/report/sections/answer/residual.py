@@ -1,7 +1,5 @@
 """The residual against the variable that shows the effect, before and after side by side."""
 
-from __future__ import annotations
-
 import numpy as np
 import plotly.graph_objects as go
 

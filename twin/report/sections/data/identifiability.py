@@ -1,7 +1,5 @@
 """Identifiability: the effects that the design can show and distinguish, and the data missing for the others."""
 
-from __future__ import annotations
-
 import math
 
 from twin.diagnosis.checks.identifiability import Visibility

@@ -1,7 +1,5 @@
 """Loops of pull and release, a row for each trial."""
 
-from __future__ import annotations
-
 from twin.report.numbers import DISPLAY_UNITS, format_number
 from twin.report.plots import loop_widths, strain_loops
 from twin.report.plots.loops import describe_loops

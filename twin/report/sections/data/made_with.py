@@ -1,7 +1,5 @@
 """The origin of the report: data, command, settings, versions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

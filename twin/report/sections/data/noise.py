@@ -1,7 +1,5 @@
 """The noise: of each kind of output and of the input readings, its correlation in time, and its origin."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.foundation.display_names import display_name

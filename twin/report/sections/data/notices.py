@@ -1,7 +1,5 @@
 """Notices about the data in plain words."""
 
-from __future__ import annotations
-
 from twin.report.hand_check import all_notices
 from twin.report.sections.section import Section, Story
 

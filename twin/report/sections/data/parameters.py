@@ -1,7 +1,5 @@
 """The calibrated parameters of the robot and of its declared effects beside their description, and those not determined."""
 
-from __future__ import annotations
-
 from twin.report.numbers import NO_NUMBER, decimals_for_error, everyday_unit, format_number, in_everyday_unit
 from twin.report.sections.section import Section, Story
 

@@ -1,7 +1,5 @@
 """Measured and predicted shapes of a few poses of held-out trials, in 3-D with equal axes."""
 
-from __future__ import annotations
-
 import numpy as np
 import plotly.graph_objects as go
 

@@ -1,7 +1,5 @@
 """One held-out trial over time: the tip as measured and predicted, and the error."""
 
-from __future__ import annotations
-
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots

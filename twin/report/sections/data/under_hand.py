@@ -1,7 +1,5 @@
 """Sensors under a hand compared with the measured shapes, a row for each sensor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from twin.report.hand_check import hand_check

@@ -1,11 +1,4 @@
-"""Write models/README.md, the reference of the three files people write, from the schemas that check them.
-
-python -m tools.reference
-"""
-
-from __future__ import annotations
-
-from pathlib import Path
+"""The reference of the three files people write, from the schemas that check them: a page of the documentation site."""
 
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -21,12 +14,8 @@ from twin.robots.family import family_names, load_family
 from twin.robots.robot import RobotFile
 from twin.robots.schema import BOUND_STDS, Row, Schema
 
-PAGE = Path(__file__).resolve().parent.parent / "models" / "README.md"
-
 HEAD = """\
-# What the files say
-
-Made by `python -m tools.reference` from the schemas that check the files; do not edit it.
+# Reference of the files
 
 Anything that is not on this page is refused; one message lists all faults. `twin new NAME --family FAMILY` writes a folder to
 begin with, `twin robots FOLDER` draws it. A robot that ships with the twin goes by its name, another by the path to its folder:
@@ -35,11 +24,6 @@ relative to the working folder on the command line, relative to the file's folde
 Units may be any of the right dimension ("mm", "inch"; an angle needs an angle's unit, temperatures may be in degC or degF).
 Values are numbers, not text; `true` is no number.
 """
-
-
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(page(), "utf-8")
 
 
 def page() -> str:
@@ -141,7 +125,3 @@ def _what(field: FieldInfo) -> str:
     low = next((m.ge for m in field.metadata if hasattr(m, "ge")), None)
     high = next((m.le for m in field.metadata if hasattr(m, "le")), None)
     return word + (f", {low} to {high}" if low is not None else "")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """A policy that brings the tip of a twin's robot to a goal, trained with Stable-Baselines3 (extra `policy`) in a minute or two.
 
-    python -m tools.benchmarks.tasks.policy.reach report/ policy.zip [--blind] [--randomise] [--seed 0]
+    python -m tools.benchmarks.tasks.reach_policy report/ policy.zip [--blind] [--randomise] [--seed 0]
 
 It is told what load cells and a tip camera read, with their noise, what it commands, and the goal; `--blind` takes the camera away.
 An episode is 20 moves of 0.2 s, the robot at rest after each. Prints the share of fresh goals within 3 mm at an episode's end.
@@ -8,7 +8,7 @@ An episode is 20 moves of 0.2 s, the robot at rest after each. Prints the share 
 
 from __future__ import annotations
 
-import argparse
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
+import tyro
 
 from twin.env.continuum import ContinuumReach
 from twin.foundation.errors import TwinError
@@ -89,12 +90,11 @@ def acting(model: SAC) -> Act:
     return lambda seen: model.predict(seen, deterministic=True)[0]
 
 
-def distances(env: gymnasium.Env, act: Act, episodes: int, begin: Callable[[], None] = lambda: None) -> list[float]:
+def distances(env: gymnasium.Env, act: Act, episodes: int) -> list[float]:
     """From the tip to the goal (m) at the end of each of as many fresh episodes; infinite where the motion was lost."""
     found = []
     for k in range(episodes):
         seen, _ = env.reset(seed=TEST_SEED + k)
-        begin()
         ended, info = False, {}
         while not ended:
             seen, _, lost, out, info = env.step(act(seen))
@@ -103,34 +103,37 @@ def distances(env: gymnasium.Env, act: Act, episodes: int, begin: Callable[[], N
     return found
 
 
-def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("twin", help="a twin.toml, a report's folder or a robot's name")
-    asked.add_argument("out", type=Path, help="the policy, as Stable-Baselines3 keeps it")
-    asked.add_argument("--blind", action="store_true")
-    asked.add_argument("--randomise", action="store_true", help="draw each episode's twin from the diagnosis's own uncertainty")
-    asked.add_argument("--seed", type=int, default=0)
-    asked.add_argument("--steps", type=int, default=TRAINING_STEPS)
-    said = asked.parse_args()
-    try:
-        learn(said)
-    except TwinError as fault:
-        asked.error(str(fault))
+def main(
+    twin: tyro.conf.Positional[str],
+    out: tyro.conf.Positional[Path],
+    blind: bool = False,
+    randomise: bool = False,
+    seed: int = 0,
+    steps: int = TRAINING_STEPS,
+) -> None:
+    """Train a policy and keep it.
 
-
-def learn(said: argparse.Namespace) -> None:
-    """Train as asked, and keep the policy."""
-    began, trial = time.perf_counter(), task(said.twin, said.blind)
+    Args:
+        twin: a twin.toml, a report's folder or a robot's name
+        out: the policy, as Stable-Baselines3 keeps it
+        blind: without the tip camera
+        randomise: draw each episode's twin from the diagnosis's own uncertainty
+        seed: of the training
+        steps: of the training
+    """
 
     def look(step: int, act: Act) -> None:
         near = np.array(distances(trial, act, 50))
         took = time.perf_counter() - began
         print(f"{took:5.1f} s, step {step}: {100 * np.mean(near < 3e-3):.0f} % within 3 mm, median {1e3 * np.median(near):.2f} mm")
 
-    model = train(task(said.twin, said.blind, said.randomise), said.seed, said.steps, look)
-    model.save(said.out)
-    print(said.out)
+    try:
+        began, trial = time.perf_counter(), task(twin, blind)
+        train(task(twin, blind, randomise), seed, steps, look).save(out)
+    except TwinError as fault:
+        sys.exit(str(fault))
+    print(out)
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

@@ -1,1 +1,0 @@
-"""Policies trained on twins and tried on the bench robot, which shares no physics with them."""
