@@ -31,6 +31,9 @@ from twin.robots import Robot
 DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end of it, it stands there
+# The same of motion. Where a joint comes to rest by friction jumps by some hundredths of a sigma with any change of any number: half a
+# step moves predictions by about a sigma, and bends little.
+MOTION_DIFFERENCE = 0.5
 MOST_RENEWALS = 2  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
 LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 MOST_FIT_STEPS = 12  # at most, of a fit
@@ -121,7 +124,7 @@ class Objective:
     @property
     def bends(self) -> bool:
         """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
-        return Drive.CONTROL in self.prepared.drives
+        return Drive.CONTROL in getattr(self.prepared, "drives", ())
 
     def smallest_fall(self, fall: float) -> float:
         """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
@@ -202,11 +205,11 @@ class Objective:
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
         """dz/dx (n, len(which)) for the listed free parameters, x in steps."""
-        x = at.model.vector()
+        x, difference = at.model.vector(), MOTION_DIFFERENCE if self.bends else PARAMETER_DIFFERENCE
         neighbours = []
         for i in which:
             p = at.model.free[i].parameter
-            size = PARAMETER_DIFFERENCE if (x[i] + PARAMETER_DIFFERENCE) * p.step <= p.high else -PARAMETER_DIFFERENCE
+            size = difference if (x[i] + difference) * p.step <= p.high else -difference
             moved = x.copy()
             moved[i] += size
             neighbours.append((at.model.at(moved), size))
