@@ -31,7 +31,7 @@ from twin.robots import Robot
 DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end of it, it stands there
-# The same of motion. Where a joint comes to rest by friction jumps by some hundredths of a sigma with any change of any number: half a
+# The same of motion. Where a joint comes to rest by friction jumps by hundredths of a sigma with any change of any number; half a
 # step moves predictions by about a sigma, and bends little.
 MOTION_DIFFERENCE = 0.5
 MOST_RENEWALS = 2  # of the derivatives for the robot's own parameters in a fit of motion, where they bend

@@ -104,6 +104,7 @@ class ModelSolver:
             model.opt.gravity[:] = loads.gravity
             if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):  # has no step in two halves
                 model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+            model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # what diverges is not begun again unseen
             data = mujoco.MjData(model)
             mujoco.mj_setConst(model, data)
             if len(self._compiled) >= MOST_LOADED_MODELS:
