@@ -34,7 +34,9 @@ AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end of it, it stan
 # The same of motion. Where a joint comes to rest by friction jumps by hundredths of a sigma with any change of any number; half a
 # step moves predictions by about a sigma, and bends little.
 MOTION_DIFFERENCE = 0.5
-MOST_RENEWALS = 2  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
+SLOW_FALL_SHARE = 0.5  # of the fall that derivatives foretold: where less came of motion, they are renewed
+MOST_MOTION_STEPS = 24  # at most, of a fit of motion
+MOST_RENEWALS = 3  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
 LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 MOST_FIT_STEPS = 12  # at most, of a fit
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives foretold: where as much came, steps may be longer (Marquardt, Fletcher)
@@ -356,7 +358,7 @@ def fit(
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping, own, moved = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
-    for left in range(MOST_FIT_STEPS - 1, -1, -1):
+    for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
         H, g = penalty.normal_equations(x, columns, at.z)
@@ -375,8 +377,11 @@ def fit(
                 damping = max(0.1 * damping, 1e-6)
             if now - left * fall > stop.beat:
                 break
-        if better is None or fall < enough:
+        slow = objective.bends and fall < SLOW_FALL_SHARE * foretold
+        if better is None or fall < enough or slow:
             if not (renewals and moved and left):
+                if slow and better is not None and fall >= enough:
+                    continue
                 break
             columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
     if refresh:
