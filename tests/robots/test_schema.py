@@ -203,7 +203,7 @@ def test_numbers_are_shown_as_written(name: str) -> None:
 
     file = tomllib.loads((models_folder() / name / "robot.toml").read_text("utf-8"))["parameters"]
     for line in file_entries(load(name)):
-        if line.row.name in file:
+        if "value" in file.get(line.row.name, {}):  # left out, it is the number of a model beside the file
             entry = file[line.row.name]
             assert line.unit == entry["unit"]
             values = entry["value"] if isinstance(entry["value"], list) else [entry["value"]]

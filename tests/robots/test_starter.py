@@ -35,7 +35,7 @@ def test_a_new_robot_loads_at_once(family: str, tmp_path: Path) -> None:
     assert np.array_equal(robot.gravity, example.gravity)
     robot.build().spec.compile()
     text = (folder / "robot.toml").read_text()
-    assert all(p.file_unit in text for p in robot.parameters)
+    assert family == "mjcf" or all(p.file_unit in text for p in robot.parameters)  # an MJCF has units of its own
     assert sorted(p.name for p in tmp_path.iterdir()) == ["snake"]  # nothing half-written stays
 
 
