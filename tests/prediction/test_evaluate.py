@@ -85,7 +85,8 @@ SI = {
 @pytest.mark.parametrize("group", OUTPUT_GROUPS)
 def test_every_unit_shown_is_as_large_as_its_definition(group: str) -> None:
     unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
-    assert pint.UnitRegistry().Quantity(1.0, "" if SI[group] == "1" else SI[group]).to("" if unit == "1" else unit).magnitude == pytest.approx(factor, rel=1e-12)
+    si, shown = ("" if u == "1" else u for u in (SI[group], unit))
+    assert pint.UnitRegistry().Quantity(1.0, si).to(shown).magnitude == pytest.approx(factor, rel=1e-12)
 
 
 def test_markers_stand_for_the_twin_wherever_there_are_any() -> None:
