@@ -20,7 +20,9 @@ from twin.robots import Family, Robot, family_names, load, load_family, robot_na
 # Every robot that ships: a family without one fails below.
 robots = pytest.mark.parametrize("name", robot_names())
 N = 40
-SMALL = {Drive.TENSION: 1.0, Drive.DISPLACEMENT: 1e-3, Drive.CURRENT: 0.5}  # N, m, A: what every robot here can take
+SMALL = {
+    Drive.TENSION: 1.0, Drive.DISPLACEMENT: 1e-3, Drive.CURRENT: 0.5, Drive.CONTROL: 2e-3,
+}  # fmt: skip  # N, m, A, m or rad: what every robot here can take
 
 
 def through(robot: Robot) -> tuple[Body, tuple[Drive, ...], np.ndarray]:
@@ -51,10 +53,11 @@ def test_its_ports_are_channels_of_the_contract(name: str) -> None:
     for ports in body.ports:
         for port in ports:
             assert len(port.tendon_gains) == body.n_tendon
-            assert Channel(port.channel, "input", units[port.channel.rpartition("_")[2]]).kind
+            unit = "m" if port.drive is Drive.CONTROL else units[port.channel.rpartition("_")[2]]
+            assert Channel(port.channel, "input", unit).kind
     units |= {"marker": "m", "temperature": "K", "resistance": "ohm", "sensor": "ohm"}
     for channel, sense in body.senses.items():
-        assert Channel(channel, "output", units[sense.group]).kind, channel
+        assert Channel(channel, "output", sense.unit or units[sense.group]).kind, channel
     for channel, field in body.load_channels.items():
         assert Channel(channel, "input", units[channel.rpartition("_")[2]]).kind
         assert field in Loads.__dataclass_fields__
@@ -174,7 +177,7 @@ def of_families() -> set[str]:
 
 def told_apart(tree: ast.Module, classes: set[str]) -> Iterator[int]:
     """Lines that ask which family a body is of: by its class, by the family's name or by the family's own module."""
-    modules = {f"twin.robots.families.{name}{end}" for name in family_names() for end in ("", "_schema")}
+    modules = {f"twin.robots.{part}.{name}" for name in family_names() for part in ("families", "schemas")}
     for node in ast.walk(tree):
         named: set[str] = set()
         match node:
@@ -212,7 +215,7 @@ def test_outside_a_family_nobody_asks_which_it_is() -> None:
         "assert isinstance(body, SoftBody)",
         "solver = cast('Equilibrium', solver)",
         "if robot.family != 'hand': pass",
-        "from twin.robots.families.hand_schema import Hand",
+        "from twin.robots.schemas.hand import Hand",
         "from twin.robots.families import continuum",
     ],
 )

@@ -29,6 +29,7 @@ FIXED = {
     "sma_hysteresis", "sma_cooling", "backbone_creep", "backbone_precurvature", "stiffness_asymmetry", "stiffness_gradient",
     "temperature_softening", "base_tilt", "camera_misalignment", "tip_payload", "contact", "load_cell_gain", "load_cell_bias",
     "load_cell_drift", "load_cell_crosstalk", "sensor_gain", "sensor_drift", "sensor_hysteresis",
+    "drive_zero", "load_dependent_friction", "reflected_inertia", "actuator_gain", "joint_stiffness", "encoder_offset",
 }  # fmt: skip
 NEW = {
     "backbone_ageing",
@@ -92,7 +93,35 @@ def turned(name: str, start: float, torque: float) -> Trial:
     return Trial(name, np.linspace(0.0, 20.0, n), values, start=start)
 
 
+LEG = (
+    Channel("actuator.hip_servo.ctrl", "input", "rad"), Channel("actuator.knee_winch.ctrl", "input", "m"),
+    *(Channel(f"joint.{joint}.position", "output", "rad", 1e-3) for joint in ("hip", "knee")),
+    *(Channel(f"site.foot_tip.{a}", "output", "m", 2e-4) for a in "xz"),
+)  # fmt: skip
+OF_MODELS = {"load friction", "joints", "controls", "servos", "encoders"}  # features that an MJCF's body alone has
+
+
+def stepped(name: str, start: float, size: float) -> Trial:
+    """A leg that swings and bends twice in two seconds."""
+    n = 101
+    wave = np.sin(4 * np.pi * np.arange(n) / (n - 1))
+    values = {"actuator.hip_servo.ctrl": size * wave, "actuator.knee_winch.ctrl": 0.01 * size * (1.0 + wave)}
+    return Trial(name, np.linspace(0.0, 2.0, n), {c.name: np.zeros(n) for c in LEG} | values, start=start)
+
+
+def is_of_models(law: type[Effect]) -> bool:
+    """Whether it acts on joints, actuators or encoders of an MJCF only."""
+    return bool(law.needs & OF_MODELS)
+
+
+def drives(law: type[Effect]) -> int:
+    """The number of drives of a robot that it acts on; an MJCF's names its joints."""
+    return load("tendon_leg").n_tendon if is_of_models(law) else 3
+
+
 def recording(*trials: Trial) -> Recording:
+    if "actuator.hip_servo.ctrl" in trials[0].values:
+        return Recording("tendon_leg", "conformance", "simulation", None, LEG, trials)
     if "joint_1_angle" in trials[0].values:
         return Recording("cable_tool", "conformance", "simulation", None, JAW, trials)
     felt, heated = "sensor_1_resistance" in trials[0].values, "sma_1_current" in trials[0].values
@@ -102,6 +131,8 @@ def recording(*trials: Trial) -> Recording:
 
 @pytest.fixture
 def two_trials(law: type[Effect]) -> Recording:
+    if is_of_models(law):
+        return recording(stepped("a.csv", 0.0, 0.5), stepped("b.csv", 160.0, 0.3))
     if is_of_sensors(law):
         return recording(bend("a.csv", 0.0, 6e-3), bend("b.csv", 160.0, 4e-3))
     if is_of_antagonists(law):
@@ -117,11 +148,11 @@ def is_of_sensors(law: type[Effect]) -> bool:
 
 def is_of_antagonists(law: type[Effect]) -> bool:
     """Whether it needs two tendons that pull against each other on a joint."""
-    return "antagonists" in law.needs
+    return "friction of joints" in law.needs
 
 
 def is_of_springs(law: type[Effect]) -> bool:
-    return law(n_tendon=3).acts_in("spring")
+    return law(n_tendon=drives(law)).acts_in("spring")
 
 
 def predict(effects: tuple[Effect, ...], data: Recording) -> list[np.ndarray]:
@@ -148,7 +179,7 @@ def test_it_says_what_it_is(law: type[Effect]) -> None:
 
 @laws
 def test_its_parameters_have_units_bounds_and_sources(law: type[Effect]) -> None:
-    declared = law.all_parameters(3)
+    declared = law.all_parameters(drives(law))
     assert declared
     assert len({p.name for p in declared}) == len(declared)
     for p in declared:
@@ -171,13 +202,13 @@ def test_off_is_the_plain_twin(law: type[Effect], two_trials: Recording) -> None
 @laws
 def test_unknown_parameters_and_broken_bounds_are_refused(law: type[Effect]) -> None:
     with pytest.raises(TwinError, match=rf"effect {law.id}.*available"):
-        law({"nonsense": 1.0}, 3)
-    p, problems = law.all_parameters(3)[0], []
+        law({"nonsense": 1.0}, drives(law))
+    p, problems = law.all_parameters(drives(law))[0], []
     with pytest.raises(TwinError, match=rf"effect {law.id}.*allowed"):
-        law({p.name: np.nan}, 3)
+        law({p.name: np.nan}, drives(law))
     # The bounds of a robot's size are those of files that name a robot.
     beyond = {"id": law.id, "parameters": {p.name: p.high + 1.0 + abs(p.high)}}
-    assert read_effects([beyond], 3, Size(), problems) == []
+    assert read_effects([beyond], drives(law), Size(), problems) == []
     assert [f"effect {law.id}" in said and "allowed" in said for said in problems] == [True]
 
 
@@ -216,6 +247,8 @@ def test_it_does_something_where_its_fits_begin(law: type[Effect], two_trials: R
         change = max(np.abs(a - b).max() for a, b in zip(plain, moved, strict=True))
         if is_of_sensors(law):
             assert 0.05 < change < 300.0  # ohm: more than a cord's last digit, less than a third of it
+        elif is_of_models(law):
+            assert 1e-5 < change < 0.5  # rad or m: more than a hundredth of an encoder's count, less than the leg's swing
         elif is_of_antagonists(law):
             assert 1e-3 < change < 0.5  # rad: more than an encoder's count, less than the drum's turn
         else:
@@ -245,7 +278,10 @@ def test_trials_are_independent_but_for_the_clock(law: type[Effect], two_trials:
 
 @laws
 def test_no_nan_at_the_corners_of_its_bounds(law: type[Effect]) -> None:
-    one = bend("a.csv", 0.0, 4e-3) if is_of_sensors(law) else cycle("a.csv", 0.0, 2.0, 0.0, is_of_springs(law))
+    if is_of_models(law):
+        one = stepped("a.csv", 0.0, 0.5)
+    else:
+        one = bend("a.csv", 0.0, 4e-3) if is_of_sensors(law) else cycle("a.csv", 0.0, 2.0, 0.0, is_of_springs(law))
     data = recording(turned("a.csv", 0.0, 0.02) if is_of_antagonists(law) else one)
     n = load(data.robot).n_tendon
     corners = itertools.product(*[(p.low, p.high) for p in law.all_parameters(n)[:4]])
@@ -268,6 +304,8 @@ def test_a_closed_cycle_takes_energy_and_gives_none(law: type[Effect]) -> None:
         pytest.skip("heat drives springs: what a loop of theirs takes is asked in test_sma.py")
     if is_of_sensors(law):
         pytest.skip("a sensor does no work")
+    if is_of_models(law):
+        pytest.skip("a leg in motion holds kinetic energy: friction of a swing is in tests/mechanics/mjcf")
     once = turned("a.csv", 0.0, 0.02) if is_of_antagonists(law) else cycle("a.csv", 0.0, 3.0, 0.0)
     time = np.concatenate([once.time, once.time[-1] + once.time[1:]])
     twice = replace(once, time=time, values={k: np.concatenate([v, v[1:]]) for k, v in once.values.items()})

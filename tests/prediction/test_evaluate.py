@@ -72,13 +72,21 @@ SI = {
     "angle": "rad",
     "torque": "N*m",
     "skin": "m",
+    **{f"joint {of}": unit for of, unit in (("angle", "rad"), ("shift", "m"), ("torque", "N*m"), ("force", "N"))},
+    **{f"actuator {of}": unit for of, unit in (("angle", "rad"), ("length", "m"), ("torque", "N*m"), ("force", "N"))},
+    **{f"{of} rate": "rad/s" for of in ("joint", "actuator")},
+    **{f"{of} speed": "m/s" for of in ("joint", "actuator", "tendon")},
+    "tendon length": "m",
+    "tendon tension": "N",
+    **{group: group[8:-1] for group in OUTPUT_GROUPS if group.startswith("sensor [")},
 }
 
 
 @pytest.mark.parametrize("group", OUTPUT_GROUPS)
 def test_every_unit_shown_is_as_large_as_its_definition(group: str) -> None:
     unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
-    assert pint.UnitRegistry().Quantity(1.0, SI[group]).to(unit).magnitude == pytest.approx(factor, rel=1e-12)
+    si, shown = ("" if u == "1" else u for u in (SI[group], unit))
+    assert pint.UnitRegistry().Quantity(1.0, si).to(shown).magnitude == pytest.approx(factor, rel=1e-12)
 
 
 def test_markers_stand_for_the_twin_wherever_there_are_any() -> None:

@@ -8,10 +8,22 @@ drawable.py      arrays for drawing a body
 """
 
 from twin.body.body import ROPE_FEATURES, Body, Frame, Port, Sense, marker_senses, tendon_ports, tendon_senses
+from twin.body.counts import Counts
 from twin.body.loads import Loads, Push
-from twin.body.route import Bearing, Creep, Route
+from twin.body.route import Bearing, Creep, Route, Rubbing
 from twin.body.signals import Drive, Drives, Signals, drive_mask, interpolate_commands
-from twin.body.solver import BY_CONTINUATION, DIRECT, NOT_FOUND, SOLVE_TOLERANCE, Heating, Problem, Solution, Solver, array_hash
+from twin.body.solver import (
+    BY_CONTINUATION,
+    DIRECT,
+    NOT_FOUND,
+    SOLVE_TOLERANCE,
+    Heating,
+    Problem,
+    Solution,
+    Solver,
+    Start,
+    array_hash,
+)
 
 __all__ = [
     "BY_CONTINUATION",
@@ -21,6 +33,7 @@ __all__ = [
     "SOLVE_TOLERANCE",
     "Bearing",
     "Body",
+    "Counts",
     "Creep",
     "Drive",
     "Drives",
@@ -31,10 +44,12 @@ __all__ = [
     "Problem",
     "Push",
     "Route",
+    "Rubbing",
     "Sense",
     "Signals",
     "Solution",
     "Solver",
+    "Start",
     "array_hash",
     "drive_mask",
     "interpolate_commands",

@@ -27,7 +27,7 @@ class Port:
     One SI unit of it gives each tendon `tendon_gains` (n_tendon,) SI: 1 for the tendon's own tension, m/rad for a drum's angle.
     """
 
-    channel: str
+    channel: str  # what it means, a name of the grammar of channels
     drive: Drive
     tendon_gains: tuple[float, ...]
 
@@ -40,6 +40,7 @@ class Sense:
     index: int
     axis: int = 0
     required_drive: Drive | None = None
+    unit: str = ""  # SI, of a channel that may have one of several
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,12 @@ class Body:
         holes         `move_tendon_holes` works               surface      may touch obstacles
         viscosity     may creep                               skin         compared with clouds (`Problem.seen`)
         hanging zero  lengths count from where it hangs, not from a straight body
+        friction of joints  a joint may rub                    load friction  a gear may rub with its load
+        joints        inertia and stiffness of joints change  servos         strengths of actuators change
+        encoders      joints' angles are read                 start          a trial may start from a pose, and settle
+        controls      actuators' controls drive it
+
+    `payload_places` are the sites and bodies that a declared mass may hang at.
     """
 
     spec: mujoco.MjSpec
@@ -93,6 +100,7 @@ class Body:
     frame: Frame = field(default_factory=Frame)
     tendon_sites: tuple[tuple[str, ...], ...] = ()
     marker_sites: tuple[str, ...] = ()
+    payload_places: frozenset[str] = frozenset()
 
     @property
     def size(self) -> Size:
@@ -121,6 +129,18 @@ class Body:
     def move_tendon_holes(self, tendon: int, angle: float, further: float) -> None:
         """Move all holes of a tendon (from 0) about the axis by `angle` (rad) and away from it by `further` (m)."""
         raise self._unchangeable("tendon holes")
+
+    def add_joint_inertia(self, inertia: np.ndarray) -> None:
+        """Add inertias (n_joint,) kg m^2 or kg to the joints."""
+        raise self._unchangeable("joints")
+
+    def add_joint_stiffness(self, stiffness: np.ndarray) -> None:
+        """Add springs of stiffness (n_joint,) N m/rad or N/m to the joints, at rest where the model's own joint is."""
+        raise self._unchangeable("joints")
+
+    def scale_actuators(self, share: np.ndarray) -> None:
+        """Multiply what each actuator (n_actuator,) delivers, by its share."""
+        raise self._unchangeable("actuators")
 
     def _unchangeable(self, what: str) -> DataError:
         return DataError(f"a body of kind {type(self).__name__} has no {what} to change; remove the effect that changes it")

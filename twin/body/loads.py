@@ -29,4 +29,10 @@ class Loads:
     wall: np.ndarray = field(default_factory=lambda: np.zeros(10))  # (10,), from `twin.effects.contact.obstacle`: a wall or post
     torque: np.ndarray = field(default_factory=lambda: np.zeros(1))  # (n,) or (1,) N m on a jaw's hinge, along its positive angle
     push: Push | None = None
+    payloads: tuple[tuple[str, float], ...] = ()  # kg at sites or bodies of these names
     payload_at_zero: float = 0.0  # kg that hung on silicone when its tendons' lengths were set to zero
+
+    @property
+    def hung(self) -> float:
+        """The mass (kg) of all payloads, wherever they hang."""
+        return self.payload + sum(mass for _, mass in self.payloads)

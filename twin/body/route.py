@@ -1,5 +1,7 @@
 """Properties of tendons between drive and body (friction, stretch, play), and the delayed strain of creep."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,15 +24,45 @@ class Bearing:
 
 
 @dataclass(frozen=True)
+class Rubbing:
+    """Friction of the joints of an MJCF, (n_joint,) each, in N m of a hinge and N of a slide; () is none.
+
+    The friction of joint j is F_j(v) = torque + breakaway exp(-(v / stribeck)^2) + load |load through it|, of either sign, with a
+    pre-sliding turn; viscous friction v `viscous` comes beside it.
+    """
+
+    torque: tuple[float, ...] = ()
+    breakaway: tuple[float, ...] = ()
+    load: tuple[float, ...] = ()  # 1
+    viscous: tuple[float, ...] = ()  # N m s/rad
+    stribeck: float = 0.2  # rad/s
+    presliding: float = 1e-3  # rad
+
+    def beside(self, other: Rubbing) -> Rubbing:
+        """Return the friction of both; rate and pre-sliding are those of the first that has any."""
+
+        def both(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
+            return tuple(x + y for x, y in zip(a, b, strict=True)) if a and b else a or b
+
+        leads = self if any((self.torque, self.load)) else other
+        return Rubbing(
+            both(self.torque, other.torque), both(self.breakaway, other.breakaway), both(self.load, other.load),
+            both(self.viscous, other.viscous), leads.stribeck, leads.presliding,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class Route:
     """The properties of the tendons between drive and body, as the effects in force set them."""
 
     mu: float = 0.0  # friction coefficient
     presliding: float = 4e-4  # m of travel, from sticking to sliding
+    mu_shares: tuple[float, ...] = ()  # of the tendons of an MJCF, in shares of mu; () is 1 for all
     stretch: float = 0.0  # m/N
     bedding: float = 0.0  # m by which a tendon beds in
     bedding_tension: float = 1.0  # N over which it beds in
     bearing: Bearing = field(default_factory=Bearing)
+    rubbing: Rubbing = field(default_factory=Rubbing)
     rest_bend_share: float = 0.0  # of its rest bend that the body had when SMA springs were put on
     stall_tension: float = np.inf  # N at which a motor that holds a tendon at a length gives way
     initial_stretch_share: float = 0.0  # of the stretch under the springs' first tension that was there when they were put on

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
@@ -13,21 +13,26 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 
 class Drive(StrEnum):
-    """The drive of a tendon: by tension (N), by displacement at its motor (m), or by the current (A) of its SMA spring."""
+    """The drive of a tendon: by tension (N), by displacement at its motor (m), or by the current (A) of its SMA spring.
+
+    An actuator of an MJCF is driven by its control, in the unit that its model gives it. Controls are known exactly, and their zero
+    means nothing.
+    """
 
     TENSION = "tension"
     DISPLACEMENT = "displacement"
     CURRENT = "current"
+    CONTROL = "control"
 
     @property
     def display_unit(self) -> tuple[str, float]:
         """The unit shown to people, and its factor from SI."""
-        return {"tension": ("N", 1.0), "displacement": ("mm", 1e3), "current": ("A", 1.0)}[self]
+        return {"tension": ("N", 1.0), "displacement": ("mm", 1e3), "current": ("A", 1.0), "control": ("", 1.0)}[self]
 
     @property
     def typical_noise(self) -> float:
-        """The typical noise of one reading (SI): 10 mN, 20 um, 3 mA."""
-        return {"tension": 0.01, "displacement": 2e-5, "current": 3e-3}[self]
+        """The typical noise of one reading (SI): 10 mN, 20 um, 3 mA; NaN of a control, whose scale is that of its range."""
+        return {"tension": 0.01, "displacement": 2e-5, "current": 3e-3, "control": float("nan")}[self]
 
 
 Drives = tuple[Drive, ...]  # one a tendon
@@ -56,6 +61,7 @@ class Signals:
     antagonists: bool = False  # two tendons pretensioned against each other on a rigid joint
     others: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))  # further groups, (n, n_port) SI
     smooth: bool = False  # commands between rows follow monotone cubics; else straight lines
+    control: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))  # (n, n_tendon), of an MJCF's actuators
 
     @property
     def driven_by_length(self) -> np.ndarray:
@@ -68,9 +74,21 @@ class Signals:
         return drive_mask(self.drives, Drive.CURRENT)
 
     @property
+    def driven_by_control(self) -> np.ndarray:
+        """(n_tendon,) whether the control of an MJCF's actuator drives it."""
+        return drive_mask(self.drives, Drive.CONTROL)
+
+    @property
     def command(self) -> np.ndarray:
         """(n, n_tendon) SI, the quantity that drives each tendon."""
+        if self.driven_by_control.all():
+            return self.control
         return np.where(self.driven_by_length, self.displacement, np.where(self.driven_by_current, self.current, self.tension))
+
+    def with_commands(self, change: Callable[[np.ndarray], np.ndarray], **others: np.ndarray) -> Signals:
+        """Return a copy whose tensions, displacements and controls, where these drive, are `change` of them; `others` replaced."""
+        control = change(self.control) if self.driven_by_control.any() else self.control
+        return replace(self, tension=change(self.tension), displacement=change(self.displacement), control=control, **others)
 
     def with_changes(self, **changes: Any) -> Signals:
         """Return a copy with some fields replaced."""

@@ -36,6 +36,14 @@ class Heating:
 
 
 @dataclass(frozen=True)
+class Start:
+    """How a trial of an MJCF begins: from a keyframe (or, if empty, where its springs and servos rest), held for `settle` s."""
+
+    settle: float = 2.0
+    pose: str = ""
+
+
+@dataclass(frozen=True)
 class Problem:
     """A trial to simulate: commands over time, under loads.
 
@@ -58,6 +66,7 @@ class Problem:
     once: bool = False
     tolerance: float = SOLVE_TOLERANCE
     seen: Patches | None = None  # patches of skin seen by a camera, for a body that predicts them
+    start: Start = field(default_factory=Start)
 
     def drive_mask(self, kind: Drive) -> np.ndarray:
         """Return (n_tendon,) whether each tendon has this kind of drive."""

@@ -41,7 +41,7 @@ def blind(prepared: PreparedRecording, trials: Sequence[int]) -> PreparedRecordi
 
 def _conditions(prepared: PreparedRecording) -> Iterator[set[tuple[Hashable, ...]]]:
     """Yield the conditions that each trial shows, by its inputs and loads only."""
-    tops = np.array([np.abs(i.command).max(axis=0) for i in prepared.inputs])
+    tops = np.array([np.abs(i.pull).max(axis=0) for i in prepared.inputs])
     ranges = {
         "command": tops,
         "torque": np.array([[np.mean(i.loads.torque)] for i in prepared.inputs]),
@@ -50,7 +50,7 @@ def _conditions(prepared: PreparedRecording) -> Iterator[set[tuple[Hashable, ...
     for k, i in enumerate(prepared.inputs):
         moved = pulled(i, float(tops.max()))
         shown: set[tuple[Hashable, ...]] = {
-            ("payload", round(i.loads.payload, 6)),
+            ("payload", round(i.loads.hung, 6)),
             ("mount", *np.round(i.loads.gravity, 3)),
             ("force", *np.round(i.loads.force, 3)),
             ("together", *moved),

@@ -111,11 +111,10 @@ class ActuatorLag(Effect):
 
     def drive(self, command: Signals) -> Signals:
         if self["time"] > 0.0 and len(command.time) > 1:
-            tension, displacement = (self._lagged(command, c) for c in (command.tension, command.displacement))
             current = np.zeros_like(command.current)
             if command.driven_by_current.any():
                 lag_held_current(np.asarray(command.time, float), np.ascontiguousarray(command.current), self["time"], current)
-            return command.with_changes(tension=tension, displacement=displacement, current=current)
+            return command.with_commands(lambda c: self._lagged(command, c), current=current)
         return command
 
     def _lagged(self, signals: Signals, command: np.ndarray) -> np.ndarray:

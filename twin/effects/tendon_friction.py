@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from twin.body import Route, Signals
+from twin.body.counts import of_a_model, tendon_names
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
@@ -31,6 +33,9 @@ class TendonFriction(Effect):
 
     theta_j (rad) is the turn angle of the tendon at inner disk j, z_j in [-1, 1] the slip state there: +1 while the tendon slides
     towards the base (pulling: tension falls along it), -1 while it slides out (releasing: tension rises), in between sticking.
+    A tendon of an MJCF turns at every site and wrapping geom, has its own mu, and z follows Dahl's law as it stands,
+    z' = s + (z - s) exp(-|travel| / presliding), s the direction of travel.
+
     z follows the tendon's travel past the hole, z = clip(z + travel / presliding, -1, 1), so loading and unloading differ. The law
     is independent of the rate: tensions are constant while the robot is at rest.
 
@@ -49,6 +54,7 @@ class TendonFriction(Effect):
         Parameter("mu", 0.0, "1", 0.0, 1.0, "capstan coefficient; CRC handbook: 0.04 (PTFE) to 0.6 (dry metal)", scale=0.05),
         Parameter("presliding", 4e-4, "m", 2e-5, 3e-3, "tendon travel from sticking to sliding; our choice", scale=1e-4),
     )
+    of_models = (Parameter("presliding", 2e-4, "m", 2e-5, 3e-3, "tendon travel from sticking to sliding; our choice", scale=5e-5),)
     inactive_when_off = ("presliding",)
     confusable_with = ("joint_friction",)
     guesses = ({"mu": 0.1},)
@@ -57,12 +63,26 @@ class TendonFriction(Effect):
     hidden_without = frozenset({DataNeed.REVERSALS})
 
     @classmethod
+    def all_parameters(cls, n_tendon: int) -> tuple[Parameter, ...]:
+        """Return the parameters for all tendons, or those of the tendons of an MJCF, mu for each."""
+        if not of_a_model(n_tendon):
+            return super().all_parameters(n_tendon)
+        return (*cls.of_models, *(replace(cls.parameters[0], name=f"mu_{name}") for name in tendon_names(n_tendon)))
+
+    @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
         """Start antagonists with a tenth of the friction: they always pull and turn several times, so that it shows as much."""
-        if any(s.antagonists for s in predicted):
+        if of_a_model(n_tendon):
+            if mu := {f"mu_{name}": 0.05 for name in tendon_names(n_tendon)}:
+                yield FitStart(mu, (*mu, "presliding"))
+        elif any(s.antagonists for s in predicted):
             yield FitStart({"mu": 0.01}, ("mu", "presliding"))
         else:
             yield from super().fit_starts(predicted, n_tendon)
 
     def route(self) -> Route:
+        if of_a_model(self.n_tendon):
+            mu = tuple(self[f"mu_{name}"] for name in tendon_names(self.n_tendon))
+            most = max(mu, default=0.0)
+            return Route(most, self["presliding"], tuple(m / most for m in mu)) if most > 0.0 else Route()
         return Route(self["mu"], self["presliding"])

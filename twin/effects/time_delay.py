@@ -36,8 +36,7 @@ class TimeDelay(Effect):
         if self["delay"] == 0.0 or len(t) < 2:
             return reported
         earlier = np.clip(t - self["delay"], t[0], t[-1])
-        tension, displacement = (interpolate_commands(reported, c)(earlier) for c in (reported.tension, reported.displacement))
-        return reported.with_changes(tension=tension, displacement=displacement, current=self._heating(reported))
+        return reported.with_commands(lambda c: interpolate_commands(reported, c)(earlier), current=self._heating(reported))
 
     def _heating(self, reported: Signals) -> np.ndarray:
         """Return the shifted currents, constant over each row, that heat as much; zero before the log."""

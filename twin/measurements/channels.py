@@ -2,8 +2,12 @@
 
     [finger_N_] tendon_I_(tension|displacement) | sma_I_(current|voltage|temperature|resistance) | ambient_temperature
               | disk_K_(x|y|z) | marker_K_(x|y|z) | tip_(x|y|z) | sensor_I_resistance | joint_I_(angle|torque)
+    on a robot that is an MJCF, NAME being the model's, dots and slashes included:
+    actuator.NAME.(ctrl|position|velocity|force) | joint.NAME.(position|velocity|torque) | tendon.NAME.(length|velocity|tension)
+              | site.NAME.(x|y|z) | sensor.NAME[.K]
 
-Indices count from 1, base to tip, and are written without leading zeros.
+Indices count from 1, base to tip, and are written without leading zeros. A channel whose column has another name says what it is as
+its `quantity`.
 """
 
 import math
@@ -34,16 +38,38 @@ CHANNEL_KINDS: dict[str, tuple[str, str]] = {
     "joint_angle": ("joint_#_angle", "rad"),
     "joint_torque": ("joint_#_torque", "N*m"),
 }
+_ROTARY_OR_LINEAR = ("rad", "m")
+_TURNING_OR_SLIDING = ("rad/s", "m/s")
+_TORQUE_OR_FORCE = ("N*m", "N")
+# quantities of an MJCF's elements: kind -> (pattern with NAME for the element, SI units by the element's own kind)
+ELEMENT_KINDS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "actuator_ctrl": ("actuator.NAME.ctrl", ("1", "rad", "m", "N*m", "N", "rad/s", "m/s", "V", "A")),
+    "actuator_position": ("actuator.NAME.position", _ROTARY_OR_LINEAR),
+    "actuator_velocity": ("actuator.NAME.velocity", _TURNING_OR_SLIDING),
+    "actuator_force": ("actuator.NAME.force", _TORQUE_OR_FORCE),
+    "joint_position": ("joint.NAME.position", _ROTARY_OR_LINEAR),
+    "joint_velocity": ("joint.NAME.velocity", _TURNING_OR_SLIDING),
+    "joint_effort": ("joint.NAME.torque", _TORQUE_OR_FORCE),
+    "tendon_length": ("tendon.NAME.length", ("m", "rad")),
+    "tendon_velocity": ("tendon.NAME.velocity", ("m/s", "rad/s")),
+    "element_tension": ("tendon.NAME.tension", ("N", "N*m")),
+    "site": ("site.NAME.@", ("m",)),
+    "element_sensor": ("sensor.NAME", ("1", "rad", "m", "N*m", "N", "rad/s", "m/s", "m/s^2", "rad/s^2")),
+}
 DERIVED_KINDS: dict[str, tuple[str, str]] = {"skin": ("skin_#", "m")}  # made from point clouds (`patches.py`), not read
 ALLOWED_NAMES = ", ".join(
     pattern.replace("#", "K" if "@" in pattern else "I").replace("@", "x|y|z") for pattern, _ in CHANNEL_KINDS.values()
-) + ", each also as finger_N_..."  # fmt: skip
+) + ", each also as finger_N_...; of an MJCF " + ", ".join(p.replace("@", "x|y|z") for p, _ in ELEMENT_KINDS.values())  # fmt: skip
 _INDEX = "[1-9][0-9]{0,3}"
 _GRAMMAR = {
     kind: re.compile(
         f"(?:finger_(?P<finger>{_INDEX})_)?" + pattern.replace("#", f"(?P<index>{_INDEX})").replace("@", "(?P<axis>[xyz])")
     )
     for kind, (pattern, _) in (CHANNEL_KINDS | DERIVED_KINDS).items()
+}
+_ELEMENT_GRAMMAR = {
+    kind: re.compile(re.escape(pattern).replace("NAME", "(?P<element>.{1,200})").replace("@", "(?P<axis>[xyz])"))
+    for kind, (pattern, _) in ELEMENT_KINDS.items()
 }
 
 
@@ -54,6 +80,7 @@ class ChannelName(NamedTuple):
     index: int | None  # from 1, base to tip; None for the tip and the surroundings
     axis: Axis | None
     finger: int | None  # from 1; None outside a hand
+    element: str | None = None  # of an MJCF
 
 
 @lru_cache(maxsize=4096)
@@ -64,12 +91,24 @@ def parse_channel_name(name: str) -> ChannelName:
             parts = {part: text for part, text in match.groupdict().items() if text}
             index, finger = (int(parts[part]) if part in parts else None for part in ("index", "finger"))
             return ChannelName(kind, index, cast(Axis | None, parts.get("axis")), finger)
+    for kind, grammar in _ELEMENT_GRAMMAR.items():
+        if match := grammar.fullmatch(name):
+            parts = match.groupdict()
+            return ChannelName(kind, None, cast(Axis | None, parts.get("axis")), None, parts["element"])
     raise DataError(f"{short_repr(name)} is no channel name; allowed: {ALLOWED_NAMES} (indices from 1)")
+
+
+def pattern_of(kind: str) -> str:
+    """Return the pattern of the names of a kind, with # for an index, @ for an axis and NAME for an element."""
+    return (CHANNEL_KINDS | DERIVED_KINDS | ELEMENT_KINDS)[kind][0]
 
 
 @dataclass(frozen=True)
 class Channel:
     """One measured quantity: its name, role, unit in the file, and standard deviation in SI.
+
+    The name is the column's. It says what the column is unless `quantity` does. A reading counts as reading * `factor` + `offset`,
+    in `unit`.
 
     Raises DataError for a name outside the grammar, an unknown role or unit, and noise that is not positive.
     """
@@ -78,41 +117,75 @@ class Channel:
     role: Role
     unit: str  # as declared; values inside the program are in `si_unit`
     noise: float | None = None  # one standard deviation, in `si_unit`; None where none is declared
+    quantity: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
-        parse_channel_name(self.name)
+        parse_channel_name(self.means)
+        if not (math.isfinite(self.factor) and self.factor != 0.0 and math.isfinite(self.offset)):
+            raise DataError(
+                f"scale {self.factor!r}, offset {self.offset!r} of {self.name}; finite numbers are needed, no scale of 0"
+            )
         if self.role not in get_args(Role):
             raise DataError(f"role {short_repr(self.role)} of {self.name}; allowed: {', '.join(get_args(Role))}")
-        unit_scale(self.unit, self.si_unit)
+        unit_scale(self.unit, self.si_unit)  # raises for a unit of another dimension
         if self.noise is not None and not (math.isfinite(self.noise) and self.noise > 0.0):
             raise DataError(f"noise {self.noise!r} of {self.name} is not positive; write one standard deviation or leave it out")
 
     @property
+    def means(self) -> str:
+        """What the column is, a name of the grammar."""
+        return self.quantity or self.name
+
+    @property
     def kind(self) -> str:
-        """The kind of quantity: a key of `CHANNEL_KINDS` or `DERIVED_KINDS`."""
-        return parse_channel_name(self.name).kind
+        """The kind of quantity: a key of `CHANNEL_KINDS`, `DERIVED_KINDS` or `ELEMENT_KINDS`."""
+        return parse_channel_name(self.means).kind
 
     @property
     def index(self) -> int | None:
         """The number of the tendon, disk, sensor ..., from 1, base to tip."""
-        return parse_channel_name(self.name).index
+        return parse_channel_name(self.means).index
 
     @property
     def axis(self) -> Axis | None:
         """The coordinate of a position in the base frame."""
-        return parse_channel_name(self.name).axis
+        return parse_channel_name(self.means).axis
 
     @property
     def finger(self) -> int | None:
         """The finger of a hand, from 1."""
-        return parse_channel_name(self.name).finger
+        return parse_channel_name(self.means).finger
 
     @property
     def si_unit(self) -> str:
         """The unit of the values inside the program."""
+        if self.kind in ELEMENT_KINDS:
+            return _fitting_unit(self.unit, ELEMENT_KINDS[self.kind][1])
         return (CHANNEL_KINDS | DERIVED_KINDS)[self.kind][1]
 
     @property
-    def scale(self) -> Scale:
-        """The conversion from the declared unit to SI and back."""
+    def unit_scale(self) -> Scale:
+        """The conversion of a number in the declared unit to SI and back."""
         return unit_scale(self.unit, self.si_unit)
+
+    @property
+    def scale(self) -> Scale:
+        """The conversion of a reading to SI and back, with its factor and offset."""
+        plain = self.unit_scale
+        if self.factor == 1.0 and self.offset == 0.0:
+            return plain
+        return Scale(plain.numerator * self.factor, plain.denominator, float(plain.to_si(self.offset)))
+
+
+@lru_cache(maxsize=1024)
+def _fitting_unit(unit: str, si_units: tuple[str, ...]) -> str:
+    """Return the SI unit of the dimension of `unit`, or the first: the conversion to that then says what is wrong."""
+    for si in si_units:
+        try:
+            unit_scale(unit, si)
+        except DataError:
+            continue
+        return si
+    return si_units[0]

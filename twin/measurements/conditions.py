@@ -8,9 +8,12 @@ from twin.foundation.errors import DataError, did_you_mean, short_repr
 from twin.foundation.files import prefix_errors
 from twin.measurements.parsing.quantity_strings import parse_quantity, parse_vector
 
-SCALAR_CONDITIONS = {"tip_payload": "kg", "ambient_temperature": "K"}
+SCALAR_CONDITIONS = {"tip_payload": "kg", "ambient_temperature": "K", "settle": "s"}
 VECTOR_CONDITIONS = {"gravity": "m/s^2", "tip_force": "N"}  # base frame
-MAX_CONDITION = {"tip_payload": 100.0, "ambient_temperature": 1000.0, "gravity": 50.0, "tip_force": 1e4}  # SI, plausible at most
+PAYLOAD_AT = "payload."  # before the name of a site or body: the condition of a mass (kg) that hangs there
+MAX_CONDITION = {
+    "tip_payload": 100.0, "ambient_temperature": 1000.0, "gravity": 50.0, "tip_force": 1e4, "settle": 600.0,
+}  # fmt: skip  # SI, plausible at most
 _TRIAL_KEYS = ("file", "start", "cloud")  # keys of a [[trial]] that are no conditions
 
 
@@ -30,6 +33,8 @@ def read_conditions(trial: Mapping[str, object]) -> tuple[dict[str, float | np.n
                     raise DataError(f"{short_repr(written)} is below zero {SCALAR_CONDITIONS[name]}; write the true value")
             elif name in VECTOR_CONDITIONS:
                 known[name] = parse_vector(written, VECTOR_CONDITIONS[name])
+            elif name == "payload" and isinstance(written, Mapping):
+                known |= {PAYLOAD_AT + at: _mass(at, mass) for at, mass in written.items()}
             elif name not in _TRIAL_KEYS:
                 if close := did_you_mean(name, (*SCALAR_CONDITIONS, *VECTOR_CONDITIONS, *_TRIAL_KEYS)):
                     raise DataError(f"no such condition{close} A name of your own must differ more")
@@ -38,3 +43,12 @@ def read_conditions(trial: Mapping[str, object]) -> tuple[dict[str, float | np.n
                 unit = SCALAR_CONDITIONS.get(name) or VECTOR_CONDITIONS[name]
                 raise DataError(f"{short_repr(written)} is not plausible; at most {MAX_CONDITION[name]:g} {unit}")
     return known, other
+
+
+def _mass(at: str, written: object) -> float:
+    """Return a mass (kg) that hangs at a site. Raises DataError for what is none."""
+    with prefix_errors(at):
+        mass = parse_quantity(written, "kg")
+        if not 0.0 <= mass <= MAX_CONDITION["tip_payload"]:
+            raise DataError(f"{short_repr(written)} is not plausible; allowed is 0 to {MAX_CONDITION['tip_payload']:g} kg")
+        return mass

@@ -26,7 +26,14 @@ def recording_hash(recording: Recording) -> str:
 
     add_text("robot", recording.robot)
     for channel in recording.channels:
-        add_text("channel", channel.name, channel.role, channel.si_unit, channel.noise and float(channel.noise))
+        add_text(
+            "channel",
+            channel.name,
+            channel.role,
+            channel.si_unit,
+            channel.noise and float(channel.noise),
+            *filter(None, [channel.quantity]),
+        )
     if recording.gravity is not None:
         add_numbers("gravity", recording.gravity)
     for trial in recording.trials:

@@ -9,7 +9,7 @@ from twin.foundation.errors import short_repr
 from twin.measurements.channels import Channel
 from twin.measurements.parsing.plausible import MAX_SLACK_SIGMAS
 from twin.measurements.parsing.tables import Table
-from twin.measurements.recording import EXTERNAL_CONTACT, Trial
+from twin.measurements.recording import EXTERNAL_CONTACT, START_POSE, Trial
 
 MAX_COLUMNS_NAMED = 5  # undeclared columns
 
@@ -27,7 +27,9 @@ def collect_notices(channels: Sequence[Channel], trials: Sequence[Trial], tables
     else:
         for name, files in extra.items():
             notices.append(f"column {short_repr(name)} is not declared in measurements.toml and not read ({_list_files(files)})")
-    for name, files in _files_by_name((trial.name, trial.other.keys() - {EXTERNAL_CONTACT}) for trial in trials).items():
+    for name, files in _files_by_name(
+        (trial.name, trial.other.keys() - {EXTERNAL_CONTACT, START_POSE}) for trial in trials
+    ).items():
         notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_list_files(files)})")
     for channel in channels:
         gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}

@@ -58,6 +58,9 @@ class ChannelTable(TableSchema):
     role: Role = Field(description="input: drives the twin; output: compared with it; context: known surroundings")
     unit: str = Field(description="any unit of the right dimension")
     noise: Any = Field(None, description="one standard deviation, in the same unit")
+    quantity: Text = Field("", description="what the column is, a name of the grammar below; left out: its name says so")
+    scale: Any = Field(1.0, description="a reading counts as reading * scale + offset, in the unit")
+    offset: Any = Field(0.0, description="see scale")
 
 
 def read(path: str | Path, *, least_trials: int = 2) -> Recording:
@@ -171,14 +174,16 @@ def _parse_channel(table: object) -> Channel:
     found = validate_table(ChannelTable, table, "", problems)
     if found is None:
         raise DataError("; ".join(problems))
-    channel = Channel(found.name, found.role, found.unit)
+    with prefix_errors(f"scale and offset of {found.name}"):
+        factor, offset = parse_number(found.scale), parse_number(found.offset)
+    channel = Channel(found.name, found.role, found.unit, None, found.quantity, factor, offset)
     if channel.kind in DERIVED_KINDS:
         raise DataError(f"{found.name} is made from point clouds, not read; give the trial's clouds as `cloud`")
     if found.noise is None:
         return channel
     with prefix_errors(f"noise of {found.name}"):
-        noise = channel.scale.without_offset().to_si(parse_number(found.noise))
-    return Channel(found.name, found.role, found.unit, noise)
+        noise = channel.unit_scale.without_offset().to_si(parse_number(found.noise))
+    return replace(channel, noise=noise)
 
 
 def _parse_trial(folder: Path, entry: object) -> DeclaredTrial:

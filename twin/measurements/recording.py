@@ -19,6 +19,7 @@ from twin.measurements.fingerprint import recording_hash
 
 Condition = float | np.ndarray  # a scalar or (3,), SI
 
+START_POSE = "start_pose"  # a trial's condition: the keyframe of its model that it starts from
 EXTERNAL_CONTACT = "external_contact"  # a trial's condition: something, mostly a hand, pushes the robot with an unknown force
 
 

@@ -12,7 +12,7 @@ import pyarrow.parquet
 
 from twin.foundation.errors import DataError, short_repr
 from twin.foundation.files import check_file_name
-from twin.measurements.conditions import SCALAR_CONDITIONS
+from twin.measurements.conditions import PAYLOAD_AT, SCALAR_CONDITIONS
 from twin.measurements.parsing.toml_text import toml_lines
 from twin.measurements.read import SET_FILE, SET_FORMAT
 from twin.measurements.recording import Recording, Trial
@@ -58,12 +58,18 @@ def _toml(recording: Recording, file_format: FileFormat) -> str:
         {"format": SET_FORMAT, "robot": recording.robot, "title": recording.title, "source": recording.source, "gravity": gravity}
     )
     for channel in recording.channels:
-        noise = None if channel.noise is None else float(channel.scale.without_offset().from_si(np.array([channel.noise]))[0])
+        noise = None if channel.noise is None else float(channel.unit_scale.without_offset().from_si(np.array([channel.noise]))[0])
         declared = {"name": channel.name, "role": channel.role, "unit": channel.unit, "noise": noise}
+        declared |= {"quantity": channel.quantity} if channel.quantity else {}
+        declared |= {"scale": channel.factor, "offset": channel.offset} if (channel.factor, channel.offset) != (1.0, 0.0) else {}
         lines += ["", "[[channel]]", *toml_lines(declared)]
     for trial in recording.trials:
         cloud = None if trial.clouds is None else f"{trial.label}.clouds.npz"
-        conditions = {name: _condition(name, value) for name, value in trial.conditions.items()}
+        conditions: dict[str, object] = {
+            name: _condition(name, value) for name, value in trial.conditions.items() if not name.startswith(PAYLOAD_AT)
+        }
+        if payload := {n.removeprefix(PAYLOAD_AT): f"{float(v)!r} kg" for n, v in trial.conditions.items() if n not in conditions}:
+            conditions["payload"] = payload
         entry = {"file": f"{trial.label}.{file_format}", "start": trial.start, **conditions, **trial.other, "cloud": cloud}
         lines += ["", "[[trial]]", *toml_lines(entry)]
     return "\n".join(lines) + "\n"

@@ -33,6 +33,25 @@ OUTPUT_GROUPS = {
     "sensor": OutputGroup("ohm", 1.0, "sensor_resistance", 0.5),
     "angle": OutputGroup("deg", 180.0 / np.pi, "joint_angle", 2e-3, has_declared_accuracy=True),
     "torque": OutputGroup("N*m", 1.0, "joint_torque", 1e-3),
+    "joint angle": OutputGroup("deg", 180.0 / np.pi, "joint_angle", 1e-3),
+    "joint shift": OutputGroup("mm", 1e3, "joint_position", 5e-5),
+    "joint rate": OutputGroup("rad/s", 1.0, "joint_rate", 2e-2),
+    "joint speed": OutputGroup("mm/s", 1e3, "joint_speed", 1e-3),
+    "joint torque": OutputGroup("N*m", 1.0, "joint_torque", 1e-2),
+    "joint force": OutputGroup("N", 1.0, "joint_force", 2e-2),
+    "actuator angle": OutputGroup("deg", 180.0 / np.pi, "motor_angle", 1e-3),
+    "actuator length": OutputGroup("mm", 1e3, "motor_position", 2e-5),
+    "actuator rate": OutputGroup("rad/s", 1.0, "motor_rate", 2e-2),
+    "actuator speed": OutputGroup("mm/s", 1e3, "motor_speed", 1e-3),
+    "actuator torque": OutputGroup("N*m", 1.0, "motor_torque", 1e-2),
+    "actuator force": OutputGroup("N", 1.0, "motor_force", 2e-2),
+    "tendon length": OutputGroup("mm", 1e3, "tendon_length", 5e-5),
+    "tendon speed": OutputGroup("mm/s", 1e3, "tendon_speed", 1e-3),
+    "tendon tension": OutputGroup("N", 1.0, "tendon_tension", 2e-2),
+    **{
+        f"sensor [{unit}]": OutputGroup(unit, 1.0, "sensor" if unit == "1" else f"sensor_{unit}", 1e-2)
+        for unit in ("1", "rad", "m", "N*m", "N", "rad/s", "m/s", "m/s^2", "rad/s^2")
+    },
     "skin": OutputGroup("mm", 1e3, "skin", 2e-4, has_declared_accuracy=True),
 }
 

@@ -1,22 +1,24 @@
 """A recording prepared for prediction: driving inputs, loads and clocks per trial, measured outputs as arrays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_smoothing_spline
 
-from twin.body import Body, Drive, Drives, Loads, Port, Signals, drive_mask
-from twin.foundation.errors import DataError
+from twin.body import Body, Drive, Drives, Loads, Port, Signals, Start, drive_mask
+from twin.foundation.errors import DataError, short_repr
 from twin.measurements import Channel, Recording, Trial
 from twin.measurements.channels import parse_channel_name
+from twin.measurements.conditions import PAYLOAD_AT
 from twin.measurements.patches import N_PATCHES, SHARED_NOISE_SHARE, Patches, camera_direction, cut_patches, point_scatter
-from twin.measurements.recording import EXTERNAL_CONTACT
+from twin.measurements.recording import EXTERNAL_CONTACT, START_POSE
 from twin.robots import Robot
 
 FEWEST_SMOOTHED_ROWS = 20  # of a thermometer; cross-validation of fewer is unreliable
 MOST_SPLINE_POINTS = 100  # enough to follow a room's temperature
+CONTROL_RESOLUTION = 1e-3  # of a control's range, which stands for the resolution of what is known without noise
 ROOM_TEMPERATURE = 296.15  # K, default: the temperature at which stiffness is quoted
 
 
@@ -38,6 +40,14 @@ class Inputs:
     loads: Loads
     clouds: Patches | None = None
     smooth: bool = True
+    start: Start = field(default_factory=Start)
+    home: np.ndarray | None = None  # (n_tendon,) of controls, whose zero means nothing: where they begin
+    reach: np.ndarray | None = None  # (n_tendon,) of controls: how far they go from there
+
+    @property
+    def pull(self) -> np.ndarray:
+        """(n, n_tendon) how much is pulled: the command; of controls their way from home, over the farthest."""
+        return self.command if self.home is None or self.reach is None else (self.command - self.home) / self.reach
 
     @property
     def signals(self) -> Signals:
@@ -46,7 +56,7 @@ class Inputs:
         of = {kind: np.where(drive_mask(self.drives, kind), self.command, nothing) for kind in Drive}
         return Signals(
             self.time, self.clock, of[Drive.TENSION], of[Drive.DISPLACEMENT], np.zeros((n, 0, 3)), self.temperature, self.drives,
-            of[Drive.CURRENT], smooth=self.smooth,
+            of[Drive.CURRENT], smooth=self.smooth, control=of[Drive.CONTROL],
         )  # fmt: skip
 
 
@@ -80,7 +90,7 @@ class PreparedRecording:
     @property
     def n_tendon(self) -> int:
         """Number of tendons."""
-        return len(self.drives)
+        return self.robot.n_tendon
 
     @property
     def drives(self) -> Drives:
@@ -93,8 +103,17 @@ class PreparedRecording:
 
     @property
     def reading(self) -> np.ndarray:
-        """(n_tendon,) typical resolution of the driving channels, N, m or A."""
+        """(n_tendon,) typical resolution of the driving channels, N, m or A; of a control a share of its range."""
+        reach = self.inputs[0].reach
+        if reach is not None:
+            return CONTROL_RESOLUTION * reach
         return np.array([d.typical_noise for d in self.drives])
+
+    @property
+    def pull_resolution(self) -> np.ndarray:
+        """(n_tendon,) the same of `Inputs.pull`."""
+        reach = self.inputs[0].reach
+        return self.reading if reach is None else self.reading / reach
 
     @property
     def n_sample(self) -> int:
@@ -112,10 +131,11 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
     _check_fingers(recording, robot, body)
     driven = _drives(recording, robot, body)
     names = [channel.name for channel, _ in driven]
+    notices += robot.notices
     notices += [
         f"input {c.name} does not drive robot {robot.name!r} and is not used"
         for c in recording.inputs()
-        if c.name not in {*names, *body.load_channels}
+        if c.name not in names and c.means not in body.load_channels
     ]
     pull = np.array([port.tendon_gains for _, port in driven])  # (n_drive, n_tendon)
     through = np.argmax(np.abs(pull), axis=0)  # which of its drives pulls a tendon
@@ -135,14 +155,25 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         trial = recording.trials[k]
         readings, note = _columns(trial, names)
         notices += note
-        notices += [f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in trial.other]
+        start, unknown_conditions = _start(trial, body)
+        notices += [
+            f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in unknown_conditions
+        ]
         loads = _loads(recording, trial, robot, body)
         seen = cut_patches(trial.clouds, camera) if skin else None
         inputs.append(
-            Inputs(trial.name, trial.time, clocks[k], readings @ pull, drives, _temperature(recording, trial), loads, seen)
+            Inputs(
+                trial.name, trial.time, clocks[k], readings @ pull, drives, _temperature(recording, trial), loads, seen,
+                smooth=Drive.CONTROL not in drives, start=start,
+            )
         )  # fmt: skip
         columns = [trial.values[o.channel.name][:, None] for o in outputs if o not in skin]
         measured.append(np.hstack([*columns, seen.at(trial.time)] if seen else columns))
+    if set(drives) == {Drive.CONTROL}:
+        home = np.median([i.command[0] for i in inputs], axis=0)
+        reach = np.max([np.abs(i.command - home).max(axis=0) for i in inputs], axis=0)
+        reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
+        inputs = [replace(i, home=home, reach=reach) for i in inputs]
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
 
@@ -177,7 +208,7 @@ def _source(recording: Recording) -> str:
 
 def _drives(recording: Recording, robot: Robot, body: Body) -> list[tuple[Channel, Port]]:
     """Return the input channel of each of the body's drives, and its port. Raises DataError where one is missing or doubled."""
-    inputs, drives = {c.name: c for c in recording.inputs()}, []
+    inputs, drives = {c.means: c for c in recording.inputs()}, []
     for ports in body.ports:
         found = [(inputs[p.channel], p) for p in ports if p.channel in inputs]
         allowed = " or ".join(p.channel for p in ports)
@@ -196,7 +227,9 @@ def _drives(recording: Recording, robot: Robot, body: Body) -> list[tuple[Channe
 def _outputs(recording: Recording, body: Body, drives: Drives) -> tuple[tuple[Output, ...], list[str]]:
     found, unknown = [], []
     for channel in recording.outputs():
-        sense = body.senses.get(channel.name)
+        sense = body.senses.get(channel.means)
+        if sense is not None and sense.unit not in ("", channel.si_unit):
+            raise DataError(f"output {channel.name} is in {channel.unit}; {channel.means} has the dimension of {sense.unit}")
         if sense is None or (sense.required_drive is not None and drives[sense.index] is not sense.required_drive):
             unknown.append(channel.name)
         else:
@@ -281,12 +314,34 @@ def _loads(recording: Recording, trial: Trial, robot: Robot, body: Body) -> Load
         field: _columns(trial, [c.name])[0][:, 0]
         for c in recording.inputs()
         for name, field in body.load_channels.items()
-        if c.name == name
+        if c.means == name
     }
     gravity = trial.conditions.get("gravity", recording.gravity if recording.gravity is not None else robot.gravity)
     return Loads(
         gravity=np.asarray(gravity, float),
         payload=float(trial.conditions.get("tip_payload", 0.0)),
         force=np.asarray(trial.conditions.get("tip_force", np.zeros(3)), float),
+        payloads=_payloads(trial, body),
         **measured,
     )
+
+
+def _payloads(trial: Trial, body: Body) -> tuple[tuple[str, float], ...]:
+    """Return the masses that hang at sites or bodies. Raises DataError for a place that the body does not have."""
+    hung = {n.removeprefix(PAYLOAD_AT): float(m) for n, m in trial.conditions.items() if n.startswith(PAYLOAD_AT)}
+    for name in hung:
+        if name not in body.payload_places:
+            there = ", ".join(sorted(body.payload_places)) or "no named places: write tip_payload"
+            raise DataError(f"{trial.name}: payload at {short_repr(name)}: no such site or body; the robot has {there}")
+    return tuple(sorted(hung.items()))
+
+
+def _start(trial: Trial, body: Body) -> tuple[Start, list[str]]:
+    """Return how a trial begins, and the names of conditions that the twin does not understand."""
+    unknown = [name for name in trial.other if name != START_POSE or "start" not in body.features]
+    if "start" not in body.features:
+        return Start(), [*unknown, *(name for name in ("settle",) if name in trial.conditions)]
+    pose = trial.other.get(START_POSE, "")
+    if not isinstance(pose, str):
+        raise DataError(f"{trial.name}: start_pose is {short_repr(pose)}; write the name of a keyframe")
+    return Start(float(trial.conditions.get("settle", Start().settle)), pose), unknown

@@ -77,7 +77,7 @@ class TrialSimulator:
         problem = Problem(
             inputs.time, driven.command, chain.surround(inputs.loads), chain.route, inputs.drives, chain.creep, delayed,
             chain.stiffness(inputs.temperature, inputs.clock), heating, near, options.keep, options.once, options.tolerance,
-            inputs.clouds,
+            inputs.clouds, inputs.start,
         )  # fmt: skip
         solution = self.solver.solve(problem)
         if not solution.status.all():

@@ -9,7 +9,7 @@ from twin.prediction.evaluate import OUTPUT_GROUPS
 MM_PER_M = 1e3
 PERCENT = 100.0
 # Group of outputs, or a tendon's drive -> unit and factor from SI.
-DISPLAY_UNITS = {**{name: (g.unit, g.factor) for name, g in OUTPUT_GROUPS.items()}, "current": ("A", 1.0)}
+DISPLAY_UNITS = {**{name: (g.unit, g.factor) for name, g in OUTPUT_GROUPS.items()}, "current": ("A", 1.0), "control": ("SI", 1.0)}
 NO_NUMBER = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 EVERYDAY_UNITS = {  # SI unit -> (shown unit, factor)

@@ -55,6 +55,8 @@ class FileEntry:
 def file_entries(robot: Robot) -> list[FileEntry]:
     """Return all entries of a robot's file, in the schema's order."""
     schema = load_family(robot.family).SCHEMA
+    if schema.model_file is not None:
+        return [FileEntry(Row(p.name, p.unit, p.file_unit, "a number of the model", p.low, p.high), (p,)) for p in robot.parameters]
     rows = schema.applicable_rows(schema.structure.model_validate(dict(robot.structure)))
     parameters = {p.name: p for p in robot.parameters}
     entries = []

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import Field
 
-from twin.body import Body, Solver
+from twin.body import Body, Counts, Solver
 from twin.body.hinge_chain import HingeChain
 from twin.body.spring import Spring, build_springs
 from twin.foundation.errors import DataError, TwinError, UnknownNameError, join_problems, short_repr
@@ -56,11 +56,13 @@ class Robot:
     accuracy: float
     effects: tuple[tuple[str, Values], ...] = ()
     uncertain: tuple[tuple[str, Parameter], ...] = ()
+    notices: tuple[str, ...] = ()  # what was assumed of it
 
     @property
     def n_tendon(self) -> int:
-        """The number of tendons."""
-        return int(self.structure["tendons"])  # type: ignore[call-overload]
+        """The number of tendons, or of actuators of an MJCF (`twin.body.Counts`)."""
+        n = self.structure["tendons"]
+        return n if isinstance(n, int) else int(str(n))
 
     @property
     def nuisance(self) -> tuple[Parameter, ...]:
@@ -112,6 +114,8 @@ class Robot:
     def find_conflicts(self, values: Values) -> list[str]:
         """Return the contradictions between this robot's numbers at these values, each valid on its own."""
         schema = load_family(self.family).SCHEMA
+        if schema.model_file is not None:
+            return []
         return schema.find_conflicts(schema.structure.model_validate(dict(self.structure)), fill_defaults(self.parameters, values))
 
     def springs(self, n: int, values: Values | None = None) -> Spring:
@@ -169,9 +173,10 @@ class RobotFile(TableSchema):
     family: TextLine = Field(description="what kind of body it is")
     title: TextLine = Field(description="one line for people")
     structure: dict[str, Any] = Field(description="whole numbers and choices")
-    parameters: dict[str, Any] = Field(description="every number with unit and source")
-    gravity: dict[str, Any] = Field(
-        description="value = [x, y, z] in the base frame, unit, source; a measurement set may say otherwise"
+    parameters: dict[str, Any] | None = Field(None, description="every number with unit and source")
+    gravity: dict[str, Any] | None = Field(
+        None,
+        description="value = [x, y, z] in the base frame, unit, source; a measurement set may say otherwise; an MJCF has its own",
     )
     accuracy: dict[str, Any] = Field(description="value, unit, source: the description's own error; no smaller effect is claimed")
     effect: list[Any] = Field([], description="laws the robot is known to have, as in twin.toml; a std makes a parameter uncertain")
@@ -187,21 +192,20 @@ def _build_robot(folder: Path, table: Mapping[str, Any]) -> Robot:
     schema = family.SCHEMA
     structure = validate_table(schema.structure, file.structure, "structure", problems)
     problems += structure.find_conflicts() if structure else []
+    problems += _missing(file, schema)
     if structure is None or problems:
         raise DataError(join_problems(problems))
-    parameters = _read_parameters(schema, structure, file.parameters, problems)
-    gravity = _read_fact(GRAVITY_ROW, file.gravity, {"axis": 3}, problems)
+    counts = schema.model_file.located(structure, folder) if schema.model_file else structure.model_dump(exclude_none=True)
+    parameters = _read_parameters(schema, structure, counts, file.parameters or {}, problems)
+    gravity_vector = _read_gravity(schema, counts, file.gravity, problems)
     accuracy = _read_fact(schema.accuracy, file.accuracy, {}, problems)
     nominal = {p.name: p.value for p in parameters}
     if not problems:
         problems += schema.find_conflicts(structure, nominal)
-    counts = structure.model_dump(exclude_none=True)
     size = family.build(counts, nominal).size if file.effect and not problems else Size()
-    effects = read_effects(file.effect, structure.counts()["tendon"], size, problems)
+    effects = read_effects(file.effect, _drives(structure, counts), size, problems)
     if problems:
         raise DataError(join_problems(problems))
-    gravity_vector = np.array([p.value for p in gravity])
-    gravity_vector.setflags(write=False)
     checked_only = {row.name for row in schema.rows if row.checked_only}
     return Robot(
         name=folder.name,
@@ -214,11 +218,37 @@ def _build_robot(folder: Path, table: Mapping[str, Any]) -> Robot:
         accuracy=accuracy[0].value,
         effects=tuple((e.id, e.values) for e in effects),
         uncertain=read_uncertain(file.effect, effects, size),
+        notices=schema.model_file.notices(counts, file.parameters or {}) if schema.model_file else (),
     )
 
 
-def _read_parameters(schema: Schema, structure: Structure, table: Mapping[str, Any], problems: list[str]) -> list[Parameter]:
+def _missing(file: RobotFile, schema: Schema) -> list[str]:
+    """Return the tables that a file lacks and that no model beside it has."""
+    found = {"parameters": file.parameters, "gravity": file.gravity}
+    return [] if schema.model_file else [f"{name} is missing; it is needed" for name, table in found.items() if table is None]
+
+
+def _drives(structure: Structure, counts: Mapping[str, object]) -> int:
+    n = counts.get("tendons")
+    return n if isinstance(n, Counts) else structure.counts()["tendon"]
+
+
+def _read_gravity(schema: Schema, counts: Mapping[str, object], table: object, problems: list[str]) -> np.ndarray:
+    """Read gravity (3,) m/s^2: as written, or of the model."""
+    if table is None and schema.model_file is not None:
+        gravity = schema.model_file.gravity(counts)
+    else:
+        gravity = np.array([p.value for p in _read_fact(GRAVITY_ROW, table, {"axis": 3}, problems)])
+    gravity.setflags(write=False)
+    return gravity
+
+
+def _read_parameters(
+    schema: Schema, structure: Structure, counts: Mapping[str, object], table: Mapping[str, Any], problems: list[str]
+) -> list[Parameter]:
     """Read a robot's parameters, those not in its file at their defaults; problems are added to `problems`."""
+    if schema.model_file is not None:
+        return schema.model_file.parameters(counts, table, problems)
     rows = schema.applicable_rows(structure)
     problems += [f"parameters: {why_unknown(name, schema, rows)}" for name in table if name not in rows]
     groups = {rows[name].group for name in table if name in rows}

@@ -6,6 +6,7 @@ Each family declares a `Schema`; the check of a file, the reference page and the
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,20 @@ class Structure(TableSchema):
 
 
 @dataclass(frozen=True)
+class ModelFile:
+    """How a family reads a robot whose numbers are those of a model beside its robot.toml.
+
+    `located` returns the structure with the model's place, given the folder; `parameters` reads [parameters] of that, adding
+    problems; `gravity` is the model's own; `notices` says what was assumed.
+    """
+
+    located: Callable[[Any, Path], dict[str, object]]
+    parameters: Callable[[Mapping[str, object], Mapping[str, Any], list[str]], list[Parameter]]
+    gravity: Callable[[Mapping[str, object]], np.ndarray]
+    notices: Callable[[Mapping[str, object], Mapping[str, Any]], tuple[str, ...]]
+
+
+@dataclass(frozen=True)
 class Schema:
     """All that a family reads of a file."""
 
@@ -77,6 +92,7 @@ class Schema:
     find_conflicts: Callable[[Any, Mapping[str, float]], list[str]]  # contradictions between valid parameters (SI, by name)
     usual_channels: Callable[[Any], list[tuple[str, str, str, float]]]  # usually logged: (channel, role, unit, noise)
     diagram: str  # of the frames
+    model_file: ModelFile | None = None  # of a family whose numbers are those of a model
 
     def applicable_rows(self, structure: Structure) -> dict[str, Row]:
         """Return the rows of a robot of this structure, by name."""

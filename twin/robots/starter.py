@@ -13,7 +13,7 @@ from twin.foundation.units import unit_scale
 from twin.measurements.parsing.toml_text import toml_lines, toml_value
 from twin.robots.family import family_names, load_family
 from twin.robots.numbers import FileEntry, file_entries, in_file_unit
-from twin.robots.robot import ROBOT_FORMAT, Robot, load, robot_names
+from twin.robots.robot import ROBOT_FILE, ROBOT_FORMAT, Robot, load, robot_names
 from twin.robots.schema import SOURCE_OF_DEFAULT
 
 EXAMPLE_SOURCE = "example: where does this number come from?"
@@ -40,6 +40,8 @@ def write_starter(name: str, family: str, place: Path) -> Path:
         (draft / FIRST_SET).mkdir(parents=True)
         try:
             (draft / "robot.toml").write_text(robot_text(name, robot), "utf-8")
+            if load_family(family).SCHEMA.model_file is not None:
+                shutil.copy(str(robot.structure["model"]), draft)
             (draft / "README.md").write_text(readme_text(name), "utf-8")
             write_set(draft / FIRST_SET, robot)
             draft.rename(folder)
@@ -54,6 +56,8 @@ def write_starter(name: str, family: str, place: Path) -> Path:
 def robot_text(name: str, robot: Robot) -> str:
     """Return a commented `robot.toml` with the numbers of `robot`, without optional groups."""
     schema = load_family(robot.family).SCHEMA
+    if schema.model_file is not None:
+        return _model_text(name, robot)
     head = [
         f"# {name}: replace every number by your robot's, and say in `source` where it comes from.",
         "# `std` marks numbers in which a built robot may differ (one standard deviation, same unit): they are fitted to data.",
@@ -84,6 +88,14 @@ def robot_text(name: str, robot: Robot) -> str:
     }
     tail += [f"[accuracy]  # {schema.accuracy.meaning}", *toml_lines(accuracy)]
     return "\n".join([*head, *body, *tail]) + "\n"
+
+
+def _model_text(name: str, robot: Robot) -> str:
+    """Return the robot.toml of a robot whose numbers are those of a model beside it, under another title."""
+    lines = (robot.folder / ROBOT_FILE).read_text("utf-8").splitlines()
+    title = toml_lines({"title": f"{name}, described by its builder"})[0]
+    head = f"# {name}: replace the model by your robot's, and say below in which of its numbers a built one may differ."
+    return "\n".join([head, *(title if line.startswith("title") else line for line in lines if not line.startswith("#"))]) + "\n"
 
 
 def _entry_text(line: FileEntry) -> str:

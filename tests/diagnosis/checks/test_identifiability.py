@@ -209,7 +209,11 @@ def usual() -> dict[str, Visibility]:
 
 
 def test_every_effect_has_a_row_and_only_what_is_not_logged_is_never_seen(usual: dict[str, Visibility]) -> None:
-    backbone = {name for name, law in catalogue().items() if not law.needs & {"strain sensors", "antagonists"}}
+    backbone = {
+        name
+        for name, law in catalogue().items()
+        if not law.needs & {"strain sensors", "friction of joints", "load friction", "joints", "controls", "servos", "encoders"}
+    }
     of_lengths = {name for name in backbone if all_effects()[name].driven_by_length}  # tensions are commanded here
     of_springs = {name for name, law in catalogue().items() if law(n_tendon=3).acts_in("spring")}  # none pull here
     assert set(usual) == backbone - of_springs - of_lengths

@@ -19,7 +19,7 @@ from twin.body import Loads
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parameters import Values, parameter_array
 from twin.robots import Robot
-from twin.robots.families.continuum_schema import ROUND_SECTION, Continuum, disk_masses, hole_places
+from twin.robots.schemas.continuum import ROUND_SECTION, Continuum, disk_masses, hole_places
 
 TOLERANCE = 1e-8  # of the integration, m and rad
 

@@ -31,6 +31,13 @@ from twin.robots import Robot
 DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
+# The same of motion. Where a joint comes to rest by friction jumps by hundredths of a sigma with any change of any number; half a
+# step moves predictions by about a sigma, and bends little.
+MOTION_DIFFERENCE = 0.5
+SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came of motion, they are renewed
+MOST_MOTION_STEPS = 24  # at most, of a fit of motion
+MOST_RENEWALS = 3  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
+LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 MOST_FIT_STEPS = 12  # at most, of a fit
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
@@ -116,6 +123,15 @@ class Objective:
         self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
 
+    @property
+    def bends(self) -> bool:
+        """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
+        return Drive.CONTROL in getattr(self.prepared, "drives", ())
+
+    def smallest_fall(self, fall: float) -> float:
+        """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
+        return min(fall, LARGEST_LAST_FALL) if self.bends else fall
+
     def of(self, which: Sequence[int]) -> Objective:
         """Return the objective of some of its trials, given by their positions."""
         return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
@@ -199,11 +215,11 @@ class Objective:
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
         """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
-        x = at.model.vector()
+        x, difference = at.model.vector(), MOTION_DIFFERENCE if self.bends else PARAMETER_DIFFERENCE
         neighbours = []
         for i in which:
             p = at.model.free[i].parameter
-            size = PARAMETER_DIFFERENCE if (x[i] + PARAMETER_DIFFERENCE) * p.step <= p.high else -PARAMETER_DIFFERENCE
+            size = difference if (x[i] + difference) * p.step <= p.high else -difference
             moved = x.copy()
             moved[i] += size
             neighbours.append((at.model.at(moved), size))
@@ -360,18 +376,19 @@ def fit(
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
+    renewals = MOST_RENEWALS if objective.bends else 0
     fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
     if J is not None:
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
-    now, damping = penalty.cost(at), 1e-4
-    for left in range(MOST_FIT_STEPS - 1, -1, -1):
+    now, damping, own, moved = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
+    for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
         H, g = penalty.normal_equations(x, columns, at.z)
-        better, whole, enough = None, damping, max(stop.tolerance * now, stop.worth)
+        better, whole, enough = None, damping, max(objective.smallest_fall(stop.tolerance * now), stop.worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, penalty.low - x, penalty.high - x)
             predicted_fall = -float(2.0 * g @ d + d @ H @ d)
@@ -379,13 +396,20 @@ def fit(
                 break
             better = _improved(objective, at, x + d, now - penalty.besides(x + d))
             damping *= 1.0 if better else 10.0
-        if better is None:
-            break
-        fall, at, now = now - penalty.cost(better), better, penalty.cost(better)
-        if fall > TRUSTED_FALL_SHARE * predicted_fall:
-            damping = max(0.1 * damping, 1e-6)
-        if fall < enough or now - left * fall > stop.beat:
-            break
+        fall = 0.0 if better is None else now - penalty.cost(better)
+        if better is not None:
+            at, now, moved = better, penalty.cost(better), True
+            if fall > TRUSTED_FALL_SHARE * predicted_fall:
+                damping = max(0.1 * damping, 1e-6)
+            if now - left * fall > stop.beat:
+                break
+        slow = objective.bends and fall < SLOW_FALL_SHARE * predicted_fall
+        if better is None or fall < enough or slow:
+            if not (renewals and moved and left):
+                if slow and better is not None and fall >= enough:
+                    continue
+                break
+            columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
     if refresh:
         columns = objective.jacobian(at, range(len(model.free)))
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))

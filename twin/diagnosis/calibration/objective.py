@@ -84,7 +84,7 @@ def sensitivity(
         rows = np.array([[np.median(np.diff(prepared.inputs[k].time))] for k in trials])
         averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * thermal_time_constant(prepared.robot.springs(prepared.n_tendon)))))
         share_of_constant = np.where(prepared.driven_by(Drive.CURRENT), averaged, share_of_constant)
-    for t in range(prepared.n_tendon):
+    for t in np.flatnonzero(~prepared.driven_by(Drive.CONTROL)):  # controls are known exactly
         step = READING_STEP * prepared.reading[t]
         push = step * np.eye(prepared.n_tendon)[t]
         moved = replace(prepared, inputs=tuple(replace(i, command=i.command + push) for i in prepared.inputs))

@@ -25,8 +25,8 @@ from twin.prediction.prepared import Inputs, PreparedRecording
 def shortcomings(prepared: PreparedRecording) -> list[DataNeed]:
     """Return what the design lacks."""
     inputs = prepared.inputs
-    top = max(float(np.abs(i.command).max()) for i in inputs)
-    changes = np.concatenate([np.diff(i.command, axis=0) for i in inputs])
+    top = max(float(np.abs(i.pull).max()) for i in inputs)
+    changes = np.concatenate([np.diff(i.pull, axis=0) for i in inputs])
     rising, falling = (float(np.maximum(c, 0.0).sum()) for c in (changes, -changes))
     every = np.array([r for i in inputs for r in rates(i, top)])
     lacking = {
@@ -34,7 +34,7 @@ def shortcomings(prepared: PreparedRecording) -> list[DataNeed]:
         # Quantiles, not extremes: one pull alone may be held out.
         DataNeed.TWO_RATES: every.size == 0 or np.quantile(every, 0.9) < TWO_RATES_RATIO**0.5 * np.quantile(every, 0.1),
         DataNeed.LONG_HOLDS: max(longest_rest(i, top) for i in inputs) < SHORTEST_HOLD,
-        DataNeed.TWO_LOADS: len({(round(i.loads.payload, 6), *np.round(i.loads.gravity, 3)) for i in inputs}) < 2,
+        DataNeed.TWO_LOADS: len({(round(i.loads.hung, 6), *np.round(i.loads.gravity, 3)) for i in inputs}) < 2,
         DataNeed.EVERY_TENDON: len(set().union(*(pulled(i, top) for i in inputs))) < prepared.n_tendon,
         DataNeed.THREE_MARKERS: len({o.index for o in prepared.outputs if OUTPUT_GROUPS[o.group].is_point}) < 3,
         DataNeed.DISPLACEMENTS: Drive.DISPLACEMENT not in prepared.drives
@@ -47,12 +47,12 @@ def shortcomings(prepared: PreparedRecording) -> list[DataNeed]:
 
 def pulled(inputs: Inputs, top: float) -> list[int]:
     """Return the tendons that move in a trial by more than `PULLED_TENDON_SHARE` of the largest command `top`."""
-    return [int(t) for t in np.flatnonzero(np.ptp(inputs.command, axis=0) > PULLED_TENDON_SHARE * top)]
+    return [int(t) for t in np.flatnonzero(np.ptp(inputs.pull, axis=0) > PULLED_TENDON_SHARE * top)]
 
 
 def rates(inputs: Inputs, top: float) -> list[float]:
     """Return the rate at which each moving tendon is pulled: the median slope of its moving samples."""
-    slope = np.abs(np.diff(inputs.command, axis=0)) / np.diff(inputs.time)[:, None]
+    slope = np.abs(np.diff(inputs.pull, axis=0)) / np.diff(inputs.time)[:, None]
     found = []
     for t in pulled(inputs, top):
         moving = slope[:, t] > 0.1 * slope[:, t].max()
@@ -63,7 +63,7 @@ def rates(inputs: Inputs, top: float) -> list[float]:
 
 def longest_rest(inputs: Inputs, top: float) -> float:
     """Return the longest stretch (s) of a trial without motion."""
-    still = np.abs(np.diff(inputs.command, axis=0)).max(axis=1) < STILL_COMMAND_SHARE * top
+    still = np.abs(np.diff(inputs.pull, axis=0)).max(axis=1) < STILL_COMMAND_SHARE * top
     best, since = 0.0, None
     for k, s in enumerate(still):
         if s:
@@ -79,8 +79,8 @@ def _ordered(prepared: PreparedRecording) -> bool:
 
     They do if the label changes between neighbouring trials less than half as often as by chance.
     """
-    return _blocked([i.loads.payload for i in prepared.inputs]) or _blocked(
-        [int(np.argmax(np.ptp(i.command, axis=0))) for i in prepared.inputs]
+    return _blocked([i.loads.hung for i in prepared.inputs]) or _blocked(
+        [int(np.argmax(np.ptp(i.pull, axis=0))) for i in prepared.inputs]
     )
 
 

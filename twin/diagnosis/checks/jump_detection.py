@@ -105,7 +105,7 @@ def _conditions(inputs: Inputs) -> np.ndarray:
     """Return the conditions of a trial: mean commands and their rate, mean loads."""
     u, loads = inputs.command, inputs.loads
     pace = np.abs(np.diff(u, axis=0)).sum() / (inputs.time[-1] - inputs.time[0] + 1e-9)
-    return np.array([*u.mean(axis=0), pace, loads.payload, np.mean(loads.torque), *loads.gravity, *loads.force])
+    return np.array([*u.mean(axis=0), pace, loads.hung, np.mean(loads.torque), *loads.gravity, *loads.force])
 
 
 def _parted(done: np.ndarray, k: int) -> bool:

@@ -76,13 +76,13 @@ def loops(prepared: PreparedRecording, predicted: Sequence[np.ndarray] | None = 
     """
     group = headline_group([o.group for o in prepared.outputs if o.group != "skin"] or ["skin"])  # too few clouds
     name, columns = _largest(prepared, group)
-    top = np.max([np.abs(i.command).max(axis=0) for i in prepared.inputs], axis=0)
+    top = np.max([np.abs(i.pull).max(axis=0) for i in prepared.inputs], axis=0)
     top = np.where(top > 0.0, top, 1.0)
     found = []
     for k, i in enumerate(prepared.inputs):
         y = prepared.measured[k][:, columns]
         shown = y if predicted is None else np.where(np.isfinite(y), predicted[k][:, columns], np.nan)
-        found.append(_loop(k, i, i.command / top, shown, y))
+        found.append(_loop(k, i, i.pull / top, shown, y))
     return Loops(group, name, tuple(loop for loop in found if loop is not None))
 
 

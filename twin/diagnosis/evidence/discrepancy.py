@@ -69,7 +69,7 @@ def regressors(prepared: PreparedRecording, trials: Sequence[int], noise: np.nda
     `noise` (n_tendon,) is the readings' noise.
     """
     inputs = [prepared.inputs[k] for k in trials]
-    span = np.max([np.abs(i.command).max(axis=0) for i in inputs], axis=0)
+    span = np.max([np.abs(i.pull).max(axis=0) for i in inputs], axis=0)
     held = prepared.driven_by(Drive.DISPLACEMENT)
     for kind in (held, ~held):  # tendons driven alike have one scale
         span[kind] = max(span[kind].max(initial=0.0), 1e-9)
@@ -78,7 +78,7 @@ def regressors(prepared: PreparedRecording, trials: Sequence[int], noise: np.nda
     typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
     U, dU = np.concatenate(u), np.concatenate(slopes)
     loads = {
-        "payload": np.concatenate([np.full(len(i.time), i.loads.payload) for i in inputs]),
+        "payload": np.concatenate([np.full(len(i.time), i.loads.hung) for i in inputs]),
         "torque": np.concatenate([np.broadcast_to(i.loads.torque, len(i.time)) for i in inputs]),
     }
     clock = np.concatenate([i.clock for i in inputs])
@@ -87,7 +87,7 @@ def regressors(prepared: PreparedRecording, trials: Sequence[int], noise: np.nda
     warm = (warm - warm.mean()) / max(float(warm.std()), 0.5)
     n_tendon = U.shape[1]
     blocks: dict[str, list[tuple[str, np.ndarray]]] = {c: [] for c in COMPONENTS}
-    letter = {Drive.TENSION: "T", Drive.DISPLACEMENT: "d", Drive.CURRENT: "I"}
+    letter = {Drive.TENSION: "T", Drive.DISPLACEMENT: "d", Drive.CURRENT: "I", Drive.CONTROL: "c"}
     T = [f"{letter[d]}{i}" for i, d in enumerate(prepared.drives, 1)]
     static = blocks["static"]
     static.append(("1", np.ones(len(U))))
@@ -129,7 +129,7 @@ def quiet(inputs: Inputs, noise: np.ndarray) -> np.ndarray:
     It agrees within three standard deviations of its `noise` (n_tendon,). A regressor with a reading's own noise in it would
     correlate with the residual, which contains that noise too, although nothing is missing.
     """
-    u, t = inputs.command, inputs.time
+    u, t = inputs.pull, inputs.time
     if len(u) < 3:
         return u
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]

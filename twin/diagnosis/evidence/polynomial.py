@@ -81,18 +81,18 @@ def _ridge(gram: np.ndarray, moment: np.ndarray, ridge: float) -> np.ndarray:
 def _features(prepared: PreparedRecording, trials: Sequence[int], degree: int, branch: bool) -> list[np.ndarray]:
     """Return features (n_k, p) of each trial."""
     inputs = [prepared.inputs[k] for k in trials]
-    span = np.max([np.abs(i.command).max(axis=0) for i in inputs], axis=0)
+    span = np.max([np.abs(i.pull).max(axis=0) for i in inputs], axis=0)
     held = prepared.driven_by(Drive.DISPLACEMENT)
     for kind in (held, ~held):
         span[kind] = max(span[kind].max(initial=0.0), 1e-9)
-    slopes = [slope(i, i.command / span) for i in inputs]
+    slopes = [slope(i, i.pull / span) for i in inputs]
     typical = np.median(np.abs(np.concatenate(slopes))) + 1e-9
     loads = np.array([[i.loads.payload, *i.loads.gravity, float(np.mean(i.loads.torque))] for i in inputs])
     varying = np.ptp(loads, axis=0) > 1e-9
     loads = loads[:, varying] / np.maximum(np.abs(loads[:, varying]).max(axis=0, initial=0.0), 1e-12)
     out = []
     for i, du, load in zip(inputs, slopes, loads, strict=True):
-        u = i.command / span
+        u = i.pull / span
         columns = [np.ones(len(u))]
         for d in range(1, degree + 1):
             columns += [np.prod(u[:, list(pick)], axis=1) for pick in combinations_with_replacement(range(u.shape[1]), d)]

@@ -30,7 +30,8 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
             A, B = prepared.inputs[a], prepared.inputs[b]
             same_loads = (
                 np.allclose(A.loads.gravity, B.loads.gravity)
-                and A.loads.payload == B.loads.payload
+                and A.loads.hung == B.loads.hung
+                and A.loads.payloads == B.loads.payloads
                 and np.allclose(A.loads.force, B.loads.force)
             )
             if not same_loads or len(A.time) != len(B.time):
@@ -40,7 +41,7 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
             torque = np.broadcast_arrays(A.loads.torque, B.loads.torque)
             if np.sqrt(np.mean((torque[0] - torque[1]) ** 2)) > REPEAT_DIFFERENCE * np.abs(torque).max():
                 continue
-            a_u, b_u = A.command / prepared.reading, B.command / prepared.reading
+            a_u, b_u = A.pull / prepared.pull_resolution, B.pull / prepared.pull_resolution
             if np.sqrt(np.mean((a_u - b_u) ** 2)) < max(REPEAT_DIFFERENCE * np.ptp(a_u), 2.0):
                 pairs.append((a, b))
     return pairs
@@ -59,6 +60,7 @@ def estimate_noise(
     pairs = [(place[a], place[b]) for a, b in repeats(prepared) if a in place and b in place]
     declared = np.array([o.channel.noise or np.nan for o in prepared.outputs])
     cells = np.array([c.noise or np.nan for c in prepared.drivers]) * np.abs(prepared.pull)
+    cells = np.where(prepared.driven_by(Drive.CONTROL), 0.0, cells)  # known exactly
     drive = cells if np.isfinite(cells).all() else None
     notes = []
     groups, member = _members(prepared)
@@ -143,7 +145,7 @@ def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray,
     """
     t = (inputs.time - inputs.time[0]) / max(inputs.time[-1] - inputs.time[0], 1e-9) - 0.5
     basis = np.stack([np.ones_like(t), t], axis=1)
-    felt = np.concatenate([G, G * inputs.command[:, None, :]], axis=2)
+    felt = np.concatenate([G, G * inputs.pull[:, None, :]], axis=2)
     scale, noise = _scales(d, member)[member], np.sqrt(((G * reading) ** 2).sum(axis=2))  # (m,), (n, m)
     weight = 1.0 / np.hypot(scale, noise)
     locked = noise >= INPUT_NOISE_RATIO * scale

@@ -8,10 +8,11 @@ Prediction, loaded robots, controllers and rollouts all apply effects through it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
-from twin.body import ROPE_FEATURES, Bearing, Body, Creep, Loads, Route, Signals
+from twin.body import ROPE_FEATURES, Bearing, Body, Creep, Loads, Route, Rubbing, Signals
 from twin.body.spring import Spring
 from twin.effects import Effect
 from twin.foundation.errors import DataError
@@ -84,10 +85,12 @@ class EffectChain:
         return Route(
             mu=friction.mu,
             presliding=friction.presliding,
+            mu_shares=friction.mu_shares,
             stretch=sum(r.stretch for r in routes),
             bedding=bedding.bedding,
             bedding_tension=bedding.bedding_tension,
             bearing=next((r.bearing for r in routes if r.bearing != Bearing()), Bearing()),
+            rubbing=reduce(Rubbing.beside, (r.rubbing for r in routes), Rubbing()),
             rest_bend_share=max((r.rest_bend_share for r in routes), default=0.0),
             stall_tension=min((r.stall_tension for r in routes), default=np.inf),
             initial_stretch_share=max((r.initial_stretch_share for r in routes), default=0.0),

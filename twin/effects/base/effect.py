@@ -27,6 +27,7 @@ from typing import ClassVar
 import numpy as np
 
 from twin.body import Body, Creep, Loads, Route, Signals
+from twin.body.counts import joint_names
 from twin.body.spring import Spring
 from twin.foundation.errors import TwinError
 from twin.foundation.parameters import Parameter, Values, fill_defaults
@@ -58,7 +59,8 @@ class FitStart:
 class Effect(ABC):
     """Base of all effects. A subclass declares its data and overrides the places it acts in; the base's places change nothing.
 
-    `parameters` exist once, `per_tendon` parameters once per tendon, as name_1, name_2, ...
+    `parameters` exist once, `per_tendon` parameters once per tendon or actuator, as name_1, name_2, ..., `per_joint` parameters
+    once per joint of an MJCF, as name_JOINT.
     `inactive_when_off`: parameters without meaning while the effect is OFF, such as the time constant of no creep.
     `extended_parameters`: parameters of an extended law, which stay OFF until the plain law is accepted.
     `confusable_with`: effects that look so much like this one that both are never claimed together.
@@ -72,6 +74,7 @@ class Effect(ABC):
     id: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     per_tendon: ClassVar[tuple[Parameter, ...]] = ()
+    per_joint: ClassVar[tuple[Parameter, ...]] = ()
     inactive_when_off: ClassVar[tuple[str, ...]] = ()
     extended_parameters: ClassVar[tuple[str, ...]] = ()
     confusable_with: ClassVar[tuple[str, ...]] = ()
@@ -116,7 +119,8 @@ class Effect(ABC):
     def all_parameters(cls, n_tendon: int) -> tuple[Parameter, ...]:
         """Return all parameters, with those per tendon as name_1, name_2, ..."""
         many = (replace(p, name=f"{p.name}_{i}") for i in range(1, n_tendon + 1) for p in cls.per_tendon)
-        return (*cls.parameters, *many)
+        joints = (replace(p, name=f"{p.name}_{joint}") for joint in joint_names(n_tendon) for p in cls.per_joint)
+        return (*cls.parameters, *many, *joints)
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
@@ -132,6 +136,8 @@ class Effect(ABC):
             single = [{f"{p.name}_{i}": p.value + p.step for p in kind} for i in tendons]
             for values in (*single, {k: v for s in single for k, v in s.items()}):
                 yield FitStart(values, tuple(values))
+        if joints := {f"{p.name}_{j}": p.value + p.step for p in cls.per_joint[:1] for j in joint_names(n_tendon)}:
+            yield FitStart(joints, (*joints, *names))
 
     @classmethod
     def form(cls, free: Collection[str]) -> str:
@@ -159,6 +165,10 @@ class Effect(ABC):
     def per_tendon_values(self, name: str) -> np.ndarray:
         """Return a per-tendon parameter as an array (n_tendon,)."""
         return np.array([self.values[f"{name}_{i}"] for i in range(1, self.n_tendon + 1)])
+
+    def per_joint_values(self, name: str) -> tuple[float, ...]:
+        """Return a per-joint parameter (n_joint,)."""
+        return tuple(self.values[f"{name}_{joint}"] for joint in joint_names(self.n_tendon))
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]

@@ -45,7 +45,7 @@ def variables(prepared: PreparedRecording) -> Iterator[tuple[str, Variable]]:
     for kind, title, parts in (
         ("elapsed", "time in the trial (s)", [i.time - i.time[0] for i in inputs]),
         ("clock", "time since the first trial (min)", [i.clock / 60.0 for i in inputs]),
-        ("payload", "tip payload (g)", [np.full(len(i.time), 1e3 * i.loads.payload) for i in inputs]),
+        ("payload", "tip payload (g)", [np.full(len(i.time), 1e3 * i.loads.hung) for i in inputs]),
         ("torque", "load torque (N m)", [np.broadcast_to(i.loads.torque, len(i.time)) for i in inputs]),
         ("temperature", "ambient temperature (K)", [i.temperature for i in inputs]),
     ):

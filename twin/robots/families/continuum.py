@@ -22,8 +22,8 @@ from twin.mechanics.rod import Equilibrium
 from twin.mechanics.rod.drawing import ChainFigure
 from twin.mechanics.rod.dynamics import Dynamics
 from twin.robots.families.backbone import BACKBONES, Backbone, Piece
-from twin.robots.families.continuum_schema import CONTINUUM_SCHEMA as SCHEMA
-from twin.robots.families.continuum_schema import Continuum, disk_masses, hole_places
+from twin.robots.schemas.continuum import CONTINUUM_SCHEMA as SCHEMA
+from twin.robots.schemas.continuum import Continuum, disk_masses, hole_places
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
@@ -38,7 +38,7 @@ CONTINUUM_FEATURES = frozenset({
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HingeChain:
-    """Build an editable MuJoCo model from `structure` and `values` (SI, by parameter name; see continuum_schema.py).
+    """Build an editable MuJoCo model from `structure` and `values` (SI, by parameter name; see `twin.robots.schemas.continuum`).
 
     Base frame: origin on the backbone at the base hole plate, +z along the straight robot, angles from +x towards +y.
     """

@@ -14,8 +14,8 @@ from twin.mechanics.silicone import HandBody, HandDynamics, HandStatics
 from twin.mechanics.silicone.drawing import PALM_COLOUR, PALM_THICKNESS, HandFigure
 from twin.mechanics.silicone.statics import rotation_about_z
 from twin.robots.families import soft
-from twin.robots.families.hand_schema import HAND_SCHEMA as SCHEMA
-from twin.robots.families.hand_schema import Hand, finger_values
+from twin.robots.schemas.hand import HAND_SCHEMA as SCHEMA
+from twin.robots.schemas.hand import Hand, finger_values
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 

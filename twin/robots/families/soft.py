@@ -11,8 +11,8 @@ from twin.foundation.parameters import parameter_array
 from twin.mechanics.silicone import Cone, SoftBody, SoftDynamics, SoftStatics, straight_line
 from twin.mechanics.silicone.drawing import SoftFigure
 from twin.mechanics.silicone.material.lattice import lattice
-from twin.robots.families.soft_schema import SOFT_SCHEMA as SCHEMA
-from twin.robots.families.soft_schema import Soft
+from twin.robots.schemas.soft import SOFT_SCHEMA as SCHEMA
+from twin.robots.schemas.soft import Soft
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 

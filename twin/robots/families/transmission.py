@@ -13,8 +13,8 @@ import numpy as np
 
 from twin.body import Body, Drive, Port, Problem, Sense, Solution
 from twin.mechanics.rod.antagonists import TendonPair, solve_jaw
-from twin.robots.families.transmission_schema import TRANSMISSION_SCHEMA as SCHEMA
-from twin.robots.families.transmission_schema import Transmission
+from twin.robots.schemas.transmission import TRANSMISSION_SCHEMA as SCHEMA
+from twin.robots.schemas.transmission import Transmission
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
@@ -80,7 +80,7 @@ def drum_rate(u: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
-    """Build an editable MuJoCo model from `structure` and `values` (SI, by parameter name; see transmission_schema.py).
+    """Build an editable MuJoCo model from `structure` and `values` (SI, by parameter name; see `twin.robots.schemas.transmission`).
 
     Base frame: origin at the drum's end of the shaft, +z along it; the jaw turns about y.
     """
@@ -115,7 +115,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
     return Jaw(
         spec=spec,
         n_tendon=2,
-        features=frozenset({"antagonists", "rope"}),
+        features=frozenset({"antagonists", "rope", "friction of joints"}),
         antagonists=True,
         tendon_sites=tuple((f"tendon_{i}_base", f"tendon_{i}_anchor") for i in (1, 2)),
         ports=((Port("joint_1_angle", Drive.DISPLACEMENT, (drum, -drum)),),),

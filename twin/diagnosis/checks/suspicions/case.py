@@ -22,7 +22,7 @@ from twin.diagnosis.thresholds import (
 )
 from twin.foundation.errors import TwinError
 from twin.measurements import Channel
-from twin.measurements.channels import CHANNEL_KINDS
+from twin.measurements.channels import pattern_of
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group
 from twin.prediction.prepared import Inputs, PreparedRecording
 from twin.prediction.simulate import simulate
@@ -202,5 +202,5 @@ def registration(points: np.ndarray, onto: np.ndarray) -> tuple[np.ndarray, np.n
 
 def called(channels: Sequence[Channel]) -> str:
     """Return the channels as a pattern: disk_*_*, tendon_*_tension."""
-    patterns = dict.fromkeys(CHANNEL_KINDS[c.kind][0].replace("#", "*").replace("@", "*") for c in channels)
+    patterns = dict.fromkeys(pattern_of(c.kind).replace("#", "*").replace("@", "*").replace("NAME", "*") for c in channels)
     return ", ".join(patterns)

@@ -119,7 +119,7 @@ def best(case: Case, kind: str, words: str, change: str, tried: list) -> Iterato
 def others(channel: Channel) -> list[str]:
     """Return the units that are easily mistaken for the channel's."""
     own = channel.scale
-    return [u for u in CONFUSABLE_UNITS[channel.si_unit] if unit_scale(u, channel.si_unit) != own]
+    return [u for u in CONFUSABLE_UNITS.get(channel.si_unit, ()) if unit_scale(u, channel.si_unit) != own]
 
 
 def _centred(case: Case, columns: list[int]) -> np.ndarray:

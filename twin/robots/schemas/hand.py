@@ -6,9 +6,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from twin.robots.families import soft_schema
-from twin.robots.families.soft_schema import Points
 from twin.robots.schema import Row, Schema, Structure
+from twin.robots.schemas import soft
+from twin.robots.schemas.soft import Points
 
 
 class Hand(Structure):
@@ -27,10 +27,10 @@ class Hand(Structure):
         every = {"finger": self.fingers, "tendon": self.tendons, "sensor": self.sensors}
         return every | {f"{kind} of a finger": n for kind, n in one.counts().items()}
 
-    def finger(self) -> soft_schema.Soft:
+    def finger(self) -> soft.Soft:
         """Return the structure of one finger."""
         n = self.fingers
-        return soft_schema.Soft(
+        return soft.Soft(
             cells=self.cells, tendons=self.tendons // n, tendon_points=self.tendon_points, sensors=self.sensors // n,
             sensor_points=self.sensor_points, markers=self.markers // n,
         )  # fmt: skip
@@ -44,7 +44,7 @@ class Hand(Structure):
 def finger_values(k: int, structure: Hand, values: Mapping[str, float]) -> dict[str, float]:
     """Return finger k's values (from 0) of the hand's, with the names of a single finger's."""
     one, own = structure.finger().counts(), {}
-    for row in soft_schema.SOFT_ROWS:
+    for row in soft.SOFT_ROWS:
         kind = row.shape[0] if row.shape else ""
         if row.name in PER_FINGER:
             own[row.name] = values.get(f"{row.name}_{k + 1}", values.get(row.name, row.default or 0.0))
@@ -58,7 +58,7 @@ def finger_values(k: int, structure: Hand, values: Mapping[str, float]) -> dict[
 
 def find_conflicts(structure: Hand, values: Mapping[str, float]) -> list[str]:
     """Return the contradictions between numbers that are valid on their own."""
-    out = soft_schema.find_conflicts(structure.finger(), finger_values(0, structure, values))
+    out = soft.find_conflicts(structure.finger(), finger_values(0, structure, values))
     palm, base = values["palm.radius"], values["body.radius_base"]
     if palm < base:
         out.append(f"palm.radius is {1e3 * palm:g} mm; the fingers' bases ({1e3 * base:g} mm) would meet on the axis")
@@ -68,7 +68,7 @@ def find_conflicts(structure: Hand, values: Mapping[str, float]) -> list[str]:
 def usual_channels(structure: Hand) -> list[tuple[str, str, str, float]]:
     """Return a finger's usual channels for each finger."""
     fingers = range(1, structure.fingers + 1)
-    return [(f"finger_{k}_{name}", *rest) for k in fingers for name, *rest in soft_schema.usual_channels(structure.finger())]  # type: ignore[misc]
+    return [(f"finger_{k}_{name}", *rest) for k in fingers for name, *rest in soft.usual_channels(structure.finger())]  # type: ignore[misc]
 
 
 PER_FINGER = {"silicone.youngs_modulus", "mounting.angle"}
@@ -98,9 +98,9 @@ HAND_SCHEMA = Schema(
     structure=Hand,
     rows=(
         Row("palm.radius", "m", "mm", "distance of the fingers' axes from the palm's axis", 5e-3, 1.0),
-        *(_row(row) for row in soft_schema.SOFT_ROWS),
+        *(_row(row) for row in soft.SOFT_ROWS),
     ),
-    accuracy=soft_schema.SOFT_SCHEMA.accuracy,
+    accuracy=soft.SOFT_SCHEMA.accuracy,
     find_conflicts=find_conflicts,
     usual_channels=usual_channels,
     diagram=HAND_DIAGRAM,

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from twin.foundation.parameters import parameter_array
-from twin.robots.families.spring_rows import SPRING_ROWS, spring_conflicts
 from twin.robots.schema import FULL_TURN, Row, Schema, Structure
+from twin.robots.schemas.spring_rows import SPRING_ROWS, spring_conflicts
 
 Disk = Annotated[int, Field(ge=1, le=200)]
 WIRE, CAST = frozenset({'body = "wire"'}), frozenset({'body = "cast"'})

@@ -1,0 +1,193 @@
+"""Friction of joints and tendons between MuJoCo's steps, compiled; both hold still without creeping.
+
+A joint rubs with F z, z its slip state in [-1, 1] that follows Dahl's law over a turn dq,
+
+    z' = s + (z - s) exp(-|dq| / presliding),    s = sign dq,
+    F = (torque + breakaway exp(-(v / stribeck)^2) + load |torque of its actuators|),
+
+so that short of sliding it is a spring F / presliding. The step ahead is implicit in that spring: the joint's damping is raised by
+h F (1 - z s) / presliding for one step, which nothing is left of once it slides.
+
+A tendon that its actuator pulls with T_0 at its first point loses tension where it turns by theta_k at its points (capstan),
+
+    T_k = T_0 exp(-mu sum_(j<=k) z_j theta_j),    z_k = clip(z_k + travel_k / presliding, -1, 1),
+
+travel_k towards the first point being how much shorter the path beyond point k became. MuJoCo applies T_0 all along; here
+sum_k (T_0 - T_k) dl_k/dq comes on top, l_k the length between two points. The steps are implicit likewise, by a damping of each
+joint that is h T_0 mu theta_k / presliding |dD_k/dq_i| sum_j |dD_k/dq_j| at most, D_k the path beyond k.
+
+Source: Dahl (1968); Stribeck (1902); Euler-Eytelwein; all as in `twin.effects`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.foundation.compiled import jit_internal
+
+MUJOCO_PULLEY, MUJOCO_SITE = 2, 3  # mjtWrap
+PULLEY_POINT, SITE_POINT = -2, -1  # of mjData.wrap_obj; others are geoms
+LARGEST_LOSS = 40.0  # exponents of a capstan: beyond it nothing is left of a pull
+# Of the damping that would make a step implicit in the springs of what sticks: steps are stable from a quarter on.
+JOINT_SHARE, TENDON_SHARE = 1.0, 0.4
+
+
+class JointLaws(NamedTuple):
+    """Joints that rub: numbers in qpos and dof, and the law of each, (n,)."""
+
+    qpos: np.ndarray
+    dof: np.ndarray
+    torque: np.ndarray
+    breakaway: np.ndarray
+    load: np.ndarray
+    stribeck: float
+    presliding: float
+
+
+class Tree(NamedTuple):
+    """What a model's tendons run over, as MuJoCo stores it."""
+
+    tendon_adr: np.ndarray
+    tendon_num: np.ndarray
+    wrap_type: np.ndarray
+    wrap_objid: np.ndarray
+    site_body: np.ndarray
+    geom_body: np.ndarray
+    body_root: np.ndarray
+    body_last_dof: np.ndarray  # of a body or the nearest ancestor that moves, -1 for none
+    dof_parent: np.ndarray
+
+
+class Paths(NamedTuple):
+    """Views of a data's tendon paths and motion axes."""
+
+    ten_wrapadr: np.ndarray
+    ten_wrapnum: np.ndarray
+    wrap_obj: np.ndarray  # (2 nwrap,)
+    wrap_xpos: np.ndarray  # (2 nwrap, 3)
+    cdof: np.ndarray  # (nv, 6)
+    subtree_com: np.ndarray
+
+
+class Slip(NamedTuple):
+    """Slip states of tendons' points, and the paths beyond them in the step before."""
+
+    z: np.ndarray  # (ntendon, most points)
+    beyond: np.ndarray  # (ntendon, most points) m
+
+
+@jit_internal
+def joint_forces(laws, z, h, qvel, effort, applied, damping):
+    """Set the forces (nv,) and the damping (nv,) of joints that rub for one step of h s; `damping` is raised in place."""
+    for j in range(laws.dof.size):
+        i = laws.dof[j]
+        v = qvel[i]
+        r = v / laws.stribeck
+        F = laws.torque[j] + laws.breakaway[j] * math.exp(-r * r) + laws.load[j] * abs(effort[i])
+        s = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
+        applied[i] -= F * z[j]
+        damping[i] += JOINT_SHARE * h * F * (1.0 - z[j] * s) / laws.presliding
+
+
+@jit_internal
+def slide_joints(laws, z, before, qpos):
+    """Advance the slip states (n,) by the turns since `before` (n,), which becomes now."""
+    for j in range(laws.dof.size):
+        q = qpos[laws.qpos[j]]
+        dq = q - before[j]
+        before[j] = q
+        if dq != 0.0:
+            s = 1.0 if dq > 0.0 else -1.0
+            z[j] = s + (z[j] - s) * math.exp(-abs(dq) / laws.presliding)
+
+
+@jit_internal
+def path_bodies(t, tree, paths, body):
+    """Write the body (or -2 for a pulley) of each point of tendon t; return how many there are."""
+    first, n, at = paths.ten_wrapadr[t], paths.ten_wrapnum[t], tree.tendon_adr[t]
+    for k in range(n):
+        what = paths.wrap_obj[first + k]
+        if what == PULLEY_POINT:
+            body[k] = PULLEY_POINT
+        elif what == SITE_POINT:
+            while tree.wrap_type[at] != MUJOCO_SITE:
+                at += 1
+            body[k] = tree.site_body[tree.wrap_objid[at]]
+            at += 1
+        else:
+            body[k] = tree.geom_body[what]
+    return n
+
+
+@jit_internal
+def add_point(point, u, sign, body, tree, paths, out):
+    """Add sign * (u . dp/dq) of a point of a body to `out` (nv,)."""
+    if body < 0:
+        return
+    i = tree.body_last_dof[body]
+    root = tree.body_root[body]
+    while i >= 0:
+        c = paths.cdof[i]
+        a, b, d = (
+            point[0] - paths.subtree_com[root, 0],
+            point[1] - paths.subtree_com[root, 1],
+            point[2] - paths.subtree_com[root, 2],
+        )
+        x, y, w = c[3] + c[1] * d - c[2] * b, c[4] + c[2] * a - c[0] * d, c[5] + c[0] * b - c[1] * a
+        out[i] += sign * (u[0] * x + u[1] * y + u[2] * w)
+        i = tree.dof_parent[i]
+
+
+@jit_internal
+def tendon_forces(t, T, law, tree, paths, slip, gradient, h, started, applied, damping):
+    """Add what a tendon's friction changes of the generalised forces (nv,) while it is pulled by T (N), and the damping (nv,).
+
+    `law` is (mu, presliding in m). Advances the slip states by the travel since the step before, unless not yet `started`.
+    """
+    mu, presliding = law
+    nv = applied.size
+    body = np.empty(paths.ten_wrapnum[t], np.int64)
+    n = path_bodies(t, tree, paths, body)
+    first = paths.ten_wrapadr[t]
+    u, length = np.zeros((n, 3)), np.zeros(n)
+    for k in range(n - 1):
+        if body[k] == PULLEY_POINT or body[k + 1] == PULLEY_POINT:
+            continue
+        for c in range(3):
+            u[k, c] = paths.wrap_xpos[first + k + 1, c] - paths.wrap_xpos[first + k, c]
+        length[k] = math.sqrt(u[k, 0] * u[k, 0] + u[k, 1] * u[k, 1] + u[k, 2] * u[k, 2])
+        for c in range(3):
+            u[k, c] /= max(length[k], 1e-12)
+    for i in range(nv):
+        gradient[i] = 0.0
+    beyond, extra = 0.0, np.zeros((n, 2))  # turn of each point, and how far it is from sliding
+    for k in range(n - 2, 0, -1):
+        beyond += length[k]
+        if body[k] != body[k + 1]:
+            add_point(paths.wrap_xpos[first + k + 1], u[k], 1.0, body[k + 1], tree, paths, gradient)
+            add_point(paths.wrap_xpos[first + k], u[k], -1.0, body[k], tree, paths, gradient)
+        dot = u[k - 1, 0] * u[k, 0] + u[k - 1, 1] * u[k, 1] + u[k - 1, 2] * u[k, 2]
+        if length[k] > 0.0 and length[k - 1] > 0.0:
+            extra[k, 0] = math.acos(min(1.0, max(-1.0, dot)))
+        travel = slip.beyond[t, k] - beyond if started else 0.0
+        slip.beyond[t, k] = beyond
+        s = 1.0 if travel > 0.0 else -1.0 if travel < 0.0 else 0.0
+        slip.z[t, k] = s + (slip.z[t, k] - s) * math.exp(-abs(travel) / presliding)
+        if T > 0.0 and mu > 0.0:
+            size = 0.0
+            for i in range(nv):
+                size += abs(gradient[i])
+            for i in range(nv):
+                damping[i] += (
+                    TENDON_SHARE * h * T * mu * extra[k, 0] * (1.0 - s * slip.z[t, k]) / presliding * abs(gradient[i]) * size
+                )
+    lost = 0.0
+    for k in range(1, n - 1):
+        lost += mu * slip.z[t, k] * extra[k, 0]
+        if body[k] != body[k + 1] and T > 0.0:
+            less = T * (1.0 - math.exp(-min(lost, LARGEST_LOSS)))
+            add_point(paths.wrap_xpos[first + k + 1], u[k], less, body[k + 1], tree, paths, applied)
+            add_point(paths.wrap_xpos[first + k], u[k], -less, body[k], tree, paths, applied)

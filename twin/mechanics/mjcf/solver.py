@@ -1,0 +1,230 @@
+"""The solver of an MJCF: trials by MuJoCo's steps, with the laws of effects between them."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, field, replace
+
+import mujoco
+import numpy as np
+
+from twin.body import DIRECT, NOT_FOUND, Loads, Problem, Route, Solution
+from twin.mechanics.mjcf.body import ModelBody, payload_places
+from twin.mechanics.mjcf.friction import JointLaws, Paths, Slip, Tree
+from twin.mechanics.mjcf.poses import add_masses, set_start
+from twin.mechanics.mjcf.stepping import LARGEST_RATE, Laws, Memory, Views, run
+
+LONGEST_STEP = 2e-3  # s: for a finger of 30 g on winches of 2 N/mm a hundredth of a degree from the limit of short steps
+MOST_LOADED_MODELS = 8
+MOST_SETTLED = 4
+_WHOLE_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_SHOWN = ("qpos", "qfrc_actuator", "actuator_length", "actuator_force", "ten_length", "site_xpos", "sensordata")
+_RATES = ("qvel", "actuator_velocity", "ten_velocity")
+
+
+@dataclass(frozen=True)
+class _Compiled:
+    """A model under one set of loads, its data, views and tendons' geometry."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    views: Views
+    tree: Tree
+    paths: Paths
+    pull: np.ndarray
+    settled: dict[bytes, tuple[np.ndarray, Memory]] = field(default_factory=dict)  # states where trials begin
+
+
+class ModelSolver:
+    """Simulates trials of an MJCF. Its statics are its dynamics: what is slow is stepped like what is fast.
+
+    Steps are the rows' interval in equal parts, `ModelBody.longest_step` at most; commands run straight from row to row. A trial
+    starts settled under its first command (`twin.body.Start`).
+    """
+
+    n_delayed = 0
+
+    def __init__(self, body: ModelBody) -> None:
+        self.body, self.places = body, payload_places(body.loaded)
+        self.straight_path = _lengths_at_rest(body.model)
+        self._compiled: dict[bytes, _Compiled] = {}
+
+    def solve(self, problem: Problem) -> Solution:
+        """Simulate a trial. Raises DataError for a payload or a start that the model does not have."""
+        now = self._under(problem.loads)
+        laws = _laws(now, self.body, problem.route)
+        time, h, rows = _grid(problem.time, self.body.longest_step)
+        commands = np.stack([np.interp(time, problem.time, u) for u in np.asarray(problem.command, float).T], axis=1)
+        now.model.opt.timestep = h
+        memory, stands = self._settled(now, laws, problem, h, commands[:1])
+        out = np.full((len(time) if rows is None else len(problem.time), _width(now)), np.nan)
+        each = np.append(np.arange(len(time)) if rows is None else rows, -1)
+        commands = np.vstack([commands, commands[-1:]])
+        done = run(now.model._address, now.data._address, now.views, laws, memory, h, commands, each, out) if stands else 0
+        if rows is None:
+            out = np.stack([np.interp(problem.time, time, column) for column in out.T], axis=1)
+        return self._solution(out, now, done == len(commands))
+
+    def _settled(self, now: _Compiled, laws: Laws, problem: Problem, h: float, first: np.ndarray) -> tuple[Memory, bool]:
+        """Settle under the `first` command (1, nu), or take what was settled before; return the laws' memory and whether it stands.
+
+        Most trials of a session begin alike.
+        """
+        start = problem.start
+        key = repr((first.tolist(), h, start, problem.route)).encode()
+        if key not in now.settled:
+            set_start(now.model, now.data, first[0], start.pose)
+            memory = _memory(now, laws)
+            steps = max(0, round(start.settle / h))
+            held, none, nothing = np.repeat(first, steps, axis=0), np.empty(0, np.int64), np.empty((0, 0))
+            run(now.model._address, now.data._address, now.views, laws, memory, h, held, none, nothing)
+            state = np.empty(mujoco.mj_stateSize(now.model, _WHOLE_STATE))
+            mujoco.mj_getState(now.model, now.data, state, _WHOLE_STATE)
+            if len(now.settled) >= MOST_SETTLED:
+                now.settled.pop(next(iter(now.settled)))
+            now.settled[key] = state, memory
+        state, memory = now.settled[key]
+        mujoco.mj_resetData(now.model, now.data)
+        mujoco.mj_setState(now.model, now.data, state, _WHOLE_STATE)
+        mujoco.mj_forward(now.model, now.data)
+        slip = Slip(memory.slip.z.copy(), memory.slip.beyond.copy())  # type: ignore[attr-defined]
+        copied = Memory(memory.z.copy(), memory.before.copy(), slip, memory.started.copy())
+        rates = now.data.qvel
+        return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
+
+    def _under(self, loads: Loads) -> _Compiled:
+        """Return the model with the loads' gravity, payloads and force."""
+        body = self.body
+        tip = [(body.loaded.names("site")[body.tip], loads.payload)] if loads.payload and body.tip >= 0 else []
+        masses = [*loads.payloads, *tip]
+        key = repr((masses, loads.gravity.tolist())).encode()
+        if key not in self._compiled:
+            model = copy(body.model)
+            add_masses(model, masses, self.places)
+            model.opt.gravity[:] = loads.gravity
+            if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):  # has no step in two halves
+                model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+            model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # what diverges is not begun again unseen
+            data = mujoco.MjData(model)
+            mujoco.mj_setConst(model, data)
+            if len(self._compiled) >= MOST_LOADED_MODELS:
+                self._compiled.pop(next(iter(self._compiled)))
+            self._compiled[key] = _compile(model, data)
+        return self._compiled[key]
+
+    def _solution(self, out: np.ndarray, now: _Compiled, whole: bool) -> Solution:
+        """Return the recorded columns as signals by group."""
+        model, at = now.model, 0
+        found = {}
+        for name, array in zip((*_SHOWN, *_RATES), (*now.views.shown, *now.views.rates), strict=True):
+            found[name] = out[:, at : at + array.size]
+            at += array.size
+        joints = np.arange(model.njnt)
+        dof, qpos = model.jnt_dofadr[joints], model.jnt_qposadr[joints]
+        angle, speed, effort = found["qpos"][:, qpos], found["qvel"][:, dof], found["qfrc_actuator"][:, dof]
+        length, force = found["actuator_length"], found["actuator_force"]
+        others = {"joint angle": angle, "joint shift": angle, "joint rate": speed, "joint speed": speed, "joint torque": effort}
+        others |= {"joint force": effort, "actuator angle": length, "actuator length": length}
+        others |= {"actuator rate": found["actuator_velocity"], "actuator speed": found["actuator_velocity"]}
+        others |= {"actuator torque": force, "actuator force": force, "tendon length": found["ten_length"]}
+        others |= {"tendon speed": found["ten_velocity"], "tendon tension": force @ now.pull.T + _own_tension(model, found)}
+        others |= {sense.group: found["sensordata"] for name, sense in self.body.senses.items() if name.startswith("sensor.")}
+        good = np.isfinite(out).all(axis=1)
+        return Solution(
+            tension=-force, path=length, markers=found["site_xpos"].reshape(len(out), -1, 3), q=found["qpos"], others=others,
+            status=np.where(good, DIRECT, NOT_FOUND),
+            end_reason="" if whole and good.all() else "the model's motion diverges; check masses, inertias and gains, or write "
+            "a shorter `timestep` in [structure]",
+        )  # fmt: skip
+
+
+def _own_tension(model: mujoco.MjModel, found: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the tension (n, ntendon) of the tendons' own springs and dampers."""
+    length, low, high = found["ten_length"], model.tendon_lengthspring[:, 0], model.tendon_lengthspring[:, 1]
+    stretch = np.maximum(length - high, 0.0) + np.minimum(length - low, 0.0)
+    return model.tendon_stiffness * stretch + model.tendon_damping * found["ten_velocity"]
+
+
+def _compile(model: mujoco.MjModel, data: mujoco.MjData) -> _Compiled:
+    shown, rates = (tuple(np.asarray(getattr(data, name)).reshape(-1) for name in names) for names in (_SHOWN, _RATES))
+    before = sum(array.size for array in shown[: _SHOWN.index("actuator_force")])
+    affine = (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)) & (model.actuator_delay <= 0.0)
+    limits = np.where(model.actuator_forcelimited[:, None] != 0, model.actuator_forcerange, [-np.inf, np.inf])
+    views = Views(
+        data.ctrl, data.qpos, data.qvel, data.qfrc_applied, data.qfrc_actuator, data.actuator_force, model.dof_damping, shown,
+        rates, before, np.where(affine, model.actuator_biasprm[:, 2], 0.0), limits,
+        (data.moment_rownnz, data.moment_rowadr, data.moment_colind, data.actuator_moment.reshape(-1)),
+        (-0.5, 0.5 if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_EULER) else -0.5),
+    )  # fmt: skip
+    last = np.full(model.nbody, -1, np.int64)
+    for k in range(model.nbody):
+        own = model.body_dofnum[k] > 0
+        last[k] = model.body_dofadr[k] + model.body_dofnum[k] - 1 if own else last[model.body_parentid[k]] if k else -1
+    tree = Tree(
+        model.tendon_adr.astype(np.int64), model.tendon_num.astype(np.int64), model.wrap_type.astype(np.int64),
+        model.wrap_objid.astype(np.int64), model.site_bodyid.astype(np.int64), model.geom_bodyid.astype(np.int64),
+        model.body_rootid.astype(np.int64), last, model.dof_parentid.astype(np.int64),
+    )  # fmt: skip
+    paths = Paths(
+        data.ten_wrapadr, data.ten_wrapnum, data.wrap_obj.reshape(-1), data.wrap_xpos.reshape(-1, 3), data.cdof, data.subtree_com
+    )
+    pull = np.zeros((model.ntendon, model.nu))
+    for k in range(model.nu):
+        if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_TENDON):
+            pull[model.actuator_trnid[k, 0], k] = -model.actuator_gear[k, 0]
+    return _Compiled(model, data, views, tree, paths, pull)
+
+
+def _lengths_at_rest(model: mujoco.MjModel) -> np.ndarray:
+    """Return the lengths (nu,) of actuators in the model's reference pose."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data.actuator_length.copy()
+
+
+def _width(now: _Compiled) -> int:
+    return sum(array.size for array in (*now.views.shown, *now.views.rates))
+
+
+def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
+    """Return the laws that effects put between the steps."""
+    rub, model, n = route.rubbing, now.model, len(body.joints)
+    each = [np.array(x, float) if x else np.zeros(n) for x in (rub.torque, rub.breakaway, rub.load, rub.viscous)]
+    rubs = np.flatnonzero(each[0] + each[1] + each[2] > 0.0)
+    joints = np.array(body.joints, np.int64)
+    dof, qpos = model.jnt_dofadr[joints].astype(np.int64), model.jnt_qposadr[joints].astype(np.int64)
+    model.dof_damping[dof] = body.model.dof_damping[dof] + each[3]
+    torque, breakaway, load = (x[rubs] for x in each[:3])
+    law = JointLaws(qpos[rubs], dof[rubs], torque, breakaway, load, float(rub.stribeck), float(rub.presliding))
+    mu = route.mu * np.ones(model.ntendon) * (route.mu_shares or 1.0)
+    return Laws(law, mu, float(route.presliding), now.tree, now.paths, now.pull)
+
+
+def _memory(now: _Compiled, laws: Laws) -> Memory:
+    """Return the laws' memory of a body at its start: nothing slips, no bristle is bent."""
+    points = 2 * int(now.model.tendon_num.max(initial=0)) + 2
+    slip = Slip(np.zeros((now.model.ntendon, points)), np.zeros((now.model.ntendon, points)))
+    before = now.data.qpos[laws.joints.qpos].copy()  # type: ignore[attr-defined]
+    return Memory(np.zeros(len(before)), before, slip, np.zeros(1, bool))
+
+
+def _grid(time: np.ndarray, longest: float) -> tuple[np.ndarray, float, np.ndarray | None]:
+    """Return the steps' times, their length (s), and the row of each step, -1 for none.
+
+    Rows at equal intervals fall on steps; others are interpolated between steps, which the None for rows says.
+    """
+    gap = np.diff(time)
+    typical = float(np.median(gap)) if gap.size else longest
+    parts = max(1, int(np.ceil(typical / longest - 1e-9)))
+    h = typical / parts
+    if not gap.size or np.abs(gap - typical).max() < 1e-6:
+        rows = np.full((len(time) - 1) * parts + 1, -1, np.int64)
+        rows[::parts] = np.arange(len(time))
+        return time[0] + h * np.arange(len(rows)), h, rows
+    n = int(np.ceil((time[-1] - time[0]) / h)) + 1
+    return time[0] + h * np.arange(n), h, None
+
+
+def half_step(body: ModelBody) -> ModelBody:
+    """Return the body with steps of half the length, to check that they are short enough."""
+    return replace(body, longest_step=0.5 * body.longest_step)

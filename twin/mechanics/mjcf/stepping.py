@@ -1,0 +1,161 @@
+"""A trial by MuJoCo's steps, with the laws between them, compiled: a step of three joints and three tendons takes 5 to 8 us."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.foundation.compiled import jit, jit_internal
+from twin.mechanics.mjcf.friction import joint_forces, slide_joints, tendon_forces
+from twin.mechanics.mujoco_symbols import mj_fwd_actuation, mj_step1, mj_step2
+
+REST_RATE = 1e-7  # rad/s or m/s: slower than this in all coordinates for `REST_STEPS` steps a body has settled
+REST_STEPS = 30
+LARGEST_RATE = 1e5  # rad/s or m/s: faster bodies have diverged
+
+
+class Views(NamedTuple):
+    """Views of a data's and a model's arrays."""
+
+    ctrl: np.ndarray
+    qpos: np.ndarray
+    qvel: np.ndarray
+    applied: np.ndarray  # qfrc_applied
+    effort: np.ndarray  # qfrc_actuator
+    force: np.ndarray  # actuator_force
+    damping: np.ndarray  # dof_damping of the model
+    shown: tuple  # arrays that are recorded in every row, in the order of the solver's columns
+    rates: tuple  # (qvel, velocities of actuators, of tendons), recorded after those
+    force_column: int  # of `actuator_force` among the columns
+    slope: np.ndarray  # (nu,) of an actuator's force over its velocity
+    forcerange: np.ndarray  # (nu, 2), infinite where it is not limited
+    moment: tuple  # of actuators: rownnz, rowadr, colind, values
+    centring: tuple  # share of the last change of joints' damping, and of actuators', that is added ahead
+
+
+class Laws(NamedTuple):
+    """All laws between the steps; `pull` (ntendon, nu) is the tension per force of each actuator."""
+
+    joints: object
+    mu: np.ndarray  # (ntendon,) of capstan friction
+    presliding: float  # m, of tendons
+    tree: object
+    paths: object
+    pull: np.ndarray
+
+
+class Memory(NamedTuple):
+    """What the laws remember from step to step."""
+
+    z: np.ndarray  # (n_joint,)
+    before: np.ndarray  # (n_joint,)
+    slip: object
+    started: np.ndarray  # (1,) whether tendons' paths are those of a step before
+
+
+@jit_internal
+def center_damping(views, own, before, before_act, started, applied):
+    """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step.
+
+    Else it acts at those after it (implicit integrators) or before it (Euler). It is half of the change in the step before;
+    steps become of second order by it.
+
+    `before` (nv,) and `before_act` (nu,) are the rates a step before. An actuator at its limit has no damping.
+    """
+    rownnz, rowadr, colind, values = views.moment
+    av = views.rates[1]
+    for k in range(before.size):
+        if started:
+            applied[k] -= views.centring[0] * own[k] * (views.qvel[k] - before[k])
+        before[k] = views.qvel[k]
+    for k in range(av.size):
+        f = views.centring[1] * views.slope[k] * (av[k] - before_act[k])
+        before_act[k] = av[k]
+        low, high, force = views.forcerange[k, 0], views.forcerange[k, 1], views.force[k]
+        if started and f != 0.0 and low < force < high:
+            for e in range(rowadr[k], rowadr[k] + rownnz[k]):
+                applied[colind[e]] += values[e] * f
+
+
+@jit_internal
+def center_rates(views, out):
+    """Replace the rates of a row, those before it, by the mean with those now, and its actuators' forces by those at that mean."""
+    at = 0
+    for array in views.shown:
+        at += array.size
+    for j in range(3):
+        array = views.rates[j]
+        for k in range(array.size):
+            change = 0.5 * (array[k] - out[at])
+            out[at] += change
+            if j == 1:
+                force, low, high = out[views.force_column + k], views.forcerange[k, 0], views.forcerange[k, 1]
+                if low < force < high:
+                    out[views.force_column + k] = min(high, max(low, force + views.slope[k] * change))
+            at += 1
+
+
+@jit
+def run(model, data, views, laws, memory, h, commands, rows, out):
+    """Step through commands (n, nu), one a step of h s, the state before step i being that at command i.
+
+    Where rows[i] >= 0 the shown arrays go to out[rows[i]], and the rates after them. The steps are a leapfrog: rates belong to the
+    moments between the steps, so that their means before and after a row are shown, and forces are corrected for that. The last row
+    needs one step more. With `rows` empty it settles under commands[0] until it is at rest. Returns the number of steps.
+    """
+    nv, nt = views.qvel.size, laws.pull.shape[0]
+    own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
+    before, before_act = np.zeros(nv), np.zeros(views.ctrl.size)
+    mu = laws.mu.max() if nt else 0.0
+    settling, last = rows.size == 0, -1
+    done = commands.shape[0]
+    for i in range(commands.shape[0]):
+        for k in range(nv):
+            views.applied[k] = 0.0
+            views.damping[k] = own[k] + raised[k]
+            raised[k] = 0.0
+        joint_forces(laws.joints, memory.z, h, views.qvel, views.effort, views.applied, views.damping)
+        for k in range(views.ctrl.size):
+            views.ctrl[k] = commands[i, k]
+        mj_step1(model, data)
+        if last >= 0:
+            center_rates(views, out[last])
+        row = -1 if settling else rows[i]
+        last = row
+        if mu > 0.0 or row >= 0:
+            mj_fwd_actuation(model, data)
+        if mu > 0.0:
+            for t in range(nt):
+                T = 0.0
+                for k in range(views.force.size):
+                    T += laws.pull[t, k] * views.force[k]
+                law = (laws.mu[t], laws.presliding)
+                tendon_forces(t, T, law, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised)
+            memory.started[0] = True
+        center_damping(views, own, before, before_act, i > 0, views.applied)
+        if row >= 0:
+            at = 0
+            for array in views.shown:
+                for k in range(array.size):
+                    out[row, at] = array[k]
+                    at += 1
+            for array in views.rates:
+                for k in range(array.size):
+                    out[row, at] = array[k]
+                    at += 1
+        mj_step2(model, data)
+        fastest = 0.0
+        for k in range(nv):
+            fastest = max(fastest, abs(views.qvel[k])) if math.isfinite(views.qvel[k]) else np.inf
+        slide_joints(laws.joints, memory.z, memory.before, views.qpos)
+        if not fastest < LARGEST_RATE:
+            done = i
+            break
+        slow = slow + 1 if fastest < REST_RATE else 0
+        if settling and slow > REST_STEPS:
+            break
+    for k in range(nv):
+        views.damping[k] = own[k]
+    return done

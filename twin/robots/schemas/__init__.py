@@ -1,0 +1,1 @@
+"""The rows of each family's `robot.toml`: units, ranges, defaults and meanings (`twin.robots.schema`)."""
