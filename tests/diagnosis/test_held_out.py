@@ -70,7 +70,9 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> HeldOut:
     monkeypatch.setattr(seal, "sensitivity", lambda bench, trials, twin, predicted: [np.array([trials[0]])])
     base, final = (SimpleNamespace(name=n, effects=()) for n in ("base", "after"))
     noise = SimpleNamespace(floor=lambda bench, G: {"marker": 4e-4 * float(G[0].max())})
-    conclusion: Any = SimpleNamespace(base=base, final=final, noise=lambda: noise)
+    monkeypatch.setattr(seal, "predict_by_polynomial", lambda bench, known, wanted: [bench.measured[k] - 3.0 * off for k in wanted])
+    context = SimpleNamespace(prepared=day, trials=[0, 2])
+    conclusion: Any = SimpleNamespace(base=base, final=final, noise=lambda: noise, context=context)
     return HeldOut.of(day, [y - 2.0 * off for y in day.measured], [(conclusion, [1, 3])])
 
 
@@ -79,6 +81,7 @@ def test_a_sealed_trial_without_equilibrium_is_named_and_counts_for_no_stage(ope
     assert errors.lost == (3,)
     assert errors.nominal["marker"] == pytest.approx(2e-3)
     assert errors.calibrated["marker"] == pytest.approx(1e-3)
+    assert errors.without_physics["marker"] == pytest.approx(3e-3)
     assert errors.after["marker"] == pytest.approx(1e-3)
     assert errors.floor == {"marker": pytest.approx(4e-4)}
     assert np.isnan(opened.error(lambda c: c.final))

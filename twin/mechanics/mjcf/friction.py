@@ -142,12 +142,13 @@ def add_point(point, u, sign, body, tree, paths, out):
 
 
 @jit_internal
-def tendon_forces(t, T, law, tree, paths, slip, gradient, h, started, applied, damping):
-    """Add what a tendon's friction changes of the generalised forces (nv,) while it is pulled by T (N), and the damping (nv,).
+def tendon_forces(pulled, law, tree, paths, slip, started, work):
+    """Add what a tendon's friction changes of the generalised forces (nv,) while it is pulled, and the damping (nv,).
 
-    `law` is (mu, presliding in m). Advances the slip states by the travel since the step before, unless not yet `started`.
+    `pulled` is (tendon, tension in N), `law` (mu, presliding in m, step in s), `work` (gradient, forces, damping), (nv,) each.
+    Advances the slip states by the travel since the step before, unless not yet `started`.
     """
-    mu, presliding = law
+    (t, T), (mu, presliding, h), (gradient, applied, damping) = pulled, law, work
     nv = applied.size
     body = np.empty(paths.ten_wrapnum[t], np.int64)
     n = path_bodies(t, tree, paths, body)

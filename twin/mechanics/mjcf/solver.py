@@ -60,7 +60,7 @@ class ModelSolver:
         out = np.full((len(time) if rows is None else len(problem.time), _width(now)), np.nan)
         each = np.append(np.arange(len(time)) if rows is None else rows, -1)
         commands = np.vstack([commands, commands[-1:]])
-        done = run(now.model._address, now.data._address, now.views, laws, memory, h, commands, each, out) if stands else 0
+        done = run((now.model._address, now.data._address, h), now.views, laws, memory, commands, each, out) if stands else 0
         if rows is None:
             out = np.stack([np.interp(problem.time, time, column) for column in out.T], axis=1)
         return self._solution(out, now, done == len(commands))
@@ -77,7 +77,7 @@ class ModelSolver:
             memory = _memory(now, laws)
             steps = max(0, round(start.settle / h))
             held, none, nothing = np.repeat(first, steps, axis=0), np.empty(0, np.int64), np.empty((0, 0))
-            run(now.model._address, now.data._address, now.views, laws, memory, h, held, none, nothing)
+            run((now.model._address, now.data._address, h), now.views, laws, memory, held, none, nothing)
             state = np.empty(mujoco.mj_stateSize(now.model, _WHOLE_STATE))
             mujoco.mj_getState(now.model, now.data, state, _WHOLE_STATE)
             if len(now.settled) >= MOST_SETTLED:

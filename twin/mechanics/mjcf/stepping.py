@@ -97,14 +97,29 @@ def center_rates(views, out):
             at += 1
 
 
+@jit_internal
+def write_row(views, out):
+    """Write the shown arrays and the rates one after another."""
+    at = 0
+    for array in views.shown:
+        for k in range(array.size):
+            out[at] = array[k]
+            at += 1
+    for array in views.rates:
+        for k in range(array.size):
+            out[at] = array[k]
+            at += 1
+
+
 @jit
-def run(model, data, views, laws, memory, h, commands, rows, out):
-    """Step through commands (n, nu), one a step of h s, the state before step i being that at command i.
+def run(engine, views, laws, memory, commands, rows, out):
+    """Step through commands (n, nu), the state before step i being that at command i. `engine` is (model, data, step in s).
 
     Where rows[i] >= 0 the shown arrays go to out[rows[i]], and the rates after them. The steps are a leapfrog: rates belong to the
     moments between the steps, so that their means before and after a row are shown, and forces are corrected for that. The last row
     needs one step more. With `rows` empty it settles under commands[0] until it is at rest. Returns the number of steps.
     """
+    model, data, h = engine
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
     before, before_act = np.zeros(nv), np.zeros(views.ctrl.size)
@@ -131,20 +146,12 @@ def run(model, data, views, laws, memory, h, commands, rows, out):
                 T = 0.0
                 for k in range(views.force.size):
                     T += laws.pull[t, k] * views.force[k]
-                law = (laws.mu[t], laws.presliding)
-                tendon_forces(t, T, law, laws.tree, laws.paths, memory.slip, gradient, h, memory.started[0], views.applied, raised)
+                law, work = (laws.mu[t], laws.presliding, h), (gradient, views.applied, raised)
+                tendon_forces((t, T), law, laws.tree, laws.paths, memory.slip, memory.started[0], work)
             memory.started[0] = True
         center_damping(views, own, before, before_act, i > 0, views.applied)
         if row >= 0:
-            at = 0
-            for array in views.shown:
-                for k in range(array.size):
-                    out[row, at] = array[k]
-                    at += 1
-            for array in views.rates:
-                for k in range(array.size):
-                    out[row, at] = array[k]
-                    at += 1
+            write_row(views, out[row])
         mj_step2(model, data)
         fastest = 0.0
         for k in range(nv):
