@@ -2,7 +2,9 @@
 
 robot.py          Robot: a folder under `models/`, or any folder with a `robot.toml`
 schema.py         rows of a `robot.toml`: unit, range, default and meaning
-family.py         what a family's module provides; the modules are in families/
+family.py         what a family's module provides
+families/         one module a family                      schemas/    the rows of each family's file
+named_points.py   points of an MJCF by name
 effect_tables.py  [[effect]] tables of robots and twins
 numbers.py        a robot's numbers in the units of its file
 starter.py        a folder to start one's own robot (`twin new`)
