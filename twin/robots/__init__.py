@@ -4,7 +4,7 @@ robot.py          Robot: a folder under `models/`, or any folder with a `robot.t
 schema.py         rows of a `robot.toml`: unit, range, default and meaning
 family.py         what a family's module provides
 families/         one module a family                      schemas/    the rows of each family's file
-named_points.py   points of an MJCF by name
+named_points.py   points of a body by name (`points.csv`)
 effect_tables.py  [[effect]] tables of robots and twins
 numbers.py        a robot's numbers in the units of its file
 starter.py        a folder to start one's own robot (`twin new`)
