@@ -244,7 +244,7 @@ def test_the_sensitivity_of_a_linear_robot_is_its_matrix(
     A, near = np.random.default_rng(0).normal(size=(len(plan.outputs), 3)), []
     memory = np.array([0.1, 40.0, 1e-9])  # s
     inputs = tuple(replace(i, drives=(drive,) * 3) for i in plan.inputs[:3])
-    robot: Any = SimpleNamespace(springs=lambda n: "springs")
+    robot: Any = SimpleNamespace(springs=lambda n: "springs", n_tendon=3)
     bench = replace(plan, robot=robot, inputs=inputs, measured=plan.measured[:3])
     monkeypatch.setattr(objective, "thermal_time_constant", lambda springs: memory)
 

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from tests.effects.test_conformance import is_of_models
 from tests.recorded_days import RECOVERED, Day, half, recorded_day
 from tools.benchmarks.diagnosis.attribution_table import held
 from tools.benchmarks.diagnosis.compared import COMPARABLE, COMPARED, OTHER_LAW, distance
@@ -66,7 +67,9 @@ def fitted_alone(day: Day) -> tuple[Fit, Fit]:
 
 
 # test_finger_day.py and test_transmission.py
-OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "joint_friction"}
+OF_OTHERS = {"sensor_drift", "sensor_gain", "sensor_hysteresis", "joint_friction"} | {
+    name for name, law in catalogue().items() if is_of_models(law)
+}
 
 
 @pytest.mark.parametrize("day", sorted(RECOVERED, key=lambda day: day in LAST), ids=lambda day: day.file.name.partition(".tar")[0])

@@ -57,15 +57,15 @@ class Route:
 
     mu: float = 0.0  # friction coefficient
     presliding: float = 4e-4  # m of travel, from sticking to sliding
-    mu_shares: tuple[float, ...] = ()  # of the tendons of an MJCF, in shares of mu; () is 1 for all
     stretch: float = 0.0  # m/N
     bedding: float = 0.0  # m by which a tendon beds in
     bedding_tension: float = 1.0  # N over which it beds in
     bearing: Bearing = field(default_factory=Bearing)
-    rubbing: Rubbing = field(default_factory=Rubbing)
     rest_bend_share: float = 0.0  # of its rest bend that the body had when SMA springs were put on
     stall_tension: float = np.inf  # N at which a motor that holds a tendon at a length gives way
     initial_stretch_share: float = 0.0  # of the stretch under the springs' first tension that was there when they were put on
+    mu_shares: tuple[float, ...] = ()  # of the tendons of an MJCF, in shares of mu; () is 1 for all
+    rubbing: Rubbing = field(default_factory=Rubbing)
     backlash: tuple[float, ...] = ()  # m each way of each tendon before its SMA spring follows
     crossing_travel: tuple[float, ...] = (1e-4,)  # m over which the backlash is crossed: each tendon's, or one for all
 

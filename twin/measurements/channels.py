@@ -57,9 +57,10 @@ ELEMENT_KINDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "element_sensor": ("sensor.NAME", ("1", "rad", "m", "N*m", "N", "rad/s", "m/s", "m/s^2", "rad/s^2")),
 }
 DERIVED_KINDS: dict[str, tuple[str, str]] = {"skin": ("skin_#", "m")}  # made from point clouds (`patches.py`), not read
-ALLOWED_NAMES = ", ".join(
-    pattern.replace("#", "K" if "@" in pattern else "I").replace("@", "x|y|z") for pattern, _ in CHANNEL_KINDS.values()
-) + ", each also as finger_N_...; of an MJCF " + ", ".join(p.replace("@", "x|y|z") for p, _ in ELEMENT_KINDS.values())  # fmt: skip
+ALLOWED_NAMES = (
+    ", ".join(pattern.replace("#", "K" if "@" in pattern else "I").replace("@", "x|y|z") for pattern, _ in CHANNEL_KINDS.values())
+    + ", each also as finger_N_...; of an MJCF joint|tendon|actuator|site|sensor.NAME.QUANTITY"
+)
 _INDEX = "[1-9][0-9]{0,3}"
 _GRAMMAR = {
     kind: re.compile(

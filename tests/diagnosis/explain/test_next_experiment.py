@@ -129,7 +129,7 @@ def test_springs_are_heated_and_given_time_to_cool() -> None:
 def test_a_jaw_is_asked_for_torques_from_none_to_the_largest() -> None:
     day = planned("default")
     turned = [replace(i, loads=replace(i.loads, torque=np.full(1, 0.02 + 0.01 * (k % 3)))) for k, i in enumerate(day.inputs)]
-    jaw: Any = SimpleNamespace(build=lambda: SimpleNamespace(load_channels={"jaw_torque": "torque"}))
+    jaw: Any = SimpleNamespace(build=lambda: SimpleNamespace(load_channels={"jaw_torque": "torque"}), n_tendon=3)
     proposed = menu(replace(day, inputs=tuple(turned), robot=jaw))
     assert sorted({float(t.loads.torque[0]) for _, t in proposed}) == pytest.approx([0.0, 0.01, 0.02, 0.04])
     assert {words.split(", ")[-1] for words, _ in proposed} == {f"load torque {x} N m" for x in ("0", "0.01", "0.02", "0.04")}

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.effects.test_conformance import by_length, is_of_antagonists, is_of_sensors
+from tests.effects.test_conformance import by_length, is_of_antagonists, is_of_models, is_of_sensors
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Evaluation, Model, Objective
 from twin.diagnosis.calibration.objective import objective_of
@@ -22,7 +22,7 @@ from twin.prediction.twin import Twin
 from twin.robots import load
 
 ROBOT = load("continuum")
-OF_RODS = [e for e, law in catalogue().items() if not is_of_sensors(law) and not is_of_antagonists(law)]
+OF_RODS = [e for e, law in catalogue().items() if not (is_of_sensors(law) or is_of_antagonists(law) or is_of_models(law))]
 UNIT = {"tension": ("tendon_{}_tension", "N", 0.01), "current": ("sma_{}_current", "A", 3e-3)}
 
 

@@ -223,7 +223,7 @@ def test_what_does_not_fit_a_jaw_is_refused_with_the_way_out() -> None:
     held = Recording(
         "continuum", "made", "simulation", None, (*inputs, Channel("tip_x", "output", "m")), (Trial("a", np.arange(3.0), pull),)
     )
-    with pytest.raises(DataError, match=r"joint_friction acts on antagonists.*continuum"):
+    with pytest.raises(DataError, match=r"joint_friction acts on friction of joints.*continuum"):
         Twin(load("continuum"), {}, (effect_class("joint_friction")({"torque": 0.01}, 3),)).predict(held)
 
 
