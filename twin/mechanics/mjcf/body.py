@@ -25,7 +25,7 @@ _ACTUATOR_GROUPS = {
     "position": ("actuator angle", "actuator length"), "velocity": ("actuator rate", "actuator speed"),
     "force": ("actuator torque", "actuator force"),
 }  # fmt: skip
-_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "torque": ("N*m", "N"), "force": ("N*m", "N")}
+_PORT_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "torque": ("N*m", "N"), "force": ("N*m", "N")}
 _S = mujoco.mjtSensor
 SENSOR_UNITS = {
     _S.mjSENS_JOINTPOS: "rad", _S.mjSENS_JOINTVEL: "rad/s", _S.mjSENS_TENDONPOS: "m", _S.mjSENS_TENDONVEL: "m/s",
@@ -58,10 +58,10 @@ def element_senses(loaded: LoadedModel) -> dict[str, Sense]:
     for k, name in enumerate(loaded.names("joint")):
         if model.jnt_type[k] in SCALAR_JOINTS:
             sliding = slides(model, "joint", k)
-            senses |= {f"joint.{name}.{w}": Sense(g[sliding], k, unit=_UNITS[w][sliding]) for w, g in _JOINT_GROUPS.items()}
+            senses |= {f"joint.{name}.{w}": Sense(g[sliding], k, unit=_PORT_UNITS[w][sliding]) for w, g in _JOINT_GROUPS.items()}
     for k, name in enumerate(loaded.names("actuator")):
         sliding = slides(model, "actuator", k)
-        senses |= {f"actuator.{name}.{w}": Sense(g[sliding], k, unit=_UNITS[w][sliding]) for w, g in _ACTUATOR_GROUPS.items()}
+        senses |= {f"actuator.{name}.{w}": Sense(g[sliding], k, unit=_PORT_UNITS[w][sliding]) for w, g in _ACTUATOR_GROUPS.items()}
     for k, name in enumerate(loaded.names("tendon")):
         senses[f"tendon.{name}.length"] = Sense("tendon length", k, unit="m")
         senses[f"tendon.{name}.velocity"] = Sense("tendon speed", k, unit="m/s")

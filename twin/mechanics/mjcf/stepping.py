@@ -11,7 +11,7 @@ from twin.foundation.compiled import jit, jit_internal
 from twin.mechanics.mjcf.friction import joint_forces, slide_joints, tendon_forces
 from twin.mechanics.mujoco_symbols import mj_fwd_actuation, mj_step1, mj_step2
 
-REST_RATE = 1e-7  # rad/s or m/s: slower than this in all coordinates for `REST_STEPS` steps a body has settled
+RATE_AT_REST = 1e-7  # rad/s or m/s: slower than this in all coordinates for `REST_STEPS` steps a body has settled
 REST_STEPS = 30
 LARGEST_RATE = 1e5  # rad/s or m/s: faster bodies have diverged
 
@@ -160,7 +160,7 @@ def run(engine, views, laws, memory, commands, rows, out):
         if not fastest < LARGEST_RATE:
             done = i
             break
-        slow = slow + 1 if fastest < REST_RATE else 0
+        slow = slow + 1 if fastest < RATE_AT_REST else 0
         if settling and slow > REST_STEPS:
             break
     for k in range(nv):
