@@ -84,5 +84,5 @@ class TendonFriction(Effect):
         if of_a_model(self.n_tendon):
             mu = tuple(self[f"mu_{name}"] for name in tendon_names(self.n_tendon))
             most = max(mu, default=0.0)
-            return Route(most, self["presliding"], tuple(m / most for m in mu)) if most > 0.0 else Route()
+            return Route(most, self["presliding"], mu_shares=tuple(m / most for m in mu)) if most > 0.0 else Route()
         return Route(self["mu"], self["presliding"])

@@ -1,4 +1,4 @@
-"""What keeps a day from being explained though little is left: numbers at their bounds, another loop, no size, no gain unseen."""
+"""What keeps a day from being explained though little is left: numbers at their bounds, another loop, no gain unseen."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.polynomial import predict_by_polynomial
 from twin.diagnosis.thresholds import NAMED_ONE_BY_ONE
 from twin.diagnosis.verdict import judge as stage
-from twin.diagnosis.verdict.gate import has_no_size
 from twin.diagnosis.verdict.judge import VerdictInputs, verdict
-from twin.foundation.parameters import FittedValue, Parameter
+from twin.foundation.parameters import Parameter
 
 CLEAN = VerdictInputs(2.0, 0.05, 0.05, (1.0, 0.1), 0.1, True, False, ())
 
@@ -68,21 +67,6 @@ def test_a_loop_that_the_twin_has_not_is_told_with_both_sizes(own: float, told: 
     if told:
         assert f"by {2e3 * HALF:.2f} mm" in said[0]
         assert f"by {2e3 * own:.2f} mm in this twin" in said[0]
-
-
-@pytest.mark.parametrize(
-    ("mu", "presliding", "nothing"),
-    [((0.1, 0.2), (1e-4, 2e-4), True), ((0.3, 0.2), (1e-4, 2e-4), False), ((0.1, None), (0.0, 1e-4), False)],
-)
-def test_an_effect_whose_numbers_are_all_below_their_errors_has_no_size(
-    mu: tuple[float, float | None], presliding: tuple[float, float | None], nothing: bool
-) -> None:
-    found = {"mu": FittedValue(*mu, "1"), "presliding": FittedValue(*presliding, "m")}
-    free = [
-        SimpleNamespace(effect="tendon_friction", parameter=SimpleNamespace(name=name, value=0.0)) for name in ("mu", "presliding")
-    ]
-    fit: Any = SimpleNamespace(fitted=lambda effect: found, model=SimpleNamespace(free=free))
-    assert has_no_size(fit, "tendon_friction") is nothing
 
 
 def test_effects_improve_where_all_groups_together_come_nearer_to_their_floors() -> None:

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.evidence.left_out import left_out, proven
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, with_effect_added
@@ -13,7 +12,6 @@ from twin.diagnosis.search.lag_or_delay import LATE, tells_laws
 from twin.diagnosis.search.screen import Screening
 from twin.diagnosis.search.search import Search
 from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LARGE_STRUCTURE, LAW_FORM_SHARE, LEFT_BY_EFFECTS
-from twin.effects import catalogue
 
 
 @dataclass(frozen=True)
@@ -66,11 +64,6 @@ def gate(context: FitContext, found: Search, screening: Screening) -> Gated:
         if not moved:
             return Gated(best, {}, tuple(small), tuple(doubts))
         least = min(moved, key=lambda e: moved[e])
-        unknown = next((e for e in sorted(moved, key=lambda e: moved[e]) if has_no_size(best.fit, e)), None)
-        if unknown is not None:
-            small.append(TooSmall(unknown, best, moved[unknown]))
-            best = without[unknown]
-            continue
         if _immaterial(context, screening.limits, best, without[least]) or _may_be_form(
             context, screening.limits, best, without, least
         ):
@@ -85,19 +78,6 @@ def gate(context: FitContext, found: Search, screening: Screening) -> Gated:
             return Gated(best, without, tuple(small), tuple(doubts))
         doubts.append(ambiguity)
         best = without[ambiguity.effect]
-
-
-def has_no_size(fit: Fit, effect: str) -> bool:
-    """Return whether each fitted number of an effect is smaller than its own standard error, so that it may be absent."""
-    if not (found := fit.fitted(effect)):
-        return False
-    inactive = catalogue()[effect].inactive_when_off
-    sizes = [
-        (abs(found[f.parameter.name].value - f.parameter.value), found[f.parameter.name].std)
-        for f in fit.model.free
-        if f.effect == effect and f.parameter.name not in inactive
-    ]
-    return bool(sizes) and all(std is not None and size < std for size, std in sizes)
 
 
 def contribution(context: FitContext, best: ScoredModel, without: ScoredModel) -> float:
