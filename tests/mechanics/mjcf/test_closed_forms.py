@@ -124,7 +124,7 @@ def test_each_tendon_has_its_own_friction(tmp_path: Path) -> None:
     time = np.arange(0.0, 2.0, 0.02)
     T = np.interp(time, [0, 2], [0.0, 8.0])[:, None]
     one, none, half = (
-        solved(slider, time, T, Route(mu, 2e-5, shares)).others["joint shift"][-1, 0]
+        solved(slider, time, T, Route(mu, 2e-5, mu_shares=shares)).others["joint shift"][-1, 0]
         for mu, shares in ((0.3, (1.0,)), (0.0, ()), (0.6, (0.5,)))
     )
     assert none > one == pytest.approx(half, rel=1e-12)
