@@ -332,7 +332,7 @@ SHUFFLED_ORDERS = _row("SHUFFLED_ORDERS", 999, "orders", "of the trials, none of
 STEP_LEFTOVER_SHARE = _row("STEP_LEFTOVER_SHARE", 0.2, "of the trials' scatter",
     "that a step in time may leave; of a steady drift the best step leaves a quarter",
     "derivation: a line of slope one less its best step keeps 1/4 of its variance")
-NAMED_ONE_BY_ONE = _row("NAMED_ONE_BY_ONE", 6, "trials or numbers", "named before the rest is counted", "judgement")
+NAMED_ONE_BY_ONE = _row("NAMED_ONE_BY_ONE", 6, "trials", "named before the rest is counted", "judgement")
 TIP_FORCE_SHARE = _row("TIP_FORCE_SHARE", 0.5, "of what is left",
     "that a force on the tip must explain to be named as a possible cause", "judgement: as LEFT_BY_EFFECTS")
 PROBE_FORCE = _row("PROBE_FORCE", 1e-3, "N", "a force that moves a robot to first order", "derivation: 2 % of the weight of 5.6 g")

@@ -104,7 +104,7 @@ def describe_rival(diagnosis: Diagnosis) -> str:
 
 def describe_caveats(diagnosis: Diagnosis) -> str:
     """List what stands against the verdict."""
-    return "".join(f" But {words}." for words in diagnosis.caveats)
+    return "".join(f" {'And' if k else 'But'} {words}." for k, words in enumerate(diagnosis.caveats))
 
 
 def describe_untried(diagnosis: Diagnosis) -> str:

@@ -1,7 +1,7 @@
 """Warnings about a fit, in words."""
 
 from twin.diagnosis.calibration.fit import Fit
-from twin.diagnosis.thresholds import NAMED_ONE_BY_ONE, UNLIKELY_PARAMETER_DISTANCE
+from twin.diagnosis.thresholds import UNLIKELY_PARAMETER_DISTANCE
 
 
 def unlikely(found: Fit) -> list[str]:
@@ -31,12 +31,10 @@ def far_from_description(found: Fit) -> str:
     names = [words.partition(" ")[0] for words in unlikely(found)]
     if not names:
         return ""
-    shown = ", ".join(names[:NAMED_ONE_BY_ONE]) + (
-        f" and {len(names) - NAMED_ONE_BY_ONE} more" if len(names) > NAMED_ONE_BY_ONE else ""
-    )
+    which = names[0] if len(names) == 1 else f"{len(names)} numbers of the robot ({names[0]}, ...)"
     return (
-        f"of the robot's own numbers {shown} came out at an end of the range or {UNLIKELY_PARAMETER_DISTANCE:.0f} standard "
-        "deviations off the description (see the notices): it may be wrong there, and effects imitate what it lacks"
+        f"{which} ended at a bound or {UNLIKELY_PARAMETER_DISTANCE:.0f} standard deviations off the description, so the effects "
+        "may imitate a wrong description (see the notices)"
     )
 
 
