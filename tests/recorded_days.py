@@ -149,6 +149,7 @@ def main() -> None:
 
 
 RECOVERED = (  # an effect's own day, strong enough to be measured well, driven by what shows it
+    Day("actuator_gain", 3.0, design="by_length"), Day("drive_zero", 4.0, design="by_length"),
     Day("actuator_lag"), Day("actuator_saturation", 3.5), Day("actuator_saturation", 3.5, design="by_length"),
     Day("backbone_ageing"), Day("backbone_creep"), Day("backbone_precurvature"), Day("backbone_precurvature", design="by_current"),
     Day("base_tilt", 4.0), Day("camera_misalignment"), Day("contact", 1.6), Day("load_cell_bias", 4.0),

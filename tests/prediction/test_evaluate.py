@@ -72,6 +72,7 @@ SI = {
     "angle": "rad",
     "torque": "N*m",
     "skin": "m",
+    **{f"motor {of}": unit for of, unit in (("angle", "rad"), ("torque", "N*m"), ("current", "A"))},
     **{f"joint {of}": unit for of, unit in (("angle", "rad"), ("shift", "m"), ("torque", "N*m"), ("force", "N"))},
     **{f"actuator {of}": unit for of, unit in (("angle", "rad"), ("length", "m"), ("torque", "N*m"), ("force", "N"))},
     **{f"{of} rate": "rad/s" for of in ("joint", "actuator")},

@@ -84,7 +84,7 @@ class Body:
         friction of joints  a joint may rub                    load friction  a gear may rub with its load
         joints        inertia and stiffness of joints change  servos         strengths of actuators change
         encoders      joints' angles are read                 start          a trial may start from a pose, and settle
-        controls      actuators' controls drive it
+        controls      actuators' controls drive it      drive zeros    drives have a zero and a gain of their own
 
     `payload_places` are the sites and bodies that a declared mass may hang at.
     """

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from twin.body import Body
-from twin.effects.base.effect import Effect
+from collections.abc import Iterator
+
+import numpy as np
+
+from twin.body import Body, Signals
+from twin.effects.base.effect import Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 
 class ActuatorGain(Effect):
-    """The force (or torque) of each actuator is F' = gain F; of a servo that scales kp, kv and offset alike.
+    """The force (or torque) of each actuator is F' = gain F, which of a servo scales kp, kv and offset alike; d' = gain d of a
+    displacement, as of a spool of another radius.
 
-    Source: motor constants, 5-10 %; a supply that sags; a gear whose ratio is not the described one.
+    It does nothing to a tendon whose tension is given.
+
+    Source: motor constants, 5-10 %; a supply that sags; a gear or a spool whose size is not the described one.
 
     >>> ActuatorGain(gain_1=0.9).per_tendon_values("gain").tolist()
     [0.9]
@@ -18,11 +25,31 @@ class ActuatorGain(Effect):
 
     id = "actuator_gain"
     per_tendon = (Parameter("gain", 1.0, "1", 0.2, 3.0, "of motor constants, 5-10 %; of supplies, some tens", scale=0.02),)
-    needs = frozenset({"servos"})
-    moves_with = "the force of the drive"
+    needs = frozenset({"drive zeros"})
+    moves_with = "the force, or the travel, of the drive"
     plot_against = "torque"
+
+    @classmethod
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        """Start with each drive alone, then with all of them; where tensions or currents drive there are none."""
+        if (predicted[0].driven_by_control | predicted[0].driven_by_length).any():
+            yield from super().fit_starts(predicted, n_tendon)
 
     def edit(self, body: Body) -> None:
         gain = self.per_tendon_values("gain")
-        if (gain != 1.0).any():
+        if (gain != 1.0).any() and "servos" in body.features:
             body.scale_actuators(gain)
+
+    def command(self, reported: Signals) -> Signals:
+        gain = self.per_tendon_values("gain")
+        if not (gain != 1.0).any():
+            return reported
+        return reported.with_changes(
+            displacement=np.where(reported.driven_by_length, gain * reported.displacement, reported.displacement)
+        )
+
+    def sense(self, true: Signals) -> Signals:
+        gain = self.per_tendon_values("gain")
+        if not (gain != 1.0).any():
+            return true
+        return true.with_changes(displacement=np.where(true.driven_by_length, true.displacement / gain, true.displacement))

@@ -2,6 +2,7 @@
 
     [finger_N_] tendon_I_(tension|displacement) | sma_I_(current|voltage|temperature|resistance) | ambient_temperature
               | disk_K_(x|y|z) | marker_K_(x|y|z) | tip_(x|y|z) | sensor_I_resistance | joint_I_(angle|torque)
+              | motor_I_(angle|current|torque)
     on a robot that is an MJCF, NAME being the model's, dots and slashes included:
     actuator.NAME.(ctrl|position|velocity|force) | joint.NAME.(position|velocity|torque) | tendon.NAME.(length|velocity|tension)
               | site.NAME.(x|y|z) | sensor.NAME[.K]
@@ -37,6 +38,9 @@ CHANNEL_KINDS: dict[str, tuple[str, str]] = {
     "sensor_resistance": ("sensor_#_resistance", "ohm"),
     "joint_angle": ("joint_#_angle", "rad"),
     "joint_torque": ("joint_#_torque", "N*m"),
+    "motor_angle": ("motor_#_angle", "rad"),
+    "motor_current": ("motor_#_current", "A"),
+    "motor_torque": ("motor_#_torque", "N*m"),
 }
 _ROTARY_OR_LINEAR = ("rad", "m")
 _TURNING_OR_SLIDING = ("rad/s", "m/s")

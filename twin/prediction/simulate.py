@@ -83,7 +83,8 @@ class TrialSimulator:
         if not solution.status.all():
             bad = int(np.flatnonzero(solution.status == 0)[0])
             reason = solution.end_reason
-            raise SolveError(f"{inputs.name}: {reason}" if reason else _describe_failure(inputs.name, problem, bad), bad)
+            excess = driven.displacement[bad] - (self.solver.straight_path - solution.path[bad])
+            raise SolveError(f"{inputs.name}: {reason}" if reason else _describe_failure(inputs.name, problem, bad, excess), bad)
         shortening = self.solver.straight_path - solution.path + problem.route.elongation(solution.tension)
         travel = np.where(driven.driven_by_length, driven.displacement, shortening)
         markers = self.body.frame.to_marker_frame(solution.markers)
@@ -139,10 +140,17 @@ def _iterate(simulator: TrialSimulator, prepared: PreparedRecording, wanted: Seq
         yield k, simulator.solve(inputs, delayed, neighbours[k].solution if k in neighbours else None)
 
 
-def _describe_failure(name: str, problem: Problem, bad: int) -> str:
+def _describe_failure(name: str, problem: Problem, bad: int, excess: np.ndarray) -> str:
+    """Return where a trial has no equilibrium, and of held tendons which is asked for most beyond the last shape, `excess` m."""
     shown = [d.display_unit for d in problem.drives]
     pull = ", ".join(f"{factor * c:.2f} {unit}" for c, (unit, factor) in zip(problem.command[bad], shown, strict=True))
-    hint = "; displacements may pull against each other" if Drive.DISPLACEMENT in problem.drives else ""
+    hint = ""
+    if Drive.DISPLACEMENT in problem.drives:
+        most = int(np.argmax(np.where(problem.drive_mask(Drive.DISPLACEMENT), excess, -np.inf)))
+        hint = (
+            f"; displacements may pull against each other: tendon {most + 1} most, {1e3 * excess[most]:.2g} mm beyond the "
+            "shape before; is its zero or its sign another?"
+        )
     return (
         f"{name}: no static equilibrium at sample {bad + 1} (t = {problem.time[bad]:.3g} s, tendons {pull}, payload "
         f"{problem.loads.payload * 1e3:.3g} g); check the loads' units and directions{hint}"

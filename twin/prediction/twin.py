@@ -67,8 +67,8 @@ class Twin:
 
     @property
     def effect_chain(self) -> EffectChain:
-        """The effects, applied in order."""
-        return EffectChain(self.effects)
+        """The effects, applied in order, and the robot's own drive train."""
+        return EffectChain(self.effects, self.robot.drive_train(self.values))
 
     def body(self) -> Body:
         """Return the robot's body, edited by its effects and not compiled yet. Raises DataError for an effect that finds nothing to

@@ -1,15 +1,16 @@
 """Robots as data: the numbers of a `robot.toml`, each with unit and source, and the name of the family that builds it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from pydantic import Field
 
 from twin.body import Body, Counts, Solver
+from twin.body.drive_train import DriveTrain
 from twin.body.hinge_chain import HingeChain
 from twin.body.spring import Spring, build_springs
 from twin.foundation.errors import DataError, TwinError, UnknownNameError, join_problems, short_repr
@@ -31,6 +32,7 @@ from twin.robots.schema import (
     row_parameters,
     why_unknown,
 )
+from twin.robots.schemas.motor_rows import Motorised, drive_train
 
 ROBOT_FORMAT = "twin-robot/1"
 ROBOT_FILE = "robot.toml"
@@ -117,6 +119,15 @@ class Robot:
         if schema.model_file is not None:
             return []
         return schema.find_conflicts(schema.structure.model_validate(dict(self.structure)), fill_defaults(self.parameters, values))
+
+    def drive_train(self, values: Values | None = None) -> DriveTrain:
+        """Return what lies between its motors and its tendons at these parameter values."""
+        if not issubclass(load_family(self.family).SCHEMA.structure, Motorised):
+            return DriveTrain()
+        described = fill_defaults(self.parameters, {})
+        built = fill_defaults(self.parameters, values) if values else described
+        motors = cast(Sequence[Sequence[int]], self.structure.get("motors") or ())
+        return drive_train(motors, self.n_tendon, built, described)
 
     def springs(self, n: int, values: Values | None = None) -> Spring:
         """Return the SMA springs of n tendons at these parameter values. Raises DataError if the robot describes none."""

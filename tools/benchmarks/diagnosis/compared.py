@@ -79,6 +79,9 @@ COMPARED: dict[str, Compare] = {
         t.strength * (5e-5 * PULLS + t.toe * PULLS / (PULLS + t.half)),
         v["stretch"] * PULLS - v["toe"] * np.expm1(-PULLS / v["toe_tension"]), OTHER_LAW if t.toe else SAME_LAW,
     ),
+    "drive_zero": lambda t, v: (-1e-4 * t.strength * np.array(t.share), v["length"] + np.array(_each(v, "length")), OTHER_LAW),
+    # A common factor of all spools is the hole radius's.
+    "actuator_gain": lambda t, v: (_differ(-0.02 * t.strength * np.array(t.share)), _differ(np.array(_each(v, "gain"))), SAME_LAW),
     "transmission_error": lambda t, v: (_wave(t.pull(TRAVEL)), _wave(_harmonic(v)), OTHER_LAW),  # a whole drum there
     "sma_cooling": lambda t, v: (0.15 * t.strength * np.mean(t.gust), v["factor"] - 1.0, SAME_LAW),
     # Starts and finishes of the phases move by different amounts there: their means are what this law knows.

@@ -2,17 +2,19 @@
 
 Prediction, loaded robots, controllers and rollouts all apply effects through it:
 
-    reported -> command -> drive -> [the body, edited, under surround, route, spring, deform, soften] -> sense -> reported
+    reported -> command -> drive -> drive train
+             -> [the body, edited, under surround, route, spring, deform, soften] -> drive train -> sense -> reported
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 
 import numpy as np
 
 from twin.body import ROPE_FEATURES, Bearing, Body, Creep, Loads, Route, Rubbing, Signals
+from twin.body.drive_train import DriveTrain
 from twin.body.spring import Spring
 from twin.effects import Effect
 from twin.foundation.errors import DataError
@@ -20,9 +22,10 @@ from twin.foundation.errors import DataError
 
 @dataclass(frozen=True)
 class EffectChain:
-    """Effects in the order in which they act on a signal."""
+    """Effects in the order in which they act on a signal, and the robot's own drive train between them and its tendons."""
 
     effects: tuple[Effect, ...]
+    train: DriveTrain = field(default_factory=DriveTrain)
 
     def edit(self, body: Body, robot: str) -> None:
         """Change a body that is not compiled yet. Raises DataError as `check_body`."""
@@ -54,7 +57,7 @@ class EffectChain:
         """Return what the drives deliver for a command."""
         for effect in self.effects:
             command = effect.drive(command)
-        return command
+        return self.train.deliver(command)
 
     def surround(self, loads: Loads) -> Loads:
         """Return the loads that act on the body."""
@@ -82,7 +85,7 @@ class EffectChain:
         friction = next((r for r in routes if r.mu > 0.0), Route())
         bedding = next((r for r in routes if r.bedding > 0.0), Route())
         backlash = next((r for r in routes if any(r.backlash)), Route())
-        return Route(
+        route = Route(
             mu=friction.mu,
             presliding=friction.presliding,
             mu_shares=friction.mu_shares,
@@ -97,6 +100,7 @@ class EffectChain:
             backlash=backlash.backlash,
             crossing_travel=backlash.crossing_travel,
         )
+        return self.train.add_to(route)
 
     @property
     def creep(self) -> Creep:
@@ -106,6 +110,7 @@ class EffectChain:
 
     def sense(self, true: Signals) -> Signals:
         """Return the reported signals from the true ones."""
+        true = self.train.read(true)
         for effect in self.effects:
             true = effect.sense(true)
         return true

@@ -22,8 +22,9 @@ class EffectIO:
 
     def __init__(self, effect_chain: EffectChain, drive: Drive, n_tendon: int) -> None:
         self._chain, self.drives = effect_chain, (drive,) * n_tendon
-        self._acts = any(e.acts_in("command", "drive") for e in effect_chain.effects)
-        self._senses = any(e.acts_in("sense") for e in effect_chain.effects)
+        geared = effect_chain.train.acts
+        self._acts = geared or any(e.acts_in("command", "drive") for e in effect_chain.effects)
+        self._senses = geared or any(e.acts_in("sense") for e in effect_chain.effects)
         self.time: list[float] = []
         self._commands: list[np.ndarray] = []
         self.actuated: list[np.ndarray] = []

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from twin.body import Drive, Frame, marker_senses, tendon_ports, tendon_senses
+from twin.body import Drive, Frame, Port, marker_senses, tendon_ports, tendon_senses
 from twin.body.hinge_chain import HingeChain, JointSet
 from twin.foundation.parameters import parameter_array
 from twin.mechanics.rod import Equilibrium
@@ -24,6 +24,7 @@ from twin.mechanics.rod.dynamics import Dynamics
 from twin.robots.families.backbone import BACKBONES, Backbone, Piece
 from twin.robots.schemas.continuum import CONTINUUM_SCHEMA as SCHEMA
 from twin.robots.schemas.continuum import Continuum, disk_masses, hole_places
+from twin.robots.schemas.motor_rows import motor_ports, motor_senses
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
 
@@ -34,6 +35,7 @@ MIN_INERTIA = 1e-14  # kg m^2: MuJoCo refuses less than 1e-15; a millionth of a 
 MIN_DRAWN_THICKNESS = 1.5e-3  # m, of a drawn disk
 CONTINUUM_FEATURES = frozenset({
     "weight", "elasticity", "rest shape", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity", "rope",
+    "drive zeros",
 })  # fmt: skip
 
 
@@ -88,9 +90,9 @@ def _assemble_body(
         spec=spec,
         n_tendon=n_tendon,
         features=CONTINUUM_FEATURES,
-        ports=tendon_ports(n_tendon, values.get("springs.resistance", 1.0)),
+        ports=_ports(shape, values),
         dynamic_drives=frozenset({Drive.TENSION, Drive.DISPLACEMENT, Drive.CURRENT}),
-        senses=tendon_senses(n_tendon) | marker_senses([*markers, "tip"]),
+        senses=tendon_senses(n_tendon) | motor_senses(len(shape.motors or ()), values) | marker_senses([*markers, "tip"]),
         frame=Frame.from_values(values),
         joints=joints,
         tendon_sites=tendons,
@@ -101,6 +103,12 @@ def _assemble_body(
         straight_tendons=shape.body == "wire",
         stiffening=values.get("backbone.stiffening", 0.0),
     )
+
+
+def _ports(shape: Continuum, values: Mapping[str, float]) -> tuple[tuple[Port, ...], ...]:
+    own = tendon_ports(shape.tendons, values.get("springs.resistance", 1.0))
+    wound = motor_ports(shape.motors or (), values, shape.tendons)
+    return tuple((*ports, *wound.get(t, ())) for t, ports in enumerate(own))
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,17 @@ class _Known:
             for k, name in enumerate(loaded.names("actuator"))
         )
         self.tendon_sites = tendon_sites(loaded)
-        features = {"controls", "start", "servos", "joints", "encoders", "friction of joints", "load friction", "markers"}
+        features = {
+            "controls",
+            "drive zeros",
+            "start",
+            "servos",
+            "joints",
+            "encoders",
+            "friction of joints",
+            "load friction",
+            "markers",
+        }
         if np.linalg.norm(model.opt.gravity) > 0.0:
             features |= {"weight"}
         self.features = frozenset(features)

@@ -11,6 +11,7 @@ from twin.foundation.parameters import parameter_array
 from twin.mechanics.silicone import Cone, SoftBody, SoftDynamics, SoftStatics, straight_line
 from twin.mechanics.silicone.drawing import SoftFigure
 from twin.mechanics.silicone.material.lattice import lattice
+from twin.robots.schemas.motor_rows import motor_ports, motor_senses
 from twin.robots.schemas.soft import SOFT_SCHEMA as SCHEMA
 from twin.robots.schemas.soft import Soft
 
@@ -24,7 +25,7 @@ SILICONE_COLOUR, TENDON_COLOUR, SENSOR_COLOUR, MARKER_COLOUR = (
 )
 SOFT_FEATURES = frozenset({
     "weight", "elasticity", "markers", "load cells", "strain sensors", "planes", "length", "hanging zero", "rest shape", "holes",
-    "surface", "viscosity", "skin",
+    "surface", "viscosity", "skin", "drive zeros",
 })  # fmt: skip
 N_DISCS = 24  # of the drawing
 
@@ -41,15 +42,17 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
     markers = [f"marker_{m}" for m in range(1, shape.markers + 1)]
     cells = lattice(cone, shape.cells).quadrature[1]
     nt, ns = shape.tendons, shape.sensors
+    wound = motor_ports(shape.motors or (), values, nt)
     return SoftBody(
         spec=_drawing_spec(cone, paths, cord_paths, seen),
         n_tendon=nt,
         features=SOFT_FEATURES,
-        ports=tuple(ports[:2] for ports in tendon_ports(nt)),
+        ports=tuple((*ports[:2], *wound.get(t, ())) for t, ports in enumerate(tendon_ports(nt))),
         dynamic_drives=frozenset({Drive.TENSION, Drive.DISPLACEMENT}),
         senses={
             **{f"tendon_{i}_{kind}": Sense(kind, i - 1) for i in range(1, nt + 1) for kind in ("tension", "displacement")},
             **{f"sensor_{i}_resistance": Sense("sensor", i - 1) for i in range(1, ns + 1)},
+            **motor_senses(len(shape.motors or ()), values),
             **marker_senses([*markers, "tip"]),
         },
         tendon_sites=tuple(tuple(f"tendon_{i}_{p}" for p in range(shape.tendon_points)) for i in range(1, nt + 1)),

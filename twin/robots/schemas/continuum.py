@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from twin.foundation.parameters import parameter_array
-from twin.robots.schema import FULL_TURN, Row, Schema, Structure
+from twin.robots.schema import FULL_TURN, Row, Schema
+from twin.robots.schemas.motor_rows import MOTOR_ROWS, Motorised, motor_conflicts
 from twin.robots.schemas.spring_rows import SPRING_ROWS, spring_conflicts
 
 Disk = Annotated[int, Field(ge=1, le=200)]
@@ -22,7 +23,7 @@ LENGTH_TOLERANCE = 5e-3  # of the length: pitches written with three digits may 
 MAX_JOINT_SETS = 400  # of a robot: a tangent of 1,200 by 1,200, factorised in tenths of a second
 
 
-class Continuum(Structure):
+class Continuum(Motorised):
     """[structure] of family "continuum"."""
 
     body: Literal["wire", "cast"] = Field(
@@ -49,11 +50,11 @@ class Continuum(Structure):
     )
 
     def counts(self) -> dict[str, int]:
-        return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers)}
+        return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers), "motor": len(self.motors or ())}
 
     def kinds(self) -> frozenset[str]:
         body = CAST if self.body == "cast" else WIRE | (ROUND_SECTION if self.section == "round" else OTHER_SECTION)
-        return body | (ON_DISKS if self.markers == "disk" else LISTED)
+        return body | self.motor_kinds() | (ON_DISKS if self.markers == "disk" else LISTED)
 
     def ends(self) -> list[int]:
         """Return the disk at which each tendon ends."""
@@ -66,7 +67,7 @@ class Continuum(Structure):
         return self.pieces if isinstance(self.pieces, list) else [self.pieces] * self.disks
 
     def find_conflicts(self) -> list[str]:
-        out = []
+        out = self.motor_problems(self.tendons)
         if len(self.ends()) != self.tendons or max(self.ends()) > self.disks:
             one = f"a disk from 1 to {self.disks} is needed, or a list of {self.tendons}, one a tendon"
             out.append(f"structure: tendons_end is {self.tendons_end}; {one}")
@@ -111,7 +112,7 @@ def find_conflicts(structure: Continuum, values: Mapping[str, float]) -> list[st
         out += _wire_conflicts(structure, values, used, pitch)
     else:
         out += _cast_conflicts(values, z, min(used)[0])
-    return out + spring_conflicts(values)
+    return out + motor_conflicts(values) + spring_conflicts(values)
 
 
 def _wire_conflicts(
@@ -315,13 +316,16 @@ CONTINUUM_ROWS = (
         for a in "xyz"
     ),
     _all.row("damping.time", "s ms", "damping over stiffness (Rayleigh); counts in fast recordings only", 0.0, 10.0),
+    *MOTOR_ROWS,
     *SPRING_ROWS,
 )
 
 
 def usual_channels(structure: Continuum) -> list[tuple[str, str, str, float]]:
-    """Return tensions as inputs, marker positions as outputs."""
+    """Return tensions, or motors' angles, as inputs, marker positions as outputs."""
     pull = [(f"tendon_{i}_tension", "input", "N", 0.01) for i in range(1, structure.tendons + 1)]
+    if structure.motors:
+        pull = [(f"motor_{i}_angle", "input", "deg", 0.1) for i in range(1, len(structure.motors) + 1)]
     marker, n = ("disk", structure.disks) if structure.markers == "disk" else ("marker", len(structure.markers))
     return pull + [(f"{marker}_{k}_{a}", "output", "mm", 0.2) for k in range(1, n + 1) for a in "xyz"]
 

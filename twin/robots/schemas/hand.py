@@ -32,7 +32,7 @@ class Hand(Structure):
         n = self.fingers
         return soft.Soft(
             cells=self.cells, tendons=self.tendons // n, tendon_points=self.tendon_points, sensors=self.sensors // n,
-            sensor_points=self.sensor_points, markers=self.markers // n,
+            sensor_points=self.sensor_points, markers=self.markers // n, motors=None,
         )  # fmt: skip
 
     def find_conflicts(self) -> list[str]:

@@ -5,13 +5,14 @@ from typing import Annotated
 
 from pydantic import Field
 
-from twin.robots.schema import FULL_TURN, Row, Schema, Structure
+from twin.robots.schema import FULL_TURN, Row, Schema
+from twin.robots.schemas.motor_rows import MOTOR_ROWS, Motorised, motor_conflicts
 
 Count = Annotated[int, Field(ge=1, le=24)]
 Points = Annotated[int, Field(ge=3, le=200)]
 
 
-class Soft(Structure):
+class Soft(Motorised):
     """[structure] of family "soft"."""
 
     cells: Annotated[int, Field(ge=2, le=12)] = Field(5, description="layers of 27-node cells from clamp to tip")
@@ -22,7 +23,13 @@ class Soft(Structure):
     markers: Annotated[int, Field(ge=1, le=200)] = Field(description="how many markers on the skin")
 
     def counts(self) -> dict[str, int]:
-        return {"tendon": self.tendons, "sensor": self.sensors, "marker": self.markers}
+        return {"tendon": self.tendons, "sensor": self.sensors, "marker": self.markers, "motor": len(self.motors or ())}
+
+    def kinds(self) -> frozenset[str]:
+        return self.motor_kinds()
+
+    def find_conflicts(self) -> list[str]:
+        return self.motor_problems(self.tendons)
 
 
 def find_conflicts(structure: Soft, values: Mapping[str, float]) -> list[str]:
@@ -44,13 +51,16 @@ def find_conflicts(structure: Soft, values: Mapping[str, float]) -> list[str]:
                 out.append(f"{kind}.{name} is {1e3 * values[f'{kind}.{name}']:g} mm; the skin is at {1e3 * skin:.3g} mm there")
     if not clamp < values["tendons.anchor"] < length:
         out.append(f"tendons.anchor is {1e3 * values['tendons.anchor']:g} mm; a height between clamp and tip is needed")
-    return out
+    return out + motor_conflicts(values)
 
 
 def usual_channels(structure: Soft) -> list[tuple[str, str, str, float]]:
     """Return displacements as inputs, resistances and markers as outputs."""
+    pull = [(f"tendon_{i}_displacement", "input", "mm", 0.01) for i in range(1, structure.tendons + 1)]
+    if structure.motors:
+        pull = [(f"motor_{i}_angle", "input", "deg", 0.1) for i in range(1, len(structure.motors) + 1)]
     return [
-        *((f"tendon_{i}_displacement", "input", "mm", 0.01) for i in range(1, structure.tendons + 1)),
+        *pull,
         *((f"sensor_{i}_resistance", "output", "ohm", 0.3) for i in range(1, structure.sensors + 1)),
         *((f"marker_{m}_{a}", "output", "mm", 0.2) for m in range(1, structure.markers + 1) for a in "xyz"),
     ]
@@ -125,7 +135,7 @@ SOFT_DIAGRAM = """\
 
 SOFT_SCHEMA = Schema(
     structure=Soft,
-    rows=SOFT_ROWS,
+    rows=(*SOFT_ROWS, *MOTOR_ROWS),
     accuracy=Row("accuracy", "m", "mm", "what the description is believed to be good for: no smaller effect is claimed", 1e-9, 0.1),
     find_conflicts=find_conflicts,
     usual_channels=usual_channels,

@@ -244,3 +244,44 @@ class TransmissionError(Effect):
         for _ in range(INVERSE_ROUNDS):
             motor = displacement - (self.pull(motor) - motor)
         return motor
+
+
+@dataclass(frozen=True)
+class DriveZero(Effect):
+    """Motors whose zeros are off: each tendon is longer than its motor says by up to 0.1 mm times strength."""
+
+    id: ClassVar[str] = "drive_zero"
+    driven_by_length: ClassVar[bool] = True
+
+    share: tuple[float, ...]
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> DriveZero:
+        return cls(1.0, tuple(map(float, rng.uniform(0.3, 1.0, 3))))
+
+    def pull(self, displacement: np.ndarray) -> np.ndarray:
+        return displacement - 1e-4 * self.strength * np.array(self.share)
+
+    def encode(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        return displacement + 1e-4 * self.strength * np.array(self.share)
+
+
+@dataclass(frozen=True)
+class ActuatorGain(Effect):
+    """Spools smaller than described, each by up to 2 % times strength."""
+
+    id: ClassVar[str] = "actuator_gain"
+    most: ClassVar[float] = 10.0
+    driven_by_length: ClassVar[bool] = True
+
+    share: tuple[float, ...]
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> ActuatorGain:
+        return cls(1.0, tuple(map(float, rng.uniform(0.0, 1.0, 3))))
+
+    def pull(self, displacement: np.ndarray) -> np.ndarray:
+        return displacement * (1.0 - 0.02 * self.strength * np.array(self.share))
+
+    def encode(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        return displacement / (1.0 - 0.02 * self.strength * np.array(self.share))

@@ -28,7 +28,7 @@ SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal predicti
     channels.lost_markers, channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
-    units.payloads, units.torques, signs.gravity, signs.displacements, order.tendons, channels.inputs,
+    units.payloads, units.torques, signs.gravity, signs.displacements, signs.zeros, order.tendons, channels.inputs,
 )  # fmt: skip
 LAST: tuple[Kind, ...] = (  # thousandfold loads: where nothing else explains, or the robot as described has no equilibrium
     units.commands, description.parameters,

@@ -8,7 +8,7 @@ import numpy as np
 from twin.body import Drive
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, called
 from twin.diagnosis.checks.suspicions.units import best
-from twin.diagnosis.thresholds import GRAVITY_RANGE
+from twin.diagnosis.thresholds import GRAVITY_RANGE, HALVINGS_FOR_ZERO
 from twin.prediction.prepared import Inputs
 
 
@@ -43,6 +43,37 @@ def displacements(case: Case) -> Iterator[Suspicion]:
     change = f"the columns {called(channels)} with the other sign (positive is pulled in)"
     tried = [("", lambda i: replace(i, command=np.where(of, -i.command, i.command)))]
     yield from best(case, "sign", f"with {called(channels)} as written {pulls}", change, tried)
+    single = dict.fromkeys(c.name for c in channels)
+    if len(single) > 1:
+        by = {name: np.array([c.name == name for c in case.prepared.drivers]) for name in single}
+        turned = [(n, lambda i, w=w: replace(i, command=np.where(w, -i.command, i.command))) for n, w in by.items()]
+        words = "one drive turns the other way than the others"
+        yield from best(case, "one sign", words, "the column {} with the other sign (positive is pulled in)", turned)
+
+
+def zeros(case: Case) -> Iterator[Suspicion]:
+    """Yield the zero of one drive by displacement, where the lengths have no equilibrium and the least other zero gives them one."""
+    columns, found = case.columns(case.group), []
+    for t in [] if case.predicted is not None else np.flatnonzero([d is Drive.DISPLACEMENT for d in case.prepared.drives]):
+        low, high = 0.0, max(float(np.abs(i.command[:, t]).max()) for i in case.prepared.inputs)
+        shown = case.again(lambda i, t=t, by=high: _paid_out(i, t, by))
+        for _ in range(HALVINGS_FOR_ZERO if shown else 0):
+            middle = 0.5 * (low + high)
+            reached = case.again(lambda i, t=t, by=middle: _paid_out(i, t, by))
+            low, high, shown = (low, middle, reached) if reached else (middle, high, shown)
+        left = case.better(np.inf, case.error(columns, shown, case.few()), columns)
+        if left is not None:
+            found.append((left, high, case.prepared.drivers[t], abs(case.prepared.pull[t])))
+    if found:
+        left, by, channel, pull = min(found, key=lambda f: f[0])
+        beyond = f"{float(channel.unit_scale.without_offset().from_si(np.array([by / pull]))[0]):.2g} {channel.unit}"
+        words = f"{channel.name} is beyond what the body allows, by {beyond} or more"
+        change = f"its zero: offset = -{beyond.split()[0]} or less in its [[channel]]"
+        yield Suspicion("zero", words, change, left, case.group)
+
+
+def _paid_out(i: Inputs, t: int, by: float) -> Inputs:
+    return replace(i, command=i.command - by * (np.arange(i.command.shape[1]) == t))
 
 
 def size(case: Case) -> Iterator[Suspicion]:
