@@ -14,13 +14,18 @@ from twin.measurements import CHANNEL_KINDS, Channel, ChannelName, parse_channel
 INDEX = st.integers(1, 9999)
 
 
-@given(st.sampled_from(sorted(CHANNEL_KINDS)), INDEX, st.sampled_from("xyz"), st.none() | INDEX)
-def test_names_say_what_they_were_made_of(kind: str, index: int, axis: str, finger: int | None) -> None:
+AXES = {"@": ("x", "y", "z"), "%": ("qw", "qx", "qy", "qz"), "&": ("roll", "pitch", "yaw")}
+
+
+@given(st.sampled_from(sorted(CHANNEL_KINDS)), INDEX, st.integers(0, 3), st.none() | INDEX)
+def test_names_say_what_they_were_made_of(kind: str, index: int, which: int, finger: int | None) -> None:
     pattern, _ = CHANNEL_KINDS[kind]
-    name = (f"finger_{finger}_" if finger else "") + pattern.replace("#", str(index)).replace("@", axis)
-    assert parse_channel_name(name) == ChannelName(
-        kind, index if "#" in pattern else None, axis if "@" in pattern else None, finger
-    )
+    (axis,) = {axes[which % len(axes)] for mark, axes in AXES.items() if mark in pattern} or {None}
+    spelled = pattern.replace("#", str(index))
+    for mark in AXES:
+        spelled = spelled.replace(mark, str(axis))
+    name = (f"finger_{finger}_" if finger else "") + spelled
+    assert parse_channel_name(name) == ChannelName(kind, index if "#" in pattern else None, axis, finger)
 
 
 @given(st.text("tendo_1289xyzkispamr", max_size=24) | st.text(max_size=12))
@@ -28,7 +33,10 @@ def test_no_other_text_has_a_meaning(name: str) -> None:
     with contextlib.suppress(DataError):
         said = parse_channel_name(name)  # drawn by luck: then it is spelled as its meaning spells it
         pattern, _ = CHANNEL_KINDS[said.kind]
-        assert name.endswith(pattern.replace("#", str(said.index)).replace("@", str(said.axis)))
+        spelled = pattern.replace("#", str(said.index))
+        for mark in AXES:
+            spelled = spelled.replace(mark, str(said.axis))
+        assert name.endswith(spelled)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Motors that wind tendons: against the closed form of a planar rod between two antagonists, and what their descriptions may say."""
+"""Motors that wind tendons: against the closed form of a rod between two antagonists, and what their descriptions may say."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from pydantic_core import PydanticUndefined
 from tools.benchmarks.table import markdown
 from twin.foundation.file_schema import TableSchema
 from twin.foundation.units import UNIT_EXAMPLES
-from twin.measurements.channels import CHANNEL_KINDS
+from twin.measurements.channels import CHANNEL_KINDS, readable
 from twin.measurements.conditions import SCALAR_CONDITIONS, VECTOR_CONDITIONS
 from twin.measurements.read import ChannelTable, SetFile
 from twin.prediction.storage import TwinFile
@@ -70,7 +70,7 @@ def _row(row: Row) -> str:
 
 
 def _set() -> str:
-    units = [f"| `{pattern}` | {UNIT_EXAMPLES.get(unit, unit)} |" for pattern, unit in CHANNEL_KINDS.values()]
+    units = [f"| `{readable(pattern)}` | {UNIT_EXAMPLES.get(unit, unit)} |" for pattern, unit in CHANNEL_KINDS.values()]
     scalars = {name: UNIT_EXAMPLES[unit].split(", ")[-1] for name, unit in SCALAR_CONDITIONS.items()}
     known = [f'| `{name}` | text with a unit, such as "10 {unit}" |' for name, unit in scalars.items()]
     known += [f"| `{name}` | [x, y, z] in {unit}, base frame |" for name, unit in VECTOR_CONDITIONS.items()]

@@ -4,10 +4,11 @@ body.py          a body: its ports, senses and editing methods   solver.py      
 signals.py       commands and readings of a trial                loads.py         gravity, payload, forces, obstacles
 route.py         friction, stretch and play of tendons; creep    spring.py        parameters of SMA springs
 hinge_chain.py   a slender body as a chain of joints             strain_cords.py  resistive strain sensors
-drawable.py      arrays for drawing a body
+drawable.py      arrays for drawing a body         orientation.py   rotation vectors, quaternions, angles
+drive_train.py   motors that wind tendons
 """
 
-from twin.body.body import ROPE_FEATURES, Body, Frame, Port, Sense, marker_senses, tendon_ports, tendon_senses
+from twin.body.body import ROPE_FEATURES, Body, Frame, Port, Sense, marker_senses, tendon_ports, tendon_senses, turn_senses
 from twin.body.counts import Counts
 from twin.body.loads import Loads, Push
 from twin.body.route import Bearing, Creep, Route, Rubbing
@@ -56,4 +57,5 @@ __all__ = [
     "marker_senses",
     "tendon_ports",
     "tendon_senses",
+    "turn_senses",
 ]  # fmt: skip

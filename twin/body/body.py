@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from twin.body.signals import Drive
 from twin.foundation.errors import DataError
 from twin.foundation.parameters import Size
+from twin.measurements.channels import ANGLES
 
 ROPE_FEATURES = frozenset({"rope"})  # of a body whose tendons may bed in and whose motors may stall
 
@@ -73,7 +74,7 @@ class Body:
     `ports` holds, for each drive, the channels it may be driven through; `dynamic_drives` are the drives that its dynamics accept.
     `senses` are the channels it can show. `load_channels` maps input channels that load it to fields of `Loads`. `antagonists` is
     as in `Signals`, `frame` is the markers' frame, `tendon_sites` are the sites each tendon passes, base to tip, `marker_sites`
-    those of the markers. `features` are what effects need to act on:
+    those of the markers, `imu_sites` those of the IMUs. `features` are what effects need to act on:
 
         weight, elasticity (one stiffness for all of it), markers, load cells, strain sensors, antagonists
         rope          tendons may bed in, motors may stall    planes       `set_bending_anisotropy` works
@@ -100,6 +101,7 @@ class Body:
     frame: Frame = field(default_factory=Frame)
     tendon_sites: tuple[tuple[str, ...], ...] = ()
     marker_sites: tuple[str, ...] = ()
+    imu_sites: tuple[str, ...] = ()
     payload_places: frozenset[str] = frozenset()
 
     @property
@@ -170,6 +172,15 @@ def tendon_senses(n: int) -> dict[str, Sense]:
             f"sma_{i}_resistance": Sense("resistance", i - 1, required_drive=Drive.CURRENT),
         }
     return senses
+
+
+def turn_senses(names: list[str], imus: int = 0) -> dict[str, Sense]:
+    """Return the channels of the orientation of markers (or disks, or the tip), and of IMUs."""
+    turns = {f"{name}_turn_{a}": Sense("turn", m, k) for m, name in enumerate(names) for k, a in enumerate("xyz")}
+    single = {f"{name}_{a}": Sense("angles", m, k) for m, name in enumerate(names) for k, a in enumerate(ANGLES)}
+    kinds = (("gyro", "imu rate"), ("accel", "imu force"))
+    read = {f"imu_{i + 1}_{kind}_{a}": Sense(g, i, k) for i in range(imus) for kind, g in kinds for k, a in enumerate("xyz")}
+    return turns | single | read
 
 
 def marker_senses(names: list[str]) -> dict[str, Sense]:

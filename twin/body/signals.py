@@ -36,6 +36,7 @@ class Drive(StrEnum):
 
 
 Drives = tuple[Drive, ...]  # one a tendon
+POINTS_NDIM = 3  # of signals with x, y and z
 
 
 def drive_mask(drives: Drives, kind: Drive) -> np.ndarray:
@@ -95,11 +96,12 @@ class Signals:
         return replace(self, **changes)
 
     def group(self, name: str) -> np.ndarray:
-        """Return a group by its name: "marker" (n, n_marker, 3), others (n, n_port, 1)."""
+        """Return a group by its name: "marker", "turn", "angles" and IMUs' (n, n_place, 3), others (n, n_port, 1)."""
         if name == "marker":
             return self.markers
         own = {"tension": self.tension, "displacement": self.displacement}
-        return (own | dict(self.others))[name][..., None]
+        found = (own | dict(self.others))[name]
+        return found if found.ndim == POINTS_NDIM else found[..., None]
 
 
 def interpolate_commands(signals: Signals, command: np.ndarray) -> PPoly:

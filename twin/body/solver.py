@@ -109,3 +109,7 @@ class Solver(Protocol):
     def solve(self, problem: Problem) -> Solution:
         """Simulate a trial."""
         ...
+
+    def orientations(self, q: np.ndarray, sites: tuple[str, ...]) -> np.ndarray:
+        """Return rotation vectors (n, n_site, 3) rad of sites at coordinates `q` (n, nq), of a body that shows orientations."""
+        ...

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.body import Signals
+from twin.body.orientation import turned_by
 from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 
@@ -12,11 +14,10 @@ TURN_NAMES, SHIFT_NAMES = ("turn_x", "turn_y", "turn_z"), ("shift_x", "shift_y",
 
 
 class CameraMisalignment(Effect):
-    """Reported marker = R(turn) x + shift, turn a rotation vector about the base frame's origin.
+    """Reported marker = R(turn) x + shift, turn a rotation vector about the base frame's origin; reported orientation R(turn) Q.
 
     Source: rigid-body kinematics. A hand-made registration is good to a degree or two and a millimetre or two.
 
-    >>> import numpy as np
     >>> camera = CameraMisalignment(shift_x=1e-3)
     >>> z = np.zeros
     >>> float(camera.sense(Signals(z(1), z(1), z((1, 3)), z((1, 3)), z((1, 1, 3)), z(1))).markers[0, 0, 0])
@@ -36,4 +37,8 @@ class CameraMisalignment(Effect):
 
     def sense(self, true: Signals) -> Signals:
         turn = Rotation.from_rotvec([self[a] for a in TURN_NAMES]).as_matrix()
-        return true.with_changes(markers=true.markers @ turn.T + [self[a] for a in SHIFT_NAMES])
+        seen = true.with_changes(markers=true.markers @ turn.T + [self[a] for a in SHIFT_NAMES])
+        if "turn" not in true.others:
+            return seen
+        vector = np.array([self[a] for a in TURN_NAMES])
+        return seen.with_changes(others={**true.others, "turn": turned_by(true.others["turn"], vector)})

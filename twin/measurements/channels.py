@@ -1,7 +1,8 @@
 """Channel names: their grammar, and the channels they declare.
 
     [finger_N_] tendon_I_(tension|displacement) | sma_I_(current|voltage|temperature|resistance) | ambient_temperature
-              | disk_K_(x|y|z) | marker_K_(x|y|z) | tip_(x|y|z) | sensor_I_resistance | joint_I_(angle|torque)
+              | (disk_K|marker_K|tip)_(x|y|z|qw|qx|qy|qz|roll|pitch|yaw) | imu_K_(gyro|accel)_(x|y|z)
+              | sensor_I_resistance | joint_I_(angle|torque)
               | motor_I_(angle|current|torque)
     on a robot that is an MJCF, NAME being the model's, dots and slashes included:
     actuator.NAME.(ctrl|position|velocity|force) | joint.NAME.(position|velocity|torque) | tendon.NAME.(length|velocity|tension)
@@ -21,9 +22,11 @@ from twin.foundation.errors import DataError, short_repr
 from twin.foundation.units import Scale, unit_scale
 
 Role = Literal["input", "output", "context"]
-Axis = Literal["x", "y", "z"]
+Axis = Literal["x", "y", "z", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"]
+QUATERNION, ANGLES = ("qw", "qx", "qy", "qz"), ("roll", "pitch", "yaw")
+_AXES = {"@": ("x", "y", "z"), "%": QUATERNION, "&": ANGLES}  # what a mark of a pattern stands for
 
-# kind -> (pattern with # for the index and @ for the axis, SI unit)
+# kind -> (pattern with # for the index and @, % or & for the axis, SI unit)
 CHANNEL_KINDS: dict[str, tuple[str, str]] = {
     "tendon_tension": ("tendon_#_tension", "N"),
     "tendon_displacement": ("tendon_#_displacement", "m"),
@@ -35,6 +38,10 @@ CHANNEL_KINDS: dict[str, tuple[str, str]] = {
     "disk": ("disk_#_@", "m"),
     "marker": ("marker_#_@", "m"),
     "tip": ("tip_@", "m"),
+    **{f"{at}_quaternion": (f"{at}{n}_%", "1") for at, n in (("disk", "_#"), ("marker", "_#"), ("tip", ""))},
+    **{f"{at}_angles": (f"{at}{n}_&", "rad") for at, n in (("disk", "_#"), ("marker", "_#"), ("tip", ""))},
+    "imu_rate": ("imu_#_gyro_@", "rad/s"),
+    "imu_force": ("imu_#_accel_@", "m/s^2"),
     "sensor_resistance": ("sensor_#_resistance", "ohm"),
     "joint_angle": ("joint_#_angle", "rad"),
     "joint_torque": ("joint_#_torque", "N*m"),
@@ -60,16 +67,37 @@ ELEMENT_KINDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "site": ("site.NAME.@", ("m",)),
     "element_sensor": ("sensor.NAME", ("1", "rad", "m", "N*m", "N", "rad/s", "m/s", "m/s^2", "rad/s^2")),
 }
-DERIVED_KINDS: dict[str, tuple[str, str]] = {"skin": ("skin_#", "m")}  # made from point clouds (`patches.py`), not read
+DERIVED_KINDS: dict[str, tuple[str, str]] = {
+    "skin": ("skin_#", "m"),  # made from point clouds (`patches.py`), not read
+    # made from quaternions or from roll, pitch, yaw
+    **{f"{at}_turn": (f"{at}{n}_turn_@", "rad") for at, n in (("disk", "_#"), ("marker", "_#"), ("tip", ""))},
+}
+
+
+def readable(pattern: str) -> str:
+    """Return a pattern with its axes written out: disk_K_x|y|z."""
+    for mark, axes in _AXES.items():
+        pattern = pattern.replace(mark, "|".join(axes))
+    return pattern
+
+
 ALLOWED_NAMES = (
-    ", ".join(pattern.replace("#", "K" if "@" in pattern else "I").replace("@", "x|y|z") for pattern, _ in CHANNEL_KINDS.values())
-    + ", each also as finger_N_...; of an MJCF joint|tendon|actuator|site|sensor.NAME.QUANTITY"
+    "tendon_I_tension|displacement, sma_I_current|voltage|temperature|resistance, ambient_temperature, "
+    "disk_K_x|y|z|qw|qx|qy|qz|roll|pitch|yaw (marker_K, tip alike), imu_K_gyro|accel_x|y|z, sensor_I_resistance, "
+    "joint_I_angle|torque, motor_I_angle|current|torque, each also as finger_N_...; of an MJCF "
+    "joint|tendon|actuator|site|sensor.NAME.QUANTITY"
 )
 _INDEX = "[1-9][0-9]{0,3}"
+
+
+def _with_axes(pattern: str) -> str:
+    for mark, axes in _AXES.items():
+        pattern = pattern.replace(mark, f"(?P<axis>{'|'.join(axes)})")
+    return pattern
+
+
 _GRAMMAR = {
-    kind: re.compile(
-        f"(?:finger_(?P<finger>{_INDEX})_)?" + pattern.replace("#", f"(?P<index>{_INDEX})").replace("@", "(?P<axis>[xyz])")
-    )
+    kind: re.compile(f"(?:finger_(?P<finger>{_INDEX})_)?" + _with_axes(pattern.replace("#", f"(?P<index>{_INDEX})")))
     for kind, (pattern, _) in (CHANNEL_KINDS | DERIVED_KINDS).items()
 }
 _ELEMENT_GRAMMAR = {
@@ -104,7 +132,7 @@ def parse_channel_name(name: str) -> ChannelName:
 
 
 def pattern_of(kind: str) -> str:
-    """Return the pattern of the names of a kind, with # for an index, @ for an axis and NAME for an element."""
+    """Return the pattern of the names of a kind, with # for an index, @, % or & for an axis and NAME for an element."""
     return (CHANNEL_KINDS | DERIVED_KINDS | ELEMENT_KINDS)[kind][0]
 
 

@@ -21,11 +21,12 @@ class OutputGroup:
     kind: str  # name in reports
     typical_noise: float  # SI, of a usual sensor, until the noise is estimated
     is_point: bool = False  # whether its channels are the x, y and z of points
+    is_vector: bool = False  # of points, or of rotation vectors: three make one error
     has_declared_accuracy: bool = False  # whether a robot's declared accuracy is about it
 
 
 OUTPUT_GROUPS = {
-    "marker": OutputGroup("mm", 1e3, "position", 2.5e-4, is_point=True, has_declared_accuracy=True),
+    "marker": OutputGroup("mm", 1e3, "position", 2.5e-4, is_point=True, is_vector=True, has_declared_accuracy=True),
     "displacement": OutputGroup("mm", 1e3, "tendon_displacement", 5e-5),
     "tension": OutputGroup("N", 1.0, "tendon_tension", 2e-2),
     "temperature": OutputGroup("K", 1.0, "sma_temperature", 0.5),
@@ -33,6 +34,10 @@ OUTPUT_GROUPS = {
     "sensor": OutputGroup("ohm", 1.0, "sensor_resistance", 0.5),
     "angle": OutputGroup("deg", 180.0 / np.pi, "joint_angle", 2e-3, has_declared_accuracy=True),
     "torque": OutputGroup("N*m", 1.0, "joint_torque", 1e-3),
+    "turn": OutputGroup("deg", 180.0 / np.pi, "orientation", 5e-3, is_vector=True),
+    "angles": OutputGroup("deg", 180.0 / np.pi, "orientation_angle", 5e-3),
+    "imu rate": OutputGroup("deg/s", 180.0 / np.pi, "imu_rate", 5e-3),
+    "imu force": OutputGroup("m/s^2", 1.0, "imu_acceleration", 5e-2),
     "motor angle": OutputGroup("deg", 180.0 / np.pi, "motor_angle", 2e-3),
     "motor torque": OutputGroup("N*m", 1.0, "motor_torque", 1e-3),
     "motor current": OutputGroup("A", 1.0, "motor_current", 5e-3),
@@ -66,13 +71,13 @@ def headline_group(groups: Iterable[str]) -> str:
 
 
 def squared_errors(prepared: PreparedRecording, raw: Sequence[np.ndarray], group: str) -> list[np.ndarray]:
-    """Return the squared errors of a group, one array a trial: per sample and complete marker (Euclidean), or per sample and
-    channel."""
+    """Return the squared errors of a group, one array a trial: per sample and complete marker or rotation (Euclidean), or
+    per sample and channel."""
     out = []
     for r in raw:
-        if group == "marker":
-            markers = dict.fromkeys(o.index for o in prepared.outputs if o.group == "marker")
-            columns = [[j for j, o in enumerate(prepared.outputs) if o.group == "marker" and o.index == m] for m in markers]
+        if OUTPUT_GROUPS[group].is_vector:
+            places = dict.fromkeys(o.index for o in prepared.outputs if o.group == group)
+            columns = [[j for j, o in enumerate(prepared.outputs) if o.group == group and o.index == m] for m in places]
             found = np.concatenate([(r[:, c] ** 2).sum(axis=1) for c in columns])
         else:
             found = r[:, [j for j, o in enumerate(prepared.outputs) if o.group == group]].ravel() ** 2

@@ -14,11 +14,13 @@ from twin.measurements.channels import parse_channel_name
 from twin.measurements.conditions import PAYLOAD_AT
 from twin.measurements.patches import N_PATCHES, SHARED_NOISE_SHARE, Patches, camera_direction, cut_patches, point_scatter
 from twin.measurements.recording import EXTERNAL_CONTACT, START_POSE
+from twin.prediction.orientations import Orientation, measured_columns, orientations
 from twin.robots import Robot
 
 FEWEST_SMOOTHED_ROWS = 20  # of a thermometer; cross-validation of fewer is unreliable
 MOST_SPLINE_POINTS = 100  # enough to follow a room's temperature
 CONTROL_RESOLUTION = 1e-3  # of a control's range, which stands for the resolution of what is known without noise
+ORIENTED = frozenset({"turn", "angles", "imu rate", "imu force"})  # groups of signals that need orientations
 ROOM_TEMPERATURE = 296.15  # K, default: the temperature at which stiffness is quoted
 
 
@@ -43,6 +45,7 @@ class Inputs:
     start: Start = field(default_factory=Start)
     home: np.ndarray | None = None  # (n_tendon,) of controls, whose zero means nothing: where they begin
     reach: np.ndarray | None = None  # (n_tendon,) of controls: how far they go from there
+    turned: bool = False  # whether orientations are compared
 
     @property
     def pull(self) -> np.ndarray:
@@ -86,6 +89,7 @@ class PreparedRecording:
     notices: tuple[str, ...]
     drivers: tuple[Channel, ...]
     pull: np.ndarray
+    orientations: tuple[Orientation, ...] = ()
 
     @property
     def n_tendon(self) -> int:
@@ -142,9 +146,12 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
     drives = tuple(driven[k][1].drive for k in through)
     if Drive.CURRENT in drives:
         robot.springs(body.n_tendon)  # described, or refused
-    outputs, unknown = _outputs(recording, body, drives)
+    turned = orientations(recording, body)
+    outputs, unknown = _outputs(recording, body, drives, turned)
     skin, camera, note = _skin(recording, body, outputs)
-    outputs, notices = (*outputs, *skin), [*notices, *note]
+    turns = [Output(c, "turn", o.index, k) for o in turned for k, c in enumerate(o.turns)]
+    read = outputs
+    outputs, notices = (*read, *turns, *skin), [*notices, *note]
     if not outputs:
         raise DataError(f"{_source(recording)}: robot {robot.name!r} predicts none of the outputs ({', '.join(unknown)})")
     notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
@@ -164,10 +171,10 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         inputs.append(
             Inputs(
                 trial.name, trial.time, clocks[k], readings @ pull, drives, _temperature(recording, trial), loads, seen,
-                smooth=Drive.CONTROL not in drives, start=start,
+                smooth=Drive.CONTROL not in drives, start=start, turned=any(o.group in ORIENTED for o in outputs),
             )
         )  # fmt: skip
-        columns = [trial.values[o.channel.name][:, None] for o in outputs if o not in skin]
+        columns = [trial.values[o.channel.name][:, None] for o in read] + measured_columns(turned, trial)
         measured.append(np.hstack([*columns, seen.at(trial.time)] if seen else columns))
     if set(drives) == {Drive.CONTROL}:
         home = np.median([i.command[0] for i in inputs], axis=0)
@@ -175,7 +182,7 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
         inputs = [replace(i, home=home, reach=reach) for i in inputs]
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
-    return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each)
+    return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each, turned)
 
 
 def _check_fingers(recording: Recording, robot: Robot, body: Body) -> None:
@@ -224,9 +231,12 @@ def _drives(recording: Recording, robot: Robot, body: Body) -> list[tuple[Channe
     return drives
 
 
-def _outputs(recording: Recording, body: Body, drives: Drives) -> tuple[tuple[Output, ...], list[str]]:
-    found, unknown = [], []
-    for channel in recording.outputs():
+def _outputs(
+    recording: Recording, body: Body, drives: Drives, turned: Sequence[Orientation]
+) -> tuple[tuple[Output, ...], list[str]]:
+    """Return the outputs that are compared as they are read, and the names of those that the body does not show."""
+    found, unknown, whole = [], [], {c.name for o in turned for c in o.channels}
+    for channel in (c for c in recording.outputs() if c.name not in whole):
         sense = body.senses.get(channel.means)
         if sense is not None and sense.unit not in ("", channel.si_unit):
             raise DataError(f"output {channel.name} is in {channel.unit}; {channel.means} has the dimension of {sense.unit}")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from twin.body import SOLVE_TOLERANCE, Body, Drive, Heating, Problem, Signals, Solution, Solver
+from twin.body import SOLVE_TOLERANCE, Body, Drive, Heating, Loads, Problem, Signals, Solution, Solver
+from twin.body.orientation import angles, followed, rates_and_forces, turned_by
 from twin.body.spring import Spring
 from twin.foundation.errors import SolveError
 from twin.prediction.prepared import Inputs, PreparedRecording
@@ -88,9 +89,15 @@ class TrialSimulator:
         shortening = self.solver.straight_path - solution.path + problem.route.elongation(solution.tension)
         travel = np.where(driven.driven_by_length, driven.displacement, shortening)
         markers = self.body.frame.to_marker_frame(solution.markers)
-        return Trace(
-            driven.with_changes(tension=solution.tension, displacement=travel, markers=markers, others=solution.others), solution
-        )
+        others = {**solution.others, **(self._orientations(inputs.time, solution, problem.loads) if inputs.turned else {})}
+        return Trace(driven.with_changes(tension=solution.tension, displacement=travel, markers=markers, others=others), solution)
+
+    def _orientations(self, time: np.ndarray, solution: Solution, loads: Loads) -> dict[str, np.ndarray]:
+        """Return the rotation vectors (n, n_marker, 3) rad of markers in their frame, and what IMUs read."""
+        seen = len(self.body.marker_sites)
+        turn = followed(self.solver.orientations(solution.q, (*self.body.marker_sites, *self.body.imu_sites)))
+        rate, force = rates_and_forces(time, turn[:, seen:], loads.gravity)
+        return {"turn": turned_by(turn[:, :seen], self.body.frame.turn), "imu rate": rate, "imu force": force}
 
 
 def simulate(
@@ -162,6 +169,8 @@ def output_columns(prepared: PreparedRecording, signals: Signals) -> np.ndarray:
     if any(o.group == "resistance" for o in prepared.outputs):
         of_springs = np.broadcast_to(prepared.robot.springs(prepared.n_tendon).resistance, signals.tension.shape)
         signals = signals.with_changes(others={**signals.others, "resistance": of_springs})
+    if any(o.group == "angles" for o in prepared.outputs):
+        signals = signals.with_changes(others={**signals.others, "angles": angles(signals.others["turn"])})
     return np.stack([signals.group(o.group)[:, o.index, o.axis] for o in prepared.outputs], axis=1)
 
 

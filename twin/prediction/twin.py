@@ -122,4 +122,8 @@ class Twin:
 
 
 def _by_channel(prepared: PreparedRecording, y: np.ndarray) -> dict[str, np.ndarray]:
-    return {o.channel.name: column for o, column in zip(prepared.outputs, y.T, strict=True) if o.channel.kind not in DERIVED_KINDS}
+    shown = {o.channel.name: column for o, column in zip(prepared.outputs, y.T, strict=True)}
+    for o in prepared.orientations:
+        shown |= o.readings(np.column_stack([shown[c.name] for c in o.turns]))
+    made = {o.channel.name for o in prepared.outputs if o.channel.kind in DERIVED_KINDS}
+    return {name: column for name, column in shown.items() if name not in made}

@@ -90,7 +90,8 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
         for motion, time, command in shapes:
             label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
-            out.append((label, Inputs(label, time, last + 60.0 + time, command, prepared.drives, warm, loads)))
+            inputs = Inputs(label, time, last + 60.0 + time, command, prepared.drives, warm, loads, turned=like.turned)
+            out.append((label, inputs))
     return out
 
 

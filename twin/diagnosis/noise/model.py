@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
 
 DECLARED = "as declared"
@@ -50,5 +51,5 @@ class Noise:
         floors = {}
         for group in dict.fromkeys(o.group for o in prepared.outputs):
             square = float(np.mean([self.sigma[j] ** 2 + driven[j] for j, o in enumerate(prepared.outputs) if o.group == group]))
-            floors[group] = float(np.sqrt(square * (3.0 if group == "marker" else 1.0)))
+            floors[group] = float(np.sqrt(square * (3.0 if OUTPUT_GROUPS[group].is_vector else 1.0)))
         return floors

@@ -304,6 +304,10 @@ class Dynamics:
         """Number of delayed strains of an element of creep."""
         return self.statics.n_delayed
 
+    def orientations(self, q: np.ndarray, sites: tuple[str, ...]) -> np.ndarray:
+        """Return rotation vectors (n, n_site, 3) rad of sites at shapes q (n, nv)."""
+        return self.statics.orientations(q, sites)
+
     def solve(self, problem: Problem) -> ChainSolution:
         """Return the motion under commands, from rest in equilibrium under the first ones.
 

@@ -5,6 +5,7 @@ from functools import cache, cached_property
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from twin.body import Drive, Loads, Problem, Push, Route, Solution, array_hash
 from twin.body.hinge_chain import HingeChain
@@ -107,6 +108,16 @@ class Equilibrium:
         if not route.rest_bend_share:
             return mounted
         return mounted + route.rest_bend_share * by_spring * (self.rest_path - self.straight_path)
+
+    def orientations(self, q: np.ndarray, sites: tuple[str, ...]) -> np.ndarray:
+        """Return rotation vectors (n, n_site, 3) rad of sites at shapes q (n, nv)."""
+        at = [self.model.site(name).id for name in sites]
+        matrices = np.empty((len(q), len(at), 9))
+        for i, shape in enumerate(q):
+            self.data.qpos[:] = shape
+            mujoco.mj_kinematics(self.model, self.data)
+            matrices[i] = self.data.site_xmat[at]
+        return Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec().reshape(len(q), len(at), 3)
 
     def solve(self, problem: Problem) -> ChainSolution:
         """Return the equilibria, in the order of loads of `twin.mechanics.rod.tension_trials`, or `held_trials` where tendons are

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from twin.body import Drive, Frame, Port, marker_senses, tendon_ports, tendon_senses
+from twin.body import Drive, Frame, Port, marker_senses, tendon_ports, tendon_senses, turn_senses
 from twin.body.hinge_chain import HingeChain, JointSet
 from twin.foundation.parameters import parameter_array
 from twin.mechanics.rod import Equilibrium
@@ -92,11 +92,15 @@ def _assemble_body(
         features=CONTINUUM_FEATURES,
         ports=_ports(shape, values),
         dynamic_drives=frozenset({Drive.TENSION, Drive.DISPLACEMENT, Drive.CURRENT}),
-        senses=tendon_senses(n_tendon) | motor_senses(len(shape.motors or ()), values) | marker_senses([*markers, "tip"]),
+        senses=tendon_senses(n_tendon)
+        | motor_senses(len(shape.motors or ()), values)
+        | marker_senses([*markers, "tip"])
+        | turn_senses([*markers, "tip"], len(shape.imus)),
         frame=Frame.from_values(values),
         joints=joints,
         tendon_sites=tendons,
         marker_sites=(*markers, tip if listed else f"disk_{n_disk}"),
+        imu_sites=tuple(f"disk_{k}_centre" for k in shape.imus),
         disks=tuple(f"disk_{k}_centre" for k in range(1, n_disk + 1)),
         tip=tip,
         length=length,

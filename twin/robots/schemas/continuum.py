@@ -49,6 +49,10 @@ class Continuum(Motorised):
         description='"disk": a marker disk_K in the centre of every disk; or a list of disks that carry marker_1, marker_2, ...',
     )
 
+    imus: list[Disk] = Field(
+        [], description="a list of disks that carry imu_1, imu_2, ..., whose axes are the base frame's at rest"
+    )
+
     def counts(self) -> dict[str, int]:
         return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers), "motor": len(self.motors or ())}
 
@@ -73,6 +77,8 @@ class Continuum(Motorised):
             out.append(f"structure: tendons_end is {self.tendons_end}; {one}")
         if self.markers != "disk" and not (self.markers and max(map(int, self.markers)) <= self.disks):
             out.append(f'structure: markers is {self.markers}; "disk" or a list of disks from 1 to {self.disks} is needed')
+        if self.imus and max(map(int, self.imus)) > self.disks:
+            out.append(f"structure: imus is {self.imus}; a list of disks from 1 to {self.disks} is needed")
         if len(self.divided()) != self.disks or 2 * sum(self.divided()) > MAX_JOINT_SETS:
             most = f"not more than {MAX_JOINT_SETS // 2} pieces together"
             out.append(f"structure: pieces is {self.pieces}; a number is needed, or a list of {self.disks}, one a disk, {most}")

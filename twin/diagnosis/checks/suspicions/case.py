@@ -6,6 +6,7 @@ and not applied.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -202,5 +203,5 @@ def registration(points: np.ndarray, onto: np.ndarray) -> tuple[np.ndarray, np.n
 
 def called(channels: Sequence[Channel]) -> str:
     """Return the channels as a pattern: disk_*_*, tendon_*_tension."""
-    patterns = dict.fromkeys(pattern_of(c.kind).replace("#", "*").replace("@", "*").replace("NAME", "*") for c in channels)
+    patterns = dict.fromkeys(re.sub("[#@%&]|NAME", "*", pattern_of(c.kind)) for c in channels)
     return ", ".join(patterns)

@@ -52,9 +52,9 @@ def displacements(case: Case) -> Iterator[Suspicion]:
 
 
 def zeros(case: Case) -> Iterator[Suspicion]:
-    """Yield the zero of one drive by displacement, where the lengths have no equilibrium and the least other zero gives them one."""
+    """Yield the zero of one drive by displacement, where no equilibrium is found and another zero gives one: the nearest."""
     columns, found = case.columns(case.group), []
-    for t in [] if case.predicted is not None else np.flatnonzero([d is Drive.DISPLACEMENT for d in case.prepared.drives]):
+    for t in [] if case.predicted is not None else [k for k, d in enumerate(case.prepared.drives) if d is Drive.DISPLACEMENT]:
         low, high = 0.0, max(float(np.abs(i.command[:, t]).max()) for i in case.prepared.inputs)
         shown = case.again(lambda i, t=t, by=high: _paid_out(i, t, by))
         for _ in range(HALVINGS_FOR_ZERO if shown else 0):
