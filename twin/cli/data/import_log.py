@@ -46,7 +46,7 @@ class ImportLog:
             self._write(log, path, self.out)
 
     def _name(self) -> str:
-        from twin.measurements.logs.readers.folder import stem
+        from twin.measurements.logs.tables.folder import stem
 
         return stem(self.log.resolve()) or "log"
 
@@ -59,7 +59,12 @@ class ImportLog:
             out.print(f"the map {path} exists and is kept; remove it for a new one", highlight=False, markup=False)
             return
         write_atomically(path, map_text(log, str(path)).encode())
-        out.print(f'map: {path}; fill in its "?", then: twin import {self.log} --map {path} --out SET', highlight=False, markup=False)
+        out.print(
+            f'map: {path}; fill in its "?", then: twin import {self.log} --map {path} --out SET',
+            highlight=False,
+            markup=False,
+            soft_wrap=True,
+        )
 
     def _write(self, log: Log, path: Path, folder: Path) -> None:
         from twin.measurements import read, write
@@ -73,9 +78,10 @@ class ImportLog:
         for note in (*clock_words(import_map), *notes, *read(folder, least_trials=1).notices):
             out.print(printable(f"  {note}"), highlight=False)
         trials = recording.trials
-        out.print(f"{len(trials)} trials, {recording.n_samples} rows, {len(recording.channels)} channels: {folder}", highlight=False, markup=False)
+        counted = f"{len(trials)} trial{'s' if len(trials) != 1 else ''}, {recording.n_samples} rows"
+        out.print(f"{counted}, {len(recording.channels)} channels: {folder}", highlight=False, markup=False)
         if len(trials) == 1:
-            out.print("one trial: a diagnosis needs two; cut this one, or add another to the set", highlight=False, markup=False)
+            out.print("a diagnosis needs two trials: cut this one, or add another to the set", highlight=False, markup=False)
 
 
 def _robot(recording: Recording, path: Path, folder: Path) -> str:
@@ -99,7 +105,9 @@ def _show(log: Log) -> None:
         out.print(printable(f"  {note}"), highlight=False)
     if len(log.notes) > 6:
         out.print(f"  and {len(log.notes) - 6} more remarks, see the map", highlight=False)
-    table = Table("stream", "type", "rows", "rate (1/s)", "length (s)", "longest step (s)", "clock", title="streams", title_justify="left")
+    table = Table(
+        "stream", "type", "rows", "rate (1/s)", "length (s)", "longest step (s)", "clock", title="streams", title_justify="left"
+    )
     for row in stream_rows(log):
         table.add_row(*map(printable, row))
     out.print(table)

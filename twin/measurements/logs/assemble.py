@@ -1,4 +1,4 @@
-"""A log and its map as a recording, ready to be written as a measurement set. Nothing is filled in, moved or left out without a note."""
+"""A log and its map as a recording, ready to be written as a measurement set. Nothing is moved or left out without a note."""
 
 import re
 from collections.abc import Mapping
@@ -9,10 +9,10 @@ import numpy as np
 
 from twin.foundation.errors import DataError, short_repr
 from twin.foundation.files import MAX_SET_NUMBERS, prefix_errors
-from twin.measurements.logs.clocks import EPOCH_SECONDS
+from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK
+from twin.measurements.logs.clocks import EPOCH_SECONDS, header_skew
 from twin.measurements.logs.cut import LEAST_ROWS, cut_at_gaps, cut_at_marks, marks_of
 from twin.measurements.logs.map_file import ImportMap, StreamClock
-from twin.measurements.logs.readers.topics import LOG_CLOCK
 from twin.measurements.logs.stamps import Readings, in_order, on_one_line, stamp_streams, without_infinities
 from twin.measurements.logs.streams import Log, Stream, Take
 from twin.measurements.parsing.plausible import check_roles, check_table
@@ -52,7 +52,9 @@ def assemble(log: Log, import_map: ImportMap) -> tuple[Recording, tuple[str, ...
         if not pieces:
             raise DataError(f"no trial is left ({short_repr('; '.join(notes[-3:]), 300)}); correct the map")
         if sum(piece.readings.stamps.size for piece in pieces) * (1 + len(channels)) > MAX_SET_NUMBERS:
-            raise DataError(f"more than {MAX_SET_NUMBERS} numbers in all; choose fewer channels, or cut and import the log in parts")
+            raise DataError(
+                f"more than {MAX_SET_NUMBERS} numbers in all; choose fewer channels, or cut and import the log in parts"
+            )
         trials = _trials(pieces, import_map)
     notes.append("time of each trial counts from its first row, in s")
     head = (import_map.robot, import_map.title or log.path.name, import_map.source, import_map.gravity)
@@ -82,10 +84,9 @@ def _check_names(log: Log, import_map: ImportMap) -> None:
 def _pieces(take: Take, import_map: ImportMap, notes: list[str], absolute: bool) -> list[Piece]:
     used = {name: take.streams[name] for name in sorted(_used(import_map))}
     origin, stamps = stamp_streams(used, import_map.clocks)
+    notes += _mixed_clocks(used, import_map)
     of_stream = {name: _readings(stream, stamps[name], import_map) for name, stream in used.items()}
-    ordered = {
-        name: in_order(name, each, import_map.clocks[name], notes) for name, each in of_stream.items() if each.columns
-    }
+    ordered = {name: in_order(name, each, import_map.clocks[name], notes) for name, each in of_stream.items() if each.columns}
     reset = any(len(parts) > 1 for parts in ordered.values())
     if reset and len(ordered) > 1:
         raise DataError('backward_stamps = "cut" is for a single stream; sort the stamps, or name another clock')
@@ -101,6 +102,20 @@ def _pieces(take: Take, import_map: ImportMap, notes: list[str], absolute: bool)
             began = origin + round(float(merged.stamps[rows[0]]) * 1e9) if len(rows) and known else None
             pieces.append(Piece(name, began, merged.rows(rows)))
     return pieces
+
+
+def _mixed_clocks(used: Mapping[str, Stream], import_map: ImportMap) -> list[str]:
+    """Return what is to be said of rows stamped when they were measured beside rows stamped when they were recorded."""
+    by = {name: import_map.clocks[name] for name in used}
+    late = [name for name, clock in by.items() if clock.clock == LOG_CLOCK and not clock.offset]
+    delays = [float(np.median(header_skew(used[name]))) for name, clock in by.items() if clock.clock == HEADER_CLOCK]
+    if not late or not delays:
+        return []
+    usual = 1e3 * float(np.median(delays))
+    return [
+        f"{', '.join(late)}: stamped by the recorder, the other streams by their headers, which it received {usual:.3g} ms later; "
+        "an offset in the map shifts a stream"
+    ]
 
 
 def _readings(stream: Stream, stamps: np.ndarray, import_map: ImportMap) -> Readings:

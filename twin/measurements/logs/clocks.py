@@ -1,15 +1,17 @@
-"""Clocks of streams: which to take, in what unit it counts, how it runs against the recorder's, and the rate and gaps of its stamps."""
+"""Clocks of streams: which to take, its unit, how it runs against the recorder's, and the rate and gaps of its stamps."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from twin.measurements.logs.readers.topics import HEADER_CLOCK, LOG_CLOCK
+from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK
 from twin.measurements.logs.streams import ROW_CLOCK, Clock, Stream
 
 EPOCH_SECONDS = 1e8  # s since 1970: every clock of today reads more
 MAX_HEADER_SKEW = 10.0  # s between a header's stamp and the recorder's: more is another clock, not a delay
 MAX_RATE = 1e5  # rows a second: more is a mistaken unit
+_COUNTER_NAMES = re.compile(r"id|index|idx|frame\w*|sample\w*|seq\w*|count\w*|step\w*|row\w*|tick\w*|n|no|#", re.IGNORECASE)
 GAP_STEPS = 10.0  # a gap: more than this many usual steps
 
 
@@ -45,7 +47,9 @@ def timing(seconds: np.ndarray) -> Timing:
     longest = float(forward.max()) if len(forward) else 0.0
     span = float(stamps.max() - stamps.min()) if len(stamps) else 0.0
     gaps = int(np.count_nonzero(forward > GAP_STEPS * usual)) if len(forward) else 0
-    return Timing(len(seconds), 1.0 / usual, span, longest, gaps, int(np.count_nonzero(steps == 0)), int(np.count_nonzero(steps < 0)))
+    return Timing(
+        len(seconds), 1.0 / usual, span, longest, gaps, int(np.count_nonzero(steps == 0)), int(np.count_nonzero(steps < 0))
+    )
 
 
 def guess_unit(clock: Clock) -> tuple[str, str]:
@@ -77,7 +81,18 @@ def choose_clock(stream: Stream, headers_are_sane: bool) -> ClockChoice:
     for name, clock in stream.clocks.items():
         unit, why = guess_unit(clock)
         return ClockChoice(name, unit, f"unit: {why}")
-    return ClockChoice(ROW_CLOCK, "", "the table has no column of times; its rows are counted, or a column that counts samples", "?")
+    if counter := _counter(stream):
+        return ClockChoice(counter, "", f"no column of times; {counter} counts the samples", "?")
+    return ClockChoice(ROW_CLOCK, "", "no column of times; the rows are counted", "?")
+
+
+def _counter(stream: Stream) -> str:
+    """Return the column of whole numbers that counts the samples, or an empty text."""
+    for name, field in stream.fields.items():
+        steps = np.diff(field.values) if np.issubdtype(field.values.dtype, np.integer) else np.zeros(1)
+        if _COUNTER_NAMES.fullmatch(name.strip()) and len(steps) and steps.min() > 0 and np.median(steps) == 1:
+            return name
+    return ""
 
 
 def headers_are_sane(streams: list[Stream]) -> bool:

@@ -29,7 +29,7 @@ def marks_of(stream: Stream, stamps: np.ndarray, cut: CutTable) -> Marks:
     if cut.field is None:
         texts = next((each for each in stream.fields.values() if each.labels), None)
         values = np.arange(len(order), dtype=float)
-        labels = () if texts is None else tuple(_label(texts.labels, value) for value in texts.values[order])
+        labels = () if texts is None else tuple(_label(texts.labels, float(value)) for value in texts.values[order])
         return Marks(stamps[order], values, labels)
     field = stream.fields.get(cut.field)
     if field is None:
@@ -68,7 +68,7 @@ def cut_at_marks(stamps: np.ndarray, marks: Marks, notes: list[str]) -> list[tup
     changes = np.flatnonzero((np.diff(values) != 0) | np.isnan(values[1:])) + 1
     pieces = []
     for part in np.split(np.arange(len(stamps)), changes):
-        value = values[part[0]] if len(part) else np.nan
+        value = float(values[part[0]]) if len(part) else np.nan
         if np.isfinite(value) and marks.only in (None, value):
             label = "" if marks.only is not None else _label(marks.labels, value) if marks.labels else f"{value:g}"
             pieces.append((label, part))

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 from twin.foundation.errors import DataError
 from twin.measurements.channels import Channel, parse_channel_name
-from twin.measurements.logs.readers.headers import split_unit
-from twin.measurements.logs.readers.ros_messages import short_type
+from twin.measurements.logs.bags.messages import short_type
 from twin.measurements.logs.streams import Field, Stream
+from twin.measurements.logs.tables.headers import split_unit
 
 UNKNOWN = "?"
 _COMMAND = {
-    "cmd", "command", "commands", "commanded", "des", "desired", "target", "targets", "goal", "ref", "reference", "setpoint", "sp", "sent",
-    "ctrl", "control", "action", "qdes", "ordered", "input",
+    "cmd", "command", "commands", "commanded", "des", "desired", "target", "targets", "goal", "ref", "reference", "setpoint", "sp",
+    "sent", "ctrl", "control", "action", "qdes", "ordered",
 }  # fmt: skip
 _MEASURED = {"read", "meas", "measured", "actual", "obs", "observed", "observation", "state", "states", "feedback", "fb"}
 _TENDON = {"tendon", "tendons", "cable", "cables", "wire", "wires"}
@@ -63,8 +63,8 @@ def _guess(stream: Stream, name: str, field: Field) -> Guess:
         index = re.fullmatch(r"data\[(\d+)\]", name)
         if index and not re.search(r"\d", stream.name):
             return _by_words(f"{stream.name} {int(index[1]) + 1}", field)
-    elif "position" in name or "translation" in name or "orientation" in name or "rotation" in name or kind.startswith("Point"):
-        return _pose(stream, name)
+    elif re.search("position|translation|orientation|rotation", name) or kind.startswith("Point"):
+        return _pose(stream, name) or _by_words(plain, field)
     return _by_words(plain, field)
 
 
@@ -92,10 +92,12 @@ def _imu(topic: str, name: str) -> Guess:
     return Guess()
 
 
-def _pose(stream: Stream, name: str) -> Guess:
-    """Return a proposal for a coordinate or quaternion of a body whose name is in the topic or the field."""
+def _pose(stream: Stream, name: str) -> Guess | None:
+    """Return a proposal for a coordinate or quaternion of a body that the topic or the field names; None for others."""
     match = re.search(r"(?:^|\.)([xyzw])$", name)
-    if match is None or "covariance" in name or "twist" in name:
+    if match is None:
+        return None
+    if "covariance" in name or "twist" in name:
         return Guess()
     turns = "orientation" in name or "rotation" in name
     of_ros = not stream.kind.startswith(("Motive", "text", "Parquet", "JSON"))
@@ -121,15 +123,20 @@ def _by_words(text: str, field: Field) -> Guess:
     role = "input" if _COMMAND & set(words) else "output" if _MEASURED & set(words) else UNKNOWN
     for plain in (text.strip(), "_".join(words)):
         if known := _known(plain):
-            return Guess(known, role, field.unit or UNKNOWN)
+            return Guess(known, _role(known, role), field.unit or UNKNOWN)
     quantity = _quantity(words) or _joint_by_name(text, role)
-    if quantity.startswith("actuator."):
-        role = "input"
     if not quantity:
         return Guess(UNKNOWN, "input" if re.fullmatch(r"u_?\d+", text.strip()) else role, field.unit or UNKNOWN)
-    if role == UNKNOWN and re.search(r"(disk|marker|tip)_|\.position$", quantity):
-        role = "output"
-    return Guess(quantity, role, field.unit or UNKNOWN)
+    return Guess(quantity, _role(quantity, role), field.unit or UNKNOWN)
+
+
+def _role(quantity: str, by_words: str) -> str:
+    """Return the role of a quantity where the words of its name do not say it."""
+    if quantity.endswith(".ctrl"):
+        return "input"
+    if quantity == "ambient_temperature":
+        return "context"
+    return "output" if by_words == UNKNOWN and re.search(r"(disk|marker|tip)_|\.position$", quantity) else by_words
 
 
 def _quantity(words: list[str]) -> str:
@@ -143,11 +150,23 @@ def _quantity(words: list[str]) -> str:
         return f"{body}_{axis}"
     if not number:
         return ""
-    if has & {"tension", "tensions"} or (has & _TENDON and has & {"force", "forces"}) or {"load", "cell"} <= has or "loadcell" in has:
+    if turn := next((word for word in words if word in ("qw", "qx", "qy", "qz")), ""):
+        return f"{_body(words)}_{turn}"
+    if (
+        has & {"tension", "tensions"}
+        or (has & _TENDON and has & {"force", "forces"})
+        or {"load", "cell"} <= has
+        or "loadcell" in has
+    ):
         return f"tendon_{number}_tension"
     if has & _TENDON and has & (_LENGTH | _COMMAND | _MEASURED):
         return f"tendon_{number}_displacement"
-    for names, kind in ((_MOTOR, "motor"), ({"joint", "joints"}, "joint"), ({"sma", "heater"}, "sma"), ({"sensor", "strain"}, "sensor")):
+    for names, kind in (
+        (_MOTOR, "motor"),
+        ({"joint", "joints"}, "joint"),
+        ({"sma", "heater"}, "sma"),
+        ({"sensor", "strain"}, "sensor"),
+    ):
         if has & names:
             part = next((part for part in ("current", "torque", "voltage", "temperature", "resistance") if part in has), "")
             part = part or ("angle" if has & (_ANGLE | _COMMAND | _MEASURED) else "")
@@ -162,7 +181,7 @@ def _joint_by_name(text: str, role: str) -> str:
         match = re.fullmatch(rf"(?:{either})[_. ](.*[A-Za-z].*)|(.*[A-Za-z].*)[_. ](?:{either})", text.strip())
         name = (match[1] or match[2]) if match else ""
         words_of_name = set(_words(name))
-        if name and not words_of_name & (_COMMAND | {"x", "y", "z", "w"}):
+        if name and not words_of_name & (_COMMAND | {"x", "y", "z", "w", "enable", "enabled", "limit", "max", "min"}):
             return f"joint.{name}.{quantity}" if role != "input" else f"actuator.{name}.ctrl"
     match = re.fullmatch(r"(?:qdes|q_des|q_cmd|q_target|target|cmd|goal)[_. ](.*[A-Za-z].*)", text.strip())
     return f"actuator.{match[1]}.ctrl" if match and not match[1].startswith(("pos", "vel", "torque")) else ""

@@ -18,7 +18,7 @@ def stream_rows(log: Log) -> list[tuple[str, ...]]:
         odd = "" if said is None else f"{said.equal} equal stamps" * bool(said.equal) + f" {said.back} backward" * bool(said.back)
         odd += " is the unit right?" if said is not None and said.rate > MAX_RATE else ""
         clock = f"{choice.name} [{choice.unit or 'give the rate'}] {odd}".strip()
-        count = str(stream.count) + (f" (of {len(found)} takes the first)" if len(found) > 1 else "")
+        count = str(stream.count) + (f" (first of {len(found)} takes)" if len(found) > 1 else "")
         rows.append((name, stream.kind, count, *cells, clock))
     return rows
 

@@ -77,8 +77,8 @@ class MapTable(TableSchema):
     source: TextLine
     gravity: Any = None
     cut: Any = None
-    stream: list[Any] = []
-    channel: list[Any] = []
+    stream: list[Any] = Field([])
+    channel: list[Any] = Field([])
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,17 @@
-"""The commented map that an import begins with: what is in the log, proposals for its channels, and "?" where only the user knows."""
+"""The commented map that an import begins with: what is in the log, proposals, and "?" where only the user knows."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from twin.measurements.logs.clocks import MAX_RATE, ClockChoice, Timing, choose_clock, headers_are_sane, timing
 from twin.measurements.logs.guess import UNKNOWN, Guess, guess_fields
 from twin.measurements.logs.map_file import MAP_FORMAT
-from twin.measurements.logs.streams import ROW_CLOCK, Field, Log, Stream
+from twin.measurements.logs.streams import Field, Log, Stream
+from twin.measurements.logs.tables.folder import stem
 from twin.measurements.parsing.toml_text import toml_value
 
 _HEAD = """\
@@ -28,9 +31,9 @@ _STREAMS = """
 # stamps), equal_stamps = "mean" or "first", backward_stamps = "sort" or "cut"; without these such stamps are refused.
 """
 _CHANNELS = """
-# Channels. quantity: what it is (models/README.md lists all). role: input drives the twin, output is compared with it, context is known.
-# unit: of the numbers in the log. Further keys: name (the column; else the quantity), noise (one standard deviation),
-# scale and offset (reading * scale + offset, in the unit; scale = -1 turns an axis).
+# Channels. quantity: what it is (models/README.md lists all). role: input drives the twin, output is compared with it,
+# context is known. unit: of the numbers in the log. Further keys: name (the column; else the quantity), noise (one standard
+# deviation), scale and offset (reading * scale + offset, in the unit; scale = -1 turns an axis).
 """
 
 
@@ -40,18 +43,26 @@ def map_text(log: Log, map_name: str) -> str:
     sane = headers_are_sane([each[0] for each in streams.values()])
     takes = f"{len(log.takes)} ({', '.join(take.name for take in log.takes[:4])}{', ...' if len(log.takes) > 4 else ''})"
     choices = {name: choose_clock(found[0], sane) for name, found in streams.items()}
-    title, log_name = _comment(log.path.name), _comment(str(log.path))
+    title, log_name = _comment(stem(log.path)), _comment(str(log.path))
     lines = [_HEAD.format(name=log_name, format=_comment(log.format), map=_comment(map_name))]
     lines += [f"# {_comment(note)}" for note in log.notes[:20]]
     lines += [f"# not read: {_comment(topic)} ({_comment(why)})" for topic, why in log.unread.items()]
     lines += ["", f'format = "{MAP_FORMAT}"', f'robot = "{UNKNOWN}"    # a robot\'s name, or the path to its folder from this file']
-    lines += [f"title = {toml_value(title)}", f'source = "{UNKNOWN}"   # hardware or simulation, free text may follow after a colon']
+    lines += [
+        f"title = {toml_value(title)}",
+        f'source = "{UNKNOWN}"   # hardware or simulation, free text may follow after a colon',
+    ]
     lines.append(_TRIALS.format(takes=_comment(takes), gaps=_longest_gaps(log, choices), marks=_marks(streams)))
     lines += [_STREAMS, "stream = ["]
     for name, found in streams.items():
         lines += _stream_lines(found[0], choices[name])
     lines += ["]", _CHANNELS, "channel = ["]
     proposals = {name: guess_fields(found[0]) for name, found in streams.items()}
+    together = _together(log)
+    proposals = {
+        name: {field: replace(each, proposed=each.proposed and name in together) for field, each in of_stream.items()}
+        for name, of_stream in proposals.items()
+    }
     taken = _repeated(proposals)
     for name, found in streams.items():
         lines.append(f"  # {_comment(name)}: {_comment(found[0].kind)}")
@@ -76,7 +87,7 @@ def _stream_lines(stream: Stream, choice: ClockChoice) -> list[str]:
         about += f", {said.back} BACKWARD STAMPS" if said.back else ""
         about += " (IS THE UNIT RIGHT?)" if said.rate > MAX_RATE else ""
     entry: dict[str, object] = {"name": stream.name, "clock": choice.name}
-    if choice.name == ROW_CLOCK:
+    if choice.rate:
         entry["rate"] = choice.rate
     else:
         entry["time_unit"] = choice.unit
@@ -116,17 +127,29 @@ def describe_range(field: Field) -> str:
 
 def _repeated(proposals: Mapping[str, Mapping[str, Guess]]) -> set[str]:
     """Return the quantities that are proposed more than once."""
-    all_of_them = [each.quantity for of_stream in proposals.values() for each in of_stream.values() if each.quantity != UNKNOWN]
+    all_of_them = [
+        each.quantity for found in proposals.values() for each in found.values() if each.proposed and each.quantity != UNKNOWN
+    ]  # fmt: skip
     return {each for each in all_of_them if all_of_them.count(each) > 1}
 
 
+def _together(log: Log) -> frozenset[str]:
+    """Return the streams that most takes have: a channel of another would cost those takes."""
+    return Counter(frozenset(take.streams) for take in log.takes).most_common(1)[0][0]
+
+
 def _longest_gaps(log: Log, choices: Mapping[str, ClockChoice]) -> str:
-    """Return the longest steps of the stream with the most rows, in words."""
-    stream = max((each for found in log.streams.values() for each in found), key=lambda each: each.count)
-    said = stream_timing(stream, choices[stream.name])
-    if said is None or not said.gaps:
-        return ""
-    return f"; {_comment(stream.name)} has {said.gaps} gaps, the longest {said.longest_gap:.3g} s"
+    """Return the longest pauses in the streams that have some, in words."""
+    found = []
+    for name, streams in log.streams.items():
+        said = max(
+            (each for one in streams if (each := stream_timing(one, choices[name]))),
+            key=lambda each: each.longest_gap,
+            default=None,
+        )
+        if said is not None and said.gaps:
+            found.append((said.longest_gap, f"{_comment(name)} pauses for up to {said.longest_gap:.3g} s"))
+    return "; " + ", ".join(words for _, words in sorted(found, reverse=True)[:3]) if found else ""
 
 
 def _marks(streams: Mapping[str, list[Stream]]) -> str:

@@ -3,16 +3,16 @@
 from pathlib import Path
 
 from twin.foundation.errors import DataError
-from twin.measurements.logs.readers.delimited import read_delimited
-from twin.measurements.logs.readers.folder import read_folder, stem
-from twin.measurements.logs.readers.json_log import read_json
-from twin.measurements.logs.readers.lerobot import INFO_FILE, read_lerobot
-from twin.measurements.logs.readers.mcap_log import read_mcap
-from twin.measurements.logs.readers.motive import FIRST_CELL, read_motive
-from twin.measurements.logs.readers.parquet import read_parquet
-from twin.measurements.logs.readers.rosbag import BAG_FILE, read_ros1_bag, read_ros2_bag
-from twin.measurements.logs.readers.text_files import read_head
+from twin.measurements.logs.bags.mcap_log import read_mcap
+from twin.measurements.logs.bags.rosbag import BAG_FILE, read_ros1_bag, read_ros2_bag
 from twin.measurements.logs.streams import Log, Stream, Take
+from twin.measurements.logs.tables.delimited import read_delimited
+from twin.measurements.logs.tables.folder import read_folder, stem
+from twin.measurements.logs.tables.json_log import read_json
+from twin.measurements.logs.tables.lerobot import INFO_FILE, read_lerobot
+from twin.measurements.logs.tables.motive import FIRST_CELL, read_motive
+from twin.measurements.logs.tables.parquet import read_parquet
+from twin.measurements.logs.tables.text_files import read_head
 from twin.measurements.read import SET_FILE
 
 FORMATS = "MCAP, ROS 1 and ROS 2 bags, LeRobot folders, Motive CSV, CSV and other text tables, Parquet, JSON, or a folder of tables"
@@ -58,9 +58,20 @@ def _open_folder(path: Path) -> Log:
 
 def _is_about(path: Path) -> bool:
     """Return whether a file beside logs is a text about them, or a robot's description."""
-    return path.suffix.lower() in (".md", ".toml", ".yaml", ".yml", ".xml", ".urdf", ".py", ".m", ".pdf", ".png", ".jpg", ".mp4") or (
-        path.stem.upper().startswith(("README", "LICENSE", "LICENCE"))
-    )
+    return path.suffix.lower() in (
+        ".md",
+        ".toml",
+        ".yaml",
+        ".yml",
+        ".xml",
+        ".urdf",
+        ".py",
+        ".m",
+        ".pdf",
+        ".png",
+        ".jpg",
+        ".mp4",
+    ) or (path.stem.upper().startswith(("README", "LICENSE", "LICENCE")))
 
 
 def _open_file(path: Path) -> Log:

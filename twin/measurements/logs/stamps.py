@@ -38,7 +38,9 @@ def clock_of(stream: Stream, mapped: StreamClock) -> tuple[Clock, str]:
         return Clock(clock.ticks.astype(float) / mapped.rate, "s"), "s"
     unit = mapped.unit or clock.unit  # the user's word stands against the header's
     if not unit:
-        raise DataError(f'clock {mapped.clock} of {stream.name}: give time_unit (s, ms, us, ns), or rate = "100 Hz" if it counts rows')
+        raise DataError(
+            f'clock {mapped.clock} of {stream.name}: give time_unit (s, ms, us, ns), or rate = "100 Hz" if it counts rows'
+        )
     return clock, unit
 
 
@@ -65,8 +67,8 @@ def _check_overlap(stamps: Mapping[str, np.ndarray]) -> None:
             if one < other and (begin > last or first > end) and len(stamps[one]) > 1 and len(stamps[other]) > 1:
                 apart = max(begin - last, first - end)
                 raise DataError(
-                    f"{one} and {other} share no time, they are {apart:.6g} s apart; they are on different clocks: name another clock of "
-                    "one of them, or give its offset"
+                    f"{one} and {other} share no time, they are {apart:.6g} s apart: different clocks; name another "
+                    "clock of one of them, or give its offset"
                 )
 
 
@@ -117,8 +119,8 @@ def _without_equal(name: str, readings: Readings, mapped: StreamClock, notes: li
     if clash and mapped.equal == "refuse":
         at = int(np.flatnonzero(counts > 1)[0])
         raise DataError(
-            f"{name}: {int(np.count_nonzero(counts > 1))} stamps stand on several rows, the first at {stamps[at]:.6g} s; name another "
-            'clock, or write equal_stamps = "mean" or "first"'
+            f"{name}: {int(np.count_nonzero(counts > 1))} stamps stand on several rows, the first at {stamps[at]:.6g} s; "
+            'name another clock, or write equal_stamps = "mean" or "first"'
         )
     did = {"mean": "averaged", "first": "their first kept"}.get(mapped.equal, "joined")
     notes.append(f"{name}: rows with equal stamps are {did} ({len(readings.stamps) - len(stamps)} rows fewer)")
@@ -162,4 +164,3 @@ def without_infinities(readings: Readings, notes: list[str]) -> Readings:
             notes.append(f"{infinite} infinite readings of {name} are left empty")
             columns[name] = np.where(np.isinf(values), np.nan, values)
     return replace(readings, columns=columns)
-

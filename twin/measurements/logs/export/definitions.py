@@ -8,7 +8,10 @@ FLOAT64 = ("std_msgs/msg/Float64", "float64 data\n")
 STRING = ("std_msgs/msg/String", "string data\n")
 POINT_STAMPED = (
     "geometry_msgs/msg/PointStamped",
-    "std_msgs/Header header\ngeometry_msgs/Point point\n" + f"{_RULE}\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n" + _HEADER + _TIME,
+    "std_msgs/Header header\ngeometry_msgs/Point point\n"
+    + f"{_RULE}\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    + _HEADER
+    + _TIME,
 )
 JOINT_STATE = (
     "sensor_msgs/msg/JointState",

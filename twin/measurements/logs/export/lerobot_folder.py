@@ -1,7 +1,8 @@
 """A measurement set as a LeRobot v3 dataset: an episode a trial, inputs as `action`, outputs as `observation.state`, in SI.
 
-Layout: https://huggingface.co/docs/lerobot/lerobot-dataset-v3. Numbers are float64; `timestamp` is frame_index / fps in float32, as there.
-LeRobot knows neither empty cells nor uneven steps, so that sets with either are refused, not resampled.
+Layout: https://huggingface.co/docs/lerobot/lerobot-dataset-v3. Numbers are float64;
+`timestamp` is frame_index / fps in float32, as there. LeRobot knows neither empty cells nor uneven steps:
+sets with either are refused, not resampled.
 """
 
 import json
@@ -70,9 +71,7 @@ def _check_complete(recording: Recording) -> None:
     for trial in recording.trials:
         for name, values in trial.values.items():
             if empty := int(np.count_nonzero(np.isnan(values))):
-                raise DataError(
-                    f"{trial.name}: {empty} empty cells in {name}; LeRobot has none: leave the channel out, or export --mcap or --parquet"
-                )
+                raise DataError(f"{trial.name}: {empty} empty cells in {name}; LeRobot has none; export --mcap or --parquet")
 
 
 def _write(recording: Recording, rate: float, folder: Path) -> None:
@@ -82,7 +81,8 @@ def _write(recording: Recording, rate: float, folder: Path) -> None:
     lengths = [len(trial.time) for trial in recording.trials]
     frames = np.concatenate([np.arange(length) for length in lengths])
     indices = {
-        "timestamp": (frames / rate).astype(np.float32), "frame_index": frames, "episode_index": np.repeat(np.arange(len(lengths)), lengths),
+        "timestamp": (frames / rate).astype(np.float32), "frame_index": frames,
+        "episode_index": np.repeat(np.arange(len(lengths)), lengths),
         "index": np.arange(len(frames)), "task_index": np.zeros(len(frames), np.int64),
     }  # fmt: skip
     table = pa.table({name: _column(values) for name, values in columns.items()} | {k: pa.array(v) for k, v in indices.items()})
@@ -124,8 +124,8 @@ def _episodes(lengths: Sequence[int], task: str, columns: dict[str, np.ndarray])
     zeros = np.zeros(count, np.int64)
     found: dict[str, Any] = {
         "episode_index": np.arange(count), "tasks": [[task]] * count, "length": np.array(lengths), "data/chunk_index": zeros,
-        "data/file_index": zeros, "dataset_from_index": ends - lengths, "dataset_to_index": ends, "meta/episodes/chunk_index": zeros,
-        "meta/episodes/file_index": zeros,
+        "data/file_index": zeros, "dataset_from_index": ends - lengths, "dataset_to_index": ends,
+        "meta/episodes/chunk_index": zeros, "meta/episodes/file_index": zeros,
     }  # fmt: skip
     for name, values in columns.items():
         parts = [_stats(values[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
@@ -133,7 +133,7 @@ def _episodes(lengths: Sequence[int], task: str, columns: dict[str, np.ndarray])
     return pa.table(found)
 
 
-def _stats(values: np.ndarray) -> dict[str, list[float]]:
+def _stats(values: np.ndarray) -> dict[str, Any]:
     numbers = values.astype(float)
     of_columns = {"min": numbers.min(axis=0), "max": numbers.max(axis=0), "mean": numbers.mean(axis=0), "std": numbers.std(axis=0)}
     return {name: each.tolist() for name, each in of_columns.items()} | {"count": [len(values)]}
@@ -146,8 +146,9 @@ def _info(recording: Recording, rate: float, groups: dict[str, list[Channel]], l
     }
     features |= {name: {"dtype": dtype, "shape": [1], "names": None} for name, dtype in _INDICES.items()}
     return {
-        "codebase_version": VERSION, "robot_type": recording.robot, "total_episodes": len(lengths), "total_frames": int(sum(lengths)),
-        "total_tasks": 1, "chunks_size": 1000, "data_files_size_in_mb": 100, "video_files_size_in_mb": 200,
+        "codebase_version": VERSION, "robot_type": recording.robot, "total_episodes": len(lengths),
+        "total_frames": int(sum(lengths)), "total_tasks": 1, "chunks_size": 1000, "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
         "fps": int(rate) if rate == int(rate) else rate, "splits": {"train": f"0:{len(lengths)}"}, "data_path": _DATA_PATH,
         "video_path": None, "features": features,
     }  # fmt: skip

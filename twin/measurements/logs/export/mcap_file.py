@@ -22,7 +22,7 @@ from twin.foundation.atomic_write import write_atomically
 from twin.foundation.errors import DataError
 from twin.measurements.channels import Channel
 from twin.measurements.logs.export.definitions import FLOAT64, JOINT_STATE, POINT_STAMPED, STRING
-from twin.measurements.logs.readers.libraries import library
+from twin.measurements.logs.libraries import library
 from twin.measurements.recording import Recording, Trial
 
 BETWEEN_TRIALS = 1.0  # s
@@ -66,7 +66,7 @@ def _write(recording: Recording, stream: BinaryIO, writer: Any) -> None:
 
 
 def _begins(recording: Recording) -> list[float]:
-    """Return when the trials begin on the file's time line, s: by their starts if these do not overlap, else one after the other."""
+    """Return when trials begin on the file's time line, s: by their starts if these do not overlap, else one after the other."""
     starts = [trial.start for trial in recording.trials]
     if all(start is not None for start in starts):
         known = [start for start in starts if start is not None]

@@ -7,10 +7,10 @@ from typing import Any
 import pyarrow as pa
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.readers.ros_messages import flatten
-from twin.measurements.logs.readers.tables import stream_of_table
-from twin.measurements.logs.readers.text_files import read_text
+from twin.measurements.logs.bags.messages import flatten
 from twin.measurements.logs.streams import Stream
+from twin.measurements.logs.tables.columns import stream_of_table
+from twin.measurements.logs.tables.text_files import read_text
 
 
 def read_json(path: Path, name: str) -> tuple[Stream, tuple[str, ...]]:

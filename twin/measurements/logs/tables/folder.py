@@ -1,8 +1,9 @@
-"""A folder of tables: files of one layout are the runs of one stream, and runs are paired over streams by what their names share."""
+"""A folder of tables: files of one layout are runs of one stream; runs are paired over streams by what their names share."""
 
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from twin.foundation.errors import DataError, short_repr
@@ -29,12 +30,14 @@ def read_folder(folder: Path, files: list[Path], reader: Reader) -> Log:
         notes |= dict.fromkeys(said)
     if not layouts:
         raise DataError(f"{folder}: no file that can be read ({short_repr('; '.join(unread.values()), 300)}); name a log")
-    return Log(folder, f"folder of {sum(map(len, layouts.values()))} tables", _takes(folder, list(layouts.values())), tuple(notes), unread)
+    return Log(
+        folder, f"folder of {sum(map(len, layouts.values()))} tables", _takes(folder, list(layouts.values())), tuple(notes), unread
+    )
 
 
 def stem(path: Path) -> str:
     """Return a file's name without its endings: `a.csv.gz` -> `a`."""
-    return re.sub(r"(\.(csv|txt|tsv|dat|log|json|jsonl|parquet|pq|gz))+$", "", path.name, flags=re.IGNORECASE)
+    return re.sub(r"(\.(csv|txt|tsv|dat|log|json|jsonl|parquet|pq|gz|mcap|bag|db3))+$", "", path.name, flags=re.IGNORECASE)
 
 
 def _takes(folder: Path, layouts: list[dict[str, Stream]]) -> list[Take]:
@@ -48,7 +51,8 @@ def _takes(folder: Path, layouts: list[dict[str, Stream]]) -> list[Take]:
         name = shared.strip(" _-.") or ("table" if len(layouts) == 1 else next(iter(files)))
         for file, stream in files.items():
             key = file.removeprefix(shared) if several and len(files) > 1 else file
-            takes.setdefault(key, {})[name if len(files) > 1 else file] = stream
+            called = name if len(files) > 1 else file
+            takes.setdefault(key, {})[called] = replace(stream, name=called)
     return [Take(key, streams) for key, streams in sorted(takes.items(), key=lambda each: _in_order(each[0]))]
 
 
@@ -56,7 +60,7 @@ def _shared_beginning(names: list[str]) -> str:
     """Return what all names begin with, up to a sign between words."""
     if len(names) == 1:
         return names[0]
-    shared = os.path.commonprefix(names)
+    shared = os.path.commonprefix(names)  # noqa: RUF071 - letters, not paths
     end = max((n + 1 for n, letter in enumerate(shared) if not letter.isalnum()), default=0)
     return shared if shared and not shared[-1].isalnum() else shared[:end]
 

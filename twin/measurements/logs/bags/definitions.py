@@ -5,7 +5,7 @@ One definition that cannot be read, or that two topics have in two versions, the
 
 from collections.abc import Callable
 
-from twin.measurements.logs.readers.libraries import library
+from twin.measurements.logs.libraries import library
 
 Decoder = Callable[[bytes], object]
 _IDL_LINE = "=" * 80 + "\n"

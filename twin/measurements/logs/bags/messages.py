@@ -1,7 +1,7 @@
 """Decoded ROS messages, and JSON, as flat fields: `pose.position.x`, `data[2]`, `position[elbow]`.
 
-A list beside a list of names of the same length is read by those names (JointState and its like); in a TFMessage each child frame is a
-stream of its own. Texts are kept only in messages that hold nothing else (marks).
+A list beside a list of names of the same length is read by those names (JointState and its like); in a TFMessage each child
+frame is a stream of its own. Texts are kept only in messages that hold nothing else (marks).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ LONGEST_LIST = 128  # entries of a list that become fields; longer ones are pict
 MAX_STAMP_SECONDS = 2**33  # s since 1970
 _NAME_LISTS = ("name", "names", "joint_names", "interface_names", "joint_name", "motor_names")
 _NO_NUMBERS = (
-    "Image", "CompressedImage", "PointCloud2", "PointCloud", "LaserScan", "OccupancyGrid", "CameraInfo", "CompressedVideo", "OctoMap",
+    "Image", "CompressedImage", "PointCloud2", "PointCloud", "LaserScan", "OccupancyGrid", "CameraInfo", "CompressedVideo",
     "Octomap",
 )  # fmt: skip
 Values = dict[str, float | str]
@@ -68,17 +68,15 @@ def _items(message: object) -> Mapping[str, Any]:
     """Return the parts of a message of any of the libraries, without constants and private names."""
     if isinstance(message, Mapping):
         return message
-    slots = getattr(message, "__dict__", None)
-    if slots is None:
-        slots = {name: getattr(message, name) for name in getattr(message, "__slots__", ())}
-    return {name: value for name, value in slots.items() if not name.startswith("_")}
+    names = getattr(message, "__slots__", None) or list(getattr(message, "__dict__", ()))
+    return {name: getattr(message, name) for name in names if not name.startswith("_")}
 
 
 def _flatten(message: object, path: str, names: Sequence[str], values: Values, texts: dict[str, str]) -> None:
     items = _items(message)
     names = next((own for each in _NAME_LISTS if (own := _text_list(items.get(each)))), names)
     for key, value in items.items():
-        if key == "header" or (key == "__msgtype__"):
+        if key == "header":
             continue
         place = f"{path}.{key}" if path else key
         if isinstance(value, bool | np.bool_ | int | float | np.integer | np.floating):

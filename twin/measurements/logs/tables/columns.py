@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from twin.measurements.logs.readers.headers import split_unit
 from twin.measurements.logs.streams import MAX_FIELDS, TICKS_A_SECOND, Clock, Field, Stream
+from twin.measurements.logs.tables.headers import split_unit
 
 MAX_LABELS = 1000  # different texts of a column that can mark trials
 LEAST_NUMBERS = 0.5  # share of a column's cells that are numbers, for the others to count as missing
@@ -51,12 +51,15 @@ def _flat_columns(table: pa.Table) -> list[tuple[str, pa.ChunkedArray]]:
 
 def list_entries(name: str, values: pa.ChunkedArray, names: Sequence[str] = ()) -> list[tuple[str, pa.ChunkedArray]]:
     """Return a column of lists of equal lengths as a column an entry: `name[0]`, or `name[elbow]` by `names`."""
-    lengths = pc.unique(pc.list_value_length(values)).drop_null().to_pylist()
+    lengths = pc.call_function("list_value_length", [values]).unique().drop_null().to_pylist()
     inner = values.type.value_type
     if len(lengths) != 1 or not (pa.types.is_integer(inner) or pa.types.is_floating(inner) or pa.types.is_boolean(inner)):
         return []
     named = len(names) == lengths[0] and len(set(names)) == len(names)
-    return [(f"{name}[{names[n] if named else n}]", pc.list_element(values, n)) for n in range(min(lengths[0], MAX_FIELDS))]
+    return [
+        (f"{name}[{names[n] if named else n}]", pc.call_function("list_element", [values, pa.scalar(n)]))
+        for n in range(min(lengths[0], MAX_FIELDS))
+    ]
 
 
 def _field(name: str, values: pa.ChunkedArray, unit: str, remarks: list[str]) -> Field | None:

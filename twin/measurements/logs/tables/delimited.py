@@ -9,10 +9,10 @@ import pyarrow as pa
 import pyarrow.csv
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.readers.headers import unit_word
-from twin.measurements.logs.readers.tables import stream_of_table
-from twin.measurements.logs.readers.text_files import read_text
 from twin.measurements.logs.streams import Stream
+from twin.measurements.logs.tables.columns import stream_of_table
+from twin.measurements.logs.tables.headers import unit_word
+from twin.measurements.logs.tables.text_files import read_text
 
 HEAD_LINES = 300  # lines from which the layout is found out
 MAX_RAGGED = 0.01  # share of rows of another length that are left out with a note; more: refused
@@ -82,7 +82,9 @@ def _describe(lines: list[str], delimiter: str) -> Layout:
     if len(header) == width - 1 and header:  # a comma at the end of each row, or a column of row numbers without a name
         header = [*header, ""] if not any(row[-1] for row in rows if len(row) == width) else ["", *header]
     if not width <= len(header) <= width + 1 or _numeric_cells(header, delimiter)[0] == len(header):
-        notes = ("no header: the columns are numbered from 1",) if not header else (f"no header of {width} names before the numbers",)
+        notes = (
+            ("no header: the columns are numbered from 1",) if not header else (f"no header of {width} names before the numbers",)
+        )
         return Layout(delimiter, decimal, tuple(f"column_{n + 1}" for n in range(width)), {}, first, notes)
     names, renamed = _unique(header[:width])
     skipped = [lines[n] for n in before[:-1]]
@@ -93,14 +95,15 @@ def _describe(lines: list[str], delimiter: str) -> Layout:
 def _first_of_block(lines: list[str], delimiter: str) -> int:
     """Return the first line of data, behind a block of facts about the test that looks like a small table of its own."""
     data = [n for n, line in enumerate(lines) if _is_data(line, delimiter)]
+    first = data[0]
     for n in range(data[0] + 1, len(lines)):
         before = sum(each < n for each in data)
         cells = [cell for cell in split(lines[n], delimiter) if cell]
         if before > MAX_FACTS * len(data):
             break
         if len(cells) > 1 and not _numeric_cells(cells, delimiter)[0] and n + 1 in data and lines[n] not in lines[:n]:
-            return n + 1
-    return data[0]
+            first = n + 1
+    return first
 
 
 def read_rows(path: Path, lines: list[str], layout: Layout) -> tuple[pa.Table, tuple[str, ...]]:

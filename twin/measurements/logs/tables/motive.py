@@ -1,18 +1,18 @@
 """CSV files of Motive (OptiTrack): rigid bodies, bones and markers under a header of several rows.
 
-The layout is that of OptiTrack's documentation, "Data Export: CSV": a first row of keys and values (Length Units, Rotation Type ...),
-then rows Type, Name, ID (Parent), Position or Rotation, and last `Frame, Time (Seconds), X, Y, Z, W ...`.
+The layout is that of OptiTrack's documentation, "Data Export: CSV": a first row of keys and values (Length Units, Rotation
+Type ...), then rows Type, Name, ID (Parent), Position or Rotation, and last `Frame, Time (Seconds), X, Y, Z, W ...`.
 """
 
 import csv
 from pathlib import Path
 
 from twin.foundation.errors import DataError
-from twin.measurements.logs.readers.delimited import Layout, read_rows
-from twin.measurements.logs.readers.headers import unit_word
-from twin.measurements.logs.readers.tables import stream_of_table
-from twin.measurements.logs.readers.text_files import read_text
 from twin.measurements.logs.streams import Stream
+from twin.measurements.logs.tables.columns import stream_of_table
+from twin.measurements.logs.tables.delimited import Layout, read_rows
+from twin.measurements.logs.tables.headers import unit_word
+from twin.measurements.logs.tables.text_files import read_text
 
 FIRST_CELL = "Format Version"
 TIME = "Time (Seconds)"

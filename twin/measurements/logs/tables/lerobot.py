@@ -8,10 +8,10 @@ import numpy as np
 import pyarrow as pa
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.readers.parquet import read_parquet_table
-from twin.measurements.logs.readers.tables import list_entries, stream_of_table
-from twin.measurements.logs.readers.text_files import read_text
 from twin.measurements.logs.streams import Clock, Log, Stream, Take
+from twin.measurements.logs.tables.columns import list_entries, stream_of_table
+from twin.measurements.logs.tables.parquet import read_parquet_table
+from twin.measurements.logs.tables.text_files import read_text
 
 INFO_FILE = Path("meta") / "info.json"
 STREAM, EPISODE, FRAME_CLOCK = "frames", "episode_index", "frame_index / fps"

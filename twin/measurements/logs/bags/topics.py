@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from twin.measurements.logs.readers.ros_messages import flatten, header_stamp, split_message
+from twin.measurements.logs.bags.messages import flatten, header_stamp, split_message
 from twin.measurements.logs.streams import Stream, StreamBuilder
 
 HEADER_CLOCK, LOG_CLOCK, PUBLISH_CLOCK = "header.stamp", "log time", "publish time"

@@ -6,8 +6,8 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.readers.tables import stream_of_table
 from twin.measurements.logs.streams import Stream
+from twin.measurements.logs.tables.columns import stream_of_table
 
 MAX_VALUES = 64 * 2**20  # values of a table
 

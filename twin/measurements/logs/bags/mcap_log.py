@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.readers.libraries import library
-from twin.measurements.logs.readers.ros_definitions import decoder_of_definition
-from twin.measurements.logs.readers.ros_messages import holds_no_numbers
-from twin.measurements.logs.readers.topics import LOG_CLOCK, PUBLISH_CLOCK, Topics
+from twin.measurements.logs.bags.definitions import decoder_of_definition
+from twin.measurements.logs.bags.messages import holds_no_numbers
+from twin.measurements.logs.bags.topics import LOG_CLOCK, PUBLISH_CLOCK, Topics
+from twin.measurements.logs.libraries import library
 from twin.measurements.logs.streams import Log, Take
 
 Decoder = Callable[[bytes], object]
 
 
 def read_mcap(path: Path, parts: tuple[Path, ...] = ()) -> Log:
-    """Return the log of an MCAP file, or of the `parts` of one that was split. Raises DataError for one without a readable message."""
+    """Return the log of an MCAP file, or of the `parts` of one that was split. Raises DataError if no message can be read."""
     topics, notes = Topics(), []
     for part in parts or (path,):
         notes += _read_file(part, topics)
@@ -51,7 +51,16 @@ def _read_file(path: Path, topics: Topics) -> list[str]:
                     _add(topics, channel, schemas.get(channel.schema_id), record, decoders)
     except exceptions.InvalidMagic:
         raise DataError(f"{path}: no MCAP file (it does not begin as one); was it copied whole?") from None
-    except (exceptions.McapError, ValueError, KeyError, struct.error, EOFError, MemoryError, RuntimeError, *_unpacking_errors()) as fault:
+    except (
+        exceptions.McapError,
+        ValueError,
+        KeyError,
+        struct.error,
+        EOFError,
+        MemoryError,
+        RuntimeError,
+        *_unpacking_errors(),
+    ) as fault:
         what = str(fault) or type(fault).__name__
         return [f"{path.name} breaks off ({short_repr(what, 100)}): the {topics.count - before} messages before that are read"]
     except OSError as fault:
@@ -80,6 +89,7 @@ def _add(topics: Topics, channel: Any, schema: Any, message: Any, decoders: dict
 
 def _decoder(topics: Topics, channel: Any, schema: Any) -> Decoder | None:
     """Return what decodes a channel's messages, or None, with the reason noted."""
+    named = "(none)" if schema is None else schema.name
     if schema is not None and holds_no_numbers(schema.name):
         topics.skip(channel.topic, f"{schema.name} holds no numbers for channels")
         return None
@@ -89,17 +99,12 @@ def _decoder(topics: Topics, channel: Any, schema: Any) -> Decoder | None:
             return json.loads
         if encoding == "cdr" and definition == "ros2msg":
             return library("mcap_ros2.decoder", "mcap-ros2-support").DecoderFactory().decoder_for(encoding, schema)
-        if encoding in ("cdr", "ros1") and definition in ("ros2idl", "ros1msg"):
+        if schema is not None and encoding in ("cdr", "ros1") and definition in ("ros2idl", "ros1msg"):
             return decoder_of_definition(schema.name, schema.data.decode(), definition)
     except DataError:
         raise
     except Exception as fault:  # definitions come from strangers, and the parsers answer with anything
-        topics.skip(channel.topic, f"its definition {kind_of(schema)} cannot be read ({short_repr(str(fault))})")
+        topics.skip(channel.topic, f"its definition {named} cannot be read ({short_repr(str(fault))})")
         return None
     topics.skip(channel.topic, f"encoding {encoding} with {definition or 'no'} definitions is not read; ROS 2, ROS 1 and JSON are")
     return None
-
-
-def kind_of(schema: Any) -> str:
-    """Return a schema's name for a message."""
-    return schema.name if schema is not None else "(none)"

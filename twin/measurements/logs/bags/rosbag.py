@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.readers.libraries import library
-from twin.measurements.logs.readers.mcap_log import read_mcap
-from twin.measurements.logs.readers.ros_definitions import Decoder, decoder_of_definition, decoder_of_distribution
-from twin.measurements.logs.readers.ros_messages import holds_no_numbers
-from twin.measurements.logs.readers.topics import LOG_CLOCK, Topics
+from twin.measurements.logs.bags.definitions import Decoder, decoder_of_definition, decoder_of_distribution
+from twin.measurements.logs.bags.mcap_log import read_mcap
+from twin.measurements.logs.bags.messages import holds_no_numbers
+from twin.measurements.logs.bags.topics import LOG_CLOCK, Topics
+from twin.measurements.logs.libraries import library
 from twin.measurements.logs.streams import Log, Take
 
 BAG_FILE = "metadata.yaml"
@@ -76,7 +76,9 @@ def _decoder(topics: Topics, connection: Any, ros1: bool) -> Decoder | None:
             return decoder_of_definition(kind, definition.data, encoding)
         found = decoder_of_distribution(kind, ros1)
         if found is None:
-            topics.skip(connection.topic, f"the bag does not carry the definition of {kind}; convert it to MCAP where ROS knows the type")
+            topics.skip(
+                connection.topic, f"the bag does not carry the definition of {kind}; convert it to MCAP where ROS knows the type"
+            )
         return found
     except DataError:
         raise
