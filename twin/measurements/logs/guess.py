@@ -114,7 +114,7 @@ def _body(words: list[str]) -> str:
         return "tip"
     if not number:
         return ""
-    return f"disk_{number}" if _DISK & set(words) else f"marker_{number}"
+    return f"disk_{number}" if _DISK & set(words) and not {"marker", "markers"} & set(words) else f"marker_{number}"
 
 
 def _by_words(text: str, field: Field) -> Guess:

@@ -12,6 +12,11 @@ import numpy as np
 LONGEST_LIST = 128  # entries of a list that become fields; longer ones are pictures, scans and clouds
 MAX_STAMP_SECONDS = 2**33  # s since 1970
 _NAME_LISTS = ("name", "names", "joint_names", "interface_names", "joint_name", "motor_names")
+# lists that the names one level up are of, too; another list of the same length may be a point
+_OF_JOINTS = (
+    "position", "positions", "velocity", "velocities", "acceleration", "accelerations", "effort", "efforts", "torque", "torques", "current",
+    "currents", "temperature", "temperatures",
+)  # fmt: skip
 _NO_NUMBERS = (
     "Image", "CompressedImage", "PointCloud2", "PointCloud", "LaserScan", "OccupancyGrid", "CameraInfo", "CompressedVideo",
     "Octomap",
@@ -74,7 +79,7 @@ def _items(message: object) -> Mapping[str, Any]:
 
 def _flatten(message: object, path: str, names: Sequence[str], values: Values, texts: dict[str, str]) -> None:
     items = _items(message)
-    names = next((own for each in _NAME_LISTS if (own := _text_list(items.get(each)))), names)
+    own = next((found for each in _NAME_LISTS if (found := _text_list(items.get(each)))), None)
     for key, value in items.items():
         if key == "header":
             continue
@@ -84,9 +89,10 @@ def _flatten(message: object, path: str, names: Sequence[str], values: Values, t
         elif isinstance(value, str):
             texts[place] = value
         elif _is_list(value):
-            _flatten_list(value, place, names, values, texts)
+            by_parent = names if key in _OF_JOINTS else ()
+            _flatten_list(value, place, by_parent if own is None else own, values, texts)
         elif value is not None:
-            _flatten(value, place, names, values, texts)
+            _flatten(value, place, names if own is None else own, values, texts)
 
 
 def _flatten_list(value: Any, place: str, names: Sequence[str], values: Values, texts: dict[str, str]) -> None:

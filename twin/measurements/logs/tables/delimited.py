@@ -94,14 +94,14 @@ def _describe(lines: list[str], delimiter: str) -> Layout:
 
 def _first_of_block(lines: list[str], delimiter: str) -> int:
     """Return the first line of data, behind a block of facts about the test that looks like a small table of its own."""
-    data = [n for n, line in enumerate(lines) if _is_data(line, delimiter)]
-    first = data[0]
-    for n in range(data[0] + 1, len(lines)):
-        before = sum(each < n for each in data)
+    widths = {n: len(split(line, delimiter)) for n, line in enumerate(lines) if _is_data(line, delimiter)}
+    first = min(widths)
+    for n in range(first + 1, len(lines)):
         cells = [cell for cell in split(lines[n], delimiter) if cell]
-        if before > MAX_FACTS * len(data):
-            break
-        if len(cells) > 1 and not _numeric_cells(cells, delimiter)[0] and n + 1 in data and lines[n] not in lines[:n]:
+        if len(cells) < 2 or _numeric_cells(cells, delimiter)[0] or n + 1 not in widths or lines[n] in lines[:n]:
+            continue
+        before = [width for at, width in widths.items() if at < n]
+        if len(before) <= MAX_FACTS * len(widths) or widths[n + 1] not in before:
             first = n + 1
     return first
 
