@@ -53,8 +53,10 @@ def _guess(stream: Stream, name: str, field: Field) -> Guess:
     kind = short_type(stream.kind)
     if match := re.fullmatch(r"(position|velocity|effort)\[(.+)\]", name):
         return _joint_state(stream.name, match[1], match[2])
-    if match := re.fullmatch(r"(action|observation\.state)\[(.+)\]", name):
+    if match := re.fullmatch(r"(action|observation\.state|observation\.environment_state)\[(.+)\]", name):
         return _lerobot(match[1], match[2])
+    if match := re.match(r"/(input|output|context)/(.+)", stream.name):  # as `twin export` names topics
+        return replace(_guess(replace(stream, name=match[2]), name, field), role=match[1])
     if kind == "Imu":
         return _imu(stream.name, name)
     plain = split_unit(name)[0]
@@ -78,10 +80,13 @@ def _joint_state(topic: str, part: str, joint: str) -> Guess:
 
 
 def _lerobot(feature: str, name: str) -> Guess:
-    joint = re.sub(r"\.(pos|position|vel|velocity)$", "", name)
-    if joint.isdigit():
-        return Guess(UNKNOWN, "input" if feature == "action" else "output")
-    return Guess(f"actuator.{joint}.ctrl", "input") if feature == "action" else Guess(f"joint.{joint}.position", "output")
+    joint = re.sub(r"\.(pos|vel)$", "", name)
+    role = {"action": "input", "observation.state": "output"}.get(feature, "context")
+    if known := _known(name):
+        return Guess(known, role)
+    if joint.isdigit() or role == "context":
+        return Guess(UNKNOWN, role)
+    return Guess(f"actuator.{joint}.ctrl" if role == "input" else f"joint.{joint}.position", role)
 
 
 def _imu(topic: str, name: str) -> Guess:

@@ -136,12 +136,12 @@ class StreamBuilder:
         known = self._texts.setdefault(name, {})
         return float(known.setdefault(text, len(known)))
 
-    def build(self, sort_by: str, units: Mapping[str, str] | None = None) -> Stream:
-        """Return the stream, its rows in the order of the clock `sort_by`."""
+    def build(self, sort_by: str, unit: str = "") -> Stream:
+        """Return the stream, its rows in the order of the clock `sort_by`; `unit` is that of a field `data`."""
         fields = {}
         for name, column in self._columns.items():
             column.extend([np.nan] * (self._count - len(column)))
-            fields[name] = Field(np.array(column), (units or {}).get(name, ""), tuple(self._texts.get(name, ())))
+            fields[name] = Field(np.array(column), unit if name == "data" else "", tuple(self._texts.get(name, ())))
         clocks = {}
         for name, stamps in self._clocks.items():
             stamps.extend([None] * (self._count - len(stamps)))

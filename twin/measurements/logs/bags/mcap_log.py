@@ -17,6 +17,7 @@ from twin.measurements.logs.libraries import library
 from twin.measurements.logs.streams import Log, Take
 
 Decoder = Callable[[bytes], object]
+EXPORT_METADATA = "twin-measurements"
 
 
 def read_mcap(path: Path, parts: tuple[Path, ...] = ()) -> Log:
@@ -44,6 +45,8 @@ def _read_file(path: Path, topics: Topics) -> list[str]:
                 kind = type(record).__name__
                 if kind == "Schema":
                     schemas[record.id] = record
+                elif kind == "Metadata" and record.name == EXPORT_METADATA:
+                    topics.units |= _exported_units(record.metadata)
                 elif kind == "Channel":
                     channels[record.id] = record
                 elif kind == "Message" and record.channel_id in channels:
@@ -66,6 +69,14 @@ def _read_file(path: Path, topics: Topics) -> list[str]:
     except OSError as fault:
         raise DataError(f"{path}: cannot be read ({fault.strerror or fault}); choose another file") from None
     return []
+
+
+def _exported_units(metadata: dict[str, str]) -> dict[str, str]:
+    """Return the units of topics as `twin export` notes them, or none from metadata of another kind."""
+    try:
+        return {topic: str(unit) for topic, _, unit in json.loads(metadata["channels"]).values()}
+    except (KeyError, ValueError, TypeError, AttributeError):
+        return {}
 
 
 def _unpacking_errors() -> tuple[type[Exception], ...]:

@@ -14,6 +14,7 @@ class Topics:
     def __init__(self) -> None:
         self._builders: dict[str, StreamBuilder] = {}
         self.unread: dict[str, str] = {}
+        self.units: dict[str, str] = {}  # of the plain numbers of a topic, where the log says them
         self.count = 0
 
     def add(self, topic: str, kind: str, message: object, stamps: Mapping[str, int]) -> None:
@@ -31,4 +32,4 @@ class Topics:
 
     def streams(self) -> dict[str, Stream]:
         """Return the streams, rows in the order of the log's time."""
-        return {name: builder.build(LOG_CLOCK) for name, builder in sorted(self._builders.items())}
+        return {name: builder.build(LOG_CLOCK, self.units.get(name, "")) for name, builder in sorted(self._builders.items())}

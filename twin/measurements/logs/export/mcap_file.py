@@ -21,13 +21,14 @@ import numpy as np
 from twin.foundation.atomic_write import write_atomically
 from twin.foundation.errors import DataError
 from twin.measurements.channels import Channel
+from twin.measurements.logs.bags.mcap_log import EXPORT_METADATA
 from twin.measurements.logs.export.definitions import FLOAT64, JOINT_STATE, POINT_STAMPED, STRING
 from twin.measurements.logs.libraries import library
 from twin.measurements.recording import Recording, Trial
 
 BETWEEN_TRIALS = 1.0  # s
 FIRST_TIME = 1.0  # s: a stamp of zero means "not set" in ROS
-TRIAL_TOPIC, METADATA = "/trial", "twin-measurements"
+TRIAL_TOPIC = "/trial"
 _JOINT_PARTS = {"joint_position": "position", "joint_velocity": "velocity", "joint_effort": "effort"}
 
 
@@ -61,7 +62,7 @@ def _write(recording: Recording, stream: BinaryIO, writer: Any) -> None:
             for topic in topics:
                 if (message := _message(topic, trial, row, stamp)) is not None:
                     out.write_message(topic.name, schemas[topic.schema], message, log_time=stamp, publish_time=stamp)
-    out.add_metadata(METADATA, _about(recording, topics))
+    out.add_metadata(EXPORT_METADATA, _about(recording, topics))
     out.finish()
 
 

@@ -49,8 +49,11 @@ def _flat(table: pa.Table, features: dict[str, Any]) -> pa.Table:
     """Return a table whose lists are columns, named as info.json names their entries."""
     columns: dict[str, pa.ChunkedArray] = {}
     for name, values in zip(table.column_names, table.columns, strict=True):
+        names = _names(features.get(name))
         if pa.types.is_nested(values.type) and not pa.types.is_struct(values.type):
-            columns |= dict(list_entries(name, values, _names(features.get(name))))
+            columns |= dict(list_entries(name, values, names))
+        elif len(names) == 1:
+            columns[f"{name}[{names[0]}]"] = values
         else:
             columns[name] = values
     return pa.table(columns)
