@@ -20,9 +20,11 @@ from twin.measurements.logs import assemble, map_text, open_log, read_map
 
 T0 = 1_726_041_600_000_000_000  # ns, a day in 2024
 RULE = "=" * 80
-HEADER = f"{RULE}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n{RULE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"  # noqa: E501
+HEADER = f"{RULE}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n{RULE}\nMSG: builtin_interfaces/Time\n"
+HEADER += "int32 sec\nuint32 nanosec\n"
 JOINT_STATE = f"std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n{HEADER}"
-POINT = f"std_msgs/Header header\ngeometry_msgs/Point point\n{RULE}\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n{HEADER}"
+POINT_DEFINITION = f"{RULE}\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
+POINT = f"std_msgs/Header header\ngeometry_msgs/Point point\n{POINT_DEFINITION}{HEADER}"
 DELAY = 3_000_000  # ns from header to recorder
 
 
@@ -58,7 +60,9 @@ def write_mcap(path: Path, header: bool = True) -> Path:
             if what == "joint":
                 names, turn = ["shoulder", "elbow"], slice(None, None, 1 if n % 2 else -1)
                 numbers = {"position": joints[1][n][turn].tolist(), "velocity": [], "effort": []}
-                out.write_message("/joint_states", joint_state, {"header": head, "name": names[turn], **numbers}, t + DELAY, t + DELAY)
+                out.write_message(
+                    "/joint_states", joint_state, {"header": head, "name": names[turn], **numbers}, t + DELAY, t + DELAY
+                )
             elif what == "point":
                 position = dict(zip("xyz", points[1][n].tolist(), strict=True))
                 out.write_message("/mocap/tip", point_stamped, {"header": head, "point": position}, t + DELAY, t + DELAY)
@@ -116,7 +120,8 @@ def write_lerobot(folder: Path, lengths: tuple[int, ...] = (40, 30), rate: int =
     frames = np.concatenate([np.arange(length) for length in lengths])
     table = pa.table(
         {
-            "observation.state": pa.array(state.tolist(), pa.list_(pa.float64(), 2)), "action": pa.array(action.tolist(), pa.list_(pa.float64())),
+            "observation.state": pa.array(state.tolist(), pa.list_(pa.float64(), 2)),
+            "action": pa.array(action.tolist(), pa.list_(pa.float64())),
             "timestamp": (frames / rate).astype(np.float32), "frame_index": frames, "index": np.arange(rows),
             "episode_index": np.repeat(np.arange(len(lengths)), lengths), "task_index": np.zeros(rows, np.int64),
         }

@@ -119,11 +119,11 @@ def test_a_truncated_mcap_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
 def test_broken_bags_are_refused_in_one_line(tmp_path: Path) -> None:
     bag = write_ros1_bag(tmp_path / "a.bag")
     bag.write_bytes(bag.read_bytes()[:5000])
-    with pytest.raises(DataError, match="cannot be read as a ROS 1 bag .*reindex"):
+    with pytest.raises(DataError, match=r"cannot be read as a ROS 1 bag .*reindex"):
         open_log(bag)
     folder = write_ros2_bag(tmp_path / "bag")
     (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 5}\n")
-    with pytest.raises(DataError, match="cannot be read as a ROS 2 bag .*reindex"):
+    with pytest.raises(DataError, match=r"cannot be read as a ROS 2 bag .*reindex"):
         open_log(folder)
 
 

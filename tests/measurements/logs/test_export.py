@@ -110,7 +110,9 @@ def test_lerobot_follows_the_documented_layout_and_comes_back(tmp_path: Path) ->
         np.testing.assert_allclose(again.trials[number].time, trial.time, rtol=1e-12)
         for channel in CHANNELS:
             np.testing.assert_allclose(again.trials[number].values[channel.name], trial.values[channel.name], rtol=1e-12)
-    assert [c.role for c in sorted(again.channels, key=lambda c: c.name)] == [c.role for c in sorted(CHANNELS, key=lambda c: c.name)]
+    assert [c.role for c in sorted(again.channels, key=lambda c: c.name)] == [
+        c.role for c in sorted(CHANNELS, key=lambda c: c.name)
+    ]
 
 
 def test_lerobot_refuses_what_it_cannot_hold(tmp_path: Path) -> None:

@@ -79,6 +79,8 @@ def test_encodings_of_loggers_are_read(tmp_path: Path, encoding: str) -> None:
         (["1726041600000", "1726041600500", "1726041601000"], "ms", 1726041600000),
         (["1726041600000000123", "1726041600500000123", "1726041601000000123"], "ns", 1726041600000000123),
         (["2024-09-11T08:00:00", "2024-09-11T08:00:00.5", "2024-09-11T08:00:01"], "ns", 1726041600000000000),
+        (["2024/09/11 08:00:00.5", "2024/09/11 08:00:01.0", "2024/09/11 08:00:01.5"], "ns", 1726041600500000000),
+        (["08:00:00.25", "08:00:00.50", "08:00:00.75"], "ns", 28800250000000),
         (["0.1", "0.2", "0.3"], "s", 0.1),
         (["10", "20", "30"], "?", 10),
     ],
@@ -205,9 +207,8 @@ def test_a_motive_csv_comes_out_as_the_same_numbers(tmp_path: Path, parent: str)
     rng = np.random.default_rng(5)
     numbers = rng.normal(size=(20, 11)).round(6)
     numbers[5:8, :8] = np.nan  # the body was occluded
-    rows = [
-        f"{n},{n / 100:.6f}," + ",".join("" if np.isnan(value) else f"{value:.6f}" for value in row) for n, row in enumerate(numbers)
-    ]
+    cells = [["" if np.isnan(value) else f"{value:.6f}" for value in row] for row in numbers]
+    rows = [",".join([str(n), f"{n / 100:.6f}", *row]) for n, row in enumerate(cells)]
     (tmp_path / "take.csv").write_text(MOTIVE.replace("{parent}", parent) + "\n".join(rows) + "\n")
     log = open_log(tmp_path / "take.csv")
     assert log.format == "Motive CSV"
@@ -259,7 +260,7 @@ def test_tables_in_a_folder_are_paired_by_their_names_and_joined_by_a_counter(tm
     (folder / "README.md").write_text("about\n")
     changes = (
         (r'# (\{ stream = "commands", field = "u1", quantity = )"\?"(.*)"\?"', r'\1"tendon_1_tension"\2"N"'),
-        ('rate = "[?]"', 'rate = "100 Hz"'), NEWTON[:1] + ('unit = "m"',),
+        ('rate = "[?]"', 'rate = "100 Hz"'), (NEWTON[0], 'unit = "m"'),
     )  # fmt: skip
     recording = imported(folder, tmp_path / "set", *changes)
     assert [trial.label for trial in recording.trials] == ["1", "2"]

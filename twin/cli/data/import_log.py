@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from twin.measurements import Recording
     from twin.measurements.logs.streams import Log
 
+MAX_CSV_NUMBERS = 2**21  # numbers of a trial; larger ones are written as Parquet
 SHOWN_FIELDS = 16  # of a stream, on the terminal; the map lists all
 
 
@@ -74,7 +75,8 @@ class ImportLog:
         import_map = read_map(path)
         recording, notes = assemble(log, import_map)
         recording = replace(recording, robot=_robot(recording, path, folder))
-        write(recording, folder)
+        large = max(trial.time.size for trial in recording.trials) * len(recording.channels) > MAX_CSV_NUMBERS
+        write(recording, folder, file_format="parquet" if large else "csv")
         for note in (*clock_words(import_map), *notes, *read(folder, least_trials=1).notices):
             out.print(printable(f"  {note}"), highlight=False)
         trials = recording.trials

@@ -15,7 +15,7 @@ from twin.measurements.logs.cut import LEAST_ROWS, cut_at_gaps, cut_at_marks, ma
 from twin.measurements.logs.map_file import ImportMap, StreamClock
 from twin.measurements.logs.stamps import Readings, in_order, on_one_line, stamp_streams, without_infinities
 from twin.measurements.logs.streams import Log, Stream, Take
-from twin.measurements.parsing.plausible import check_roles, check_table
+from twin.measurements.parsing.plausible import check_roles, check_table, check_trials
 from twin.measurements.parsing.tables import Table
 from twin.measurements.recording import Recording, Trial
 
@@ -56,6 +56,7 @@ def assemble(log: Log, import_map: ImportMap) -> tuple[Recording, tuple[str, ...
                 f"more than {MAX_SET_NUMBERS} numbers in all; choose fewer channels, or cut and import the log in parts"
             )
         trials = _trials(pieces, import_map)
+        check_trials(channels, trials, (), least_trials=1)
     notes.append("time of each trial counts from its first row, in s")
     head = (import_map.robot, import_map.title or log.path.name, import_map.source, import_map.gravity)
     return Recording(*head, channels, tuple(trials)), tuple(dict.fromkeys(notes))

@@ -24,6 +24,7 @@ _ANGLE = {"angle", "angles", "pos", "position", "positions", "rad", "deg", "thet
 _LENGTH = {"length", "displacement", "disp", "pos", "position", "travel", "pull", "stroke"}
 _TIP = {"tip", "ee", "effector", "endeffector", "tcp"}
 _DISK = {"disk", "disks", "disc", "segment", "section", "body", "link"}
+_OF_JOINT = re.compile(r"(?:(.+)\.)?(positions?|velocit(?:y|ies)|efforts?)\[(.+)\]")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _JOINT_WORDS = {
     "position": ("q", "qpos", "pos", "position", "angle"), "velocity": ("dq", "qd", "qvel", "vel", "velocity", "speed"),
@@ -51,8 +52,8 @@ def guess_fields(stream: Stream) -> dict[str, Guess]:
 
 def _guess(stream: Stream, name: str, field: Field) -> Guess:
     kind = short_type(stream.kind)
-    if match := re.fullmatch(r"(position|velocity|effort)\[(.+)\]", name):
-        return _joint_state(stream.name, match[1], match[2])
+    if (match := _OF_JOINT.fullmatch(name)) and not match[3].isdigit():
+        return _joint_state(f"{stream.name} {match[1] or ''}", match[2], match[3])
     if match := re.fullmatch(r"(action|observation\.state|observation\.environment_state)\[(.+)\]", name):
         return _lerobot(match[1], match[2])
     if match := re.match(r"/(input|output|context)/(.+)", stream.name):  # as `twin export` names topics
@@ -70,13 +71,14 @@ def _guess(stream: Stream, name: str, field: Field) -> Guess:
     return _by_words(plain, field)
 
 
-def _joint_state(topic: str, part: str, joint: str) -> Guess:
-    commanded = bool(_COMMAND & set(_words(topic)))
-    if commanded:
-        return Guess(f"actuator.{joint}.ctrl", "input", {"position": "rad", "velocity": "rad/s", "effort": "N*m"}[part])
-    quantity = {"position": "position", "velocity": "velocity", "effort": "torque"}[part]
-    unit = {"position": "rad", "velocity": "rad/s", "effort": "N*m"}[part]
-    return Guess(f"joint.{joint}.{quantity}", "output", unit, sure=True, proposed=part == "position")
+def _joint_state(place: str, part: str, joint: str) -> Guess:
+    """Return a proposal for a list by joint names, in ROS's units; `place` are the topic and what the list is in."""
+    quantity, unit = {"pos": ("position", "rad"), "vel": ("velocity", "rad/s"), "eff": ("torque", "N*m")}[part[:3]]
+    if _COMMAND & set(_words(place)):
+        return Guess(f"actuator.{joint}.ctrl", "input", unit, proposed=quantity == "position")
+    if "error" in place:
+        return Guess()
+    return Guess(f"joint.{joint}.{quantity}", "output", unit, sure=True, proposed=quantity == "position")
 
 
 def _lerobot(feature: str, name: str) -> Guess:
@@ -129,7 +131,7 @@ def _by_words(text: str, field: Field) -> Guess:
     for plain in (text.strip(), "_".join(words)):
         if known := _known(plain):
             return Guess(known, _role(known, role), field.unit or UNKNOWN)
-    quantity = _quantity(words) or _joint_by_name(text, role)
+    quantity = _quantity(words) or _joint_by_name("_".join(text.strip("/ ").split("/")[-2:]), role)
     if not quantity:
         return Guess(UNKNOWN, "input" if re.fullmatch(r"u_?\d+", text.strip()) else role, field.unit or UNKNOWN)
     return Guess(quantity, _role(quantity, role), field.unit or UNKNOWN)

@@ -128,7 +128,8 @@ class StreamBuilder:
                     self._dropped = True
                     continue
                 column = self._columns[name] = array("d")
-            column.extend([np.nan] * (self._count - len(column)))
+            if (missing := self._count - len(column)) > 0:
+                column.extend([np.nan] * missing)
             column.append(self._code(name, value) if isinstance(value, str) else value)
         self._count += 1
 

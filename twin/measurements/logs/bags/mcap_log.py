@@ -41,7 +41,7 @@ def _read_file(path: Path, topics: Topics) -> list[str]:
     before = topics.count
     try:
         with path.open("rb") as file:
-            for record in reader(file, record_size_limit=path.stat().st_size).records:
+            for record in reader(file, validate_crcs=True, record_size_limit=path.stat().st_size).records:
                 kind = type(record).__name__
                 if kind == "Schema":
                     schemas[record.id] = record

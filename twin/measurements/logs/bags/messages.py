@@ -14,8 +14,8 @@ MAX_STAMP_SECONDS = 2**33  # s since 1970
 _NAME_LISTS = ("name", "names", "joint_names", "interface_names", "joint_name", "motor_names")
 # lists that the names one level up are of, too; another list of the same length may be a point
 _OF_JOINTS = (
-    "position", "positions", "velocity", "velocities", "acceleration", "accelerations", "effort", "efforts", "torque", "torques", "current",
-    "currents", "temperature", "temperatures",
+    "position", "positions", "velocity", "velocities", "acceleration", "accelerations", "effort", "efforts", "torque", "torques",
+    "current", "currents", "temperature", "temperatures",
 )  # fmt: skip
 _NO_NUMBERS = (
     "Image", "CompressedImage", "PointCloud2", "PointCloud", "LaserScan", "OccupancyGrid", "CameraInfo", "CompressedVideo",
@@ -98,10 +98,13 @@ def _flatten(message: object, path: str, names: Sequence[str], values: Values, t
 def _flatten_list(value: Any, place: str, names: Sequence[str], values: Values, texts: dict[str, str]) -> None:
     if len(value) > LONGEST_LIST or isinstance(value, bytes | bytearray | memoryview):
         return
+    value = value.tolist() if isinstance(value, np.ndarray) else value
     by_name = len(names) == len(value) and len(set(names)) == len(names)
     for n, each in enumerate(value):
         at = f"{place}[{names[n] if by_name else n}]"
-        if isinstance(each, bool | np.bool_ | int | float | np.integer | np.floating):
+        if type(each) is float:  # the usual case first
+            values[at] = each
+        elif isinstance(each, bool | np.bool_ | int | float | np.integer | np.floating):
             values[at] = float(each)
         elif isinstance(each, str):
             return

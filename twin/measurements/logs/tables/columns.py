@@ -8,12 +8,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from twin.measurements.logs.streams import MAX_FIELDS, TICKS_A_SECOND, Clock, Field, Stream
+from twin.measurements.logs.tables.dates import nanoseconds_of_texts
 from twin.measurements.logs.tables.headers import split_unit
 
 MAX_LABELS = 1000  # different texts of a column that can mark trials
 LEAST_NUMBERS = 0.5  # share of a column's cells that are numbers, for the others to count as missing
 _TIME_NAMES = (  # the likelier the name, the earlier
-    r"time|t|timestamp|time.?stamp|stamp|times|timestamps",
+    r"_*(time|t|timestamp|time.?stamp|stamp|times|timestamps)_*",
     r"time[ _.-]?(s|sec|secs|seconds|ms|us|ns|millis|micros|nanos)|(secs?|seconds|millis|micros|msecs?|nanos)",
     r"(elapsed|log|unix|ros|rosbag|epoch|sys|system|host|device|sensor|wall|sim|record\w*)[ _.-]?(time|stamp|timestamp)\w*",
     r".*header.*stamp.*|.*[ _.-](time|stamp|timestamp)|(time|timestamp)[ _.-].*|date|datetime|date.?time|utc|clock",
@@ -105,6 +106,8 @@ def _text_field(name: str, values: pa.ChunkedArray, unit: str, remarks: list[str
         where = f"{len(odd)} cells are no numbers and read as missing, the first {texts[odd[0]]!r} in data row {odd[0] + 1}"
         remarks.append(f"{name}: {where}")
         return Field(numbers, unit)
+    if (ticks := nanoseconds_of_texts(texts)) is not None:
+        return Field(ticks, "ns")
     labels = list(dict.fromkeys(text for text in texts if text is not None))
     if not labels or len(labels) > MAX_LABELS:
         return None
@@ -133,6 +136,11 @@ def _clocks(fields: Mapping[str, Field]) -> dict[str, Clock]:
             found.append((-1, f"{name} + {pair}", Clock(whole, "ns")))
         elif rank is not None and _mostly_rises(each.values):
             found.append((rank, name, Clock(each.values, each.unit if each.unit in TICKS_A_SECOND else "")))
+    if not found:  # a column that rises in a unit of time
+        found = [
+            (0, name, Clock(each.values, each.unit)) for name, each in fields.items()
+            if each.unit in TICKS_A_SECOND and len(each.values) > 1 and np.all(np.diff(each.values) >= 0)
+        ]  # fmt: skip
     return {name: clock for _, name, clock in sorted(found, key=lambda each: each[0])}
 
 

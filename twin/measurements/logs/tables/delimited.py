@@ -52,11 +52,12 @@ def find_layout(lines: list[str], path: Path) -> Layout:
     """Return the layout of a table from its first lines. Raises DataError if no row of numbers is in them."""
     best: tuple[float, int, int, str] | None = None
     for rank, delimiter in enumerate(_DELIMITERS):
-        counts = [_numeric_cells(split(line, delimiter), delimiter) for line in lines if line.strip() and not _is_comment(line)]
-        data = [(numeric, total) for numeric, total in counts if numeric > 0 and 2 * numeric >= total]
+        rows = [split(line, delimiter) for line in lines if line.strip() and not _is_comment(line)]
+        counts = [(*_numeric_cells(row, delimiter), len(row)) for row in rows]
+        data = [count for count in counts if count[0] > 0 and 2 * count[0] >= count[1]]
         if data:
-            width = max(total for _, total in data)
-            score = sum(numeric / total for numeric, total in data) / len(counts)
+            width = max(cells for _, _, cells in data)
+            score = sum(numeric / stated for numeric, stated, _ in data) / len(counts)
             if best is None or (round(score, 2), min(width, 2), -rank) > best[:3]:
                 best = (round(score, 2), min(width, 2), -rank, delimiter)
     if best is None:
