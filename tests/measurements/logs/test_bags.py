@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from mcap.writer import Writer as PlainMcapWriter
 from mcap_ros2.writer import Writer as McapWriter
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.measurements.logs.sample_logs import (
     DELAY,
     JOINT_STATE,
+    RULE,
     T0,
     command_numbers,
     imported,
@@ -178,6 +180,37 @@ def test_two_publishers_on_one_topic_complement_each_other(tmp_path: Path) -> No
     assert len(trial.time) == 20
     assert trial.values["joint.arm.position"].tolist() == [n / 7 for n in range(20)]
     assert trial.values["joint.finger.position"].tolist() == [-n / 7 for n in range(20)]
+
+
+def test_messages_defined_in_idl_are_read(tmp_path: Path) -> None:
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg("float64 angle\nfloat32[3] tension\n", "lab_msgs/msg/Status"))
+    idl = (
+        f"{RULE}\nIDL: lab_msgs/msg/Status\nmodule lab_msgs {{ module msg {{ typedef float float__3[3];\n"
+        "struct Status { double angle; float__3 tension; }; }; };\n"
+    )
+    with (tmp_path / "a.mcap").open("wb") as file:
+        out = PlainMcapWriter(file)
+        out.start()
+        channel = out.register_channel("/status", "cdr", out.register_schema("lab_msgs/msg/Status", "ros2idl", idl.encode()))
+        for n in range(5):
+            message = store.types["lab_msgs/msg/Status"](n / 3, np.array([n, 1, 2], np.float32))
+            out.add_message(channel, T0 + n, bytes(store.serialize_cdr(message, "lab_msgs/msg/Status")), T0 + n)
+        out.finish()
+    fields = open_log(tmp_path / "a.mcap").takes[0].streams["/status"].fields
+    assert fields["angle"].values.tolist() == [n / 3 for n in range(5)]
+    assert fields["tension[0]"].values.tolist() == list(range(5))
+
+
+def test_a_stamp_without_a_header_is_a_clock(tmp_path: Path) -> None:
+    kind = f"builtin_interfaces/Time stamp\nfloat64 tension\n{RULE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+    with (tmp_path / "a.mcap").open("wb") as file, McapWriter(file) as out:
+        schema = out.register_msgdef("lab_msgs/msg/Cell", kind)
+        for n in range(5):
+            out.write_message("/cell", schema, {**stamped(T0 + n * 10**7), "tension": 1.0}, T0 + n * 10**7 + DELAY, T0)
+    text = map_text(open_log(tmp_path / "a.mcap"), "m.toml")
+    assert 'name = "/cell", clock = "stamp"' in text
+    assert "log time is later by 3 ms" in text
 
 
 def test_nested_messages_are_flat_fields() -> None:

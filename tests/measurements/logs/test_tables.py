@@ -15,6 +15,7 @@ from tests.measurements.logs.sample_logs import imported, readings, write_lerobo
 from twin.foundation.errors import DataError
 from twin.measurements.logs import map_text, open_log
 from twin.measurements.logs.clocks import choose_clock
+from twin.measurements.logs.guess import guess_fields
 from twin.measurements.logs.streams import Stream
 
 NEWTON = ('unit = "[?]"', 'unit = "N"')
@@ -116,6 +117,21 @@ def test_columns_of_one_name_are_told_apart_and_a_cut_off_line_is_said(tmp_path:
     assert "1 of 4 rows have not 3 cells" in notes
 
 
+def test_files_of_other_programs_are_read(tmp_path: Path) -> None:
+    plotjuggler = "__time,/joint_states/elbow/position,/cmd\n1726041600.1,0.5,\n1726041600.2,,1\n1726041600.3,0.7,\n"
+    stream = the_stream(tmp_path / "plotjuggler.csv", plotjuggler)
+    assert list(stream.clocks) == ["__time"]
+    assert guess_fields(stream)["/joint_states/elbow/position"].quantity == "joint.elbow.position"
+    rostopic = "%time,field.header.seq,field.pose.position.x\n175447000000,5,1.5\n175467000000,6,2.5\n175487000000,7,2.5\n"
+    assert the_stream(tmp_path / "rostopic.csv", rostopic).clocks["time"].unit == "ns"
+    qualisys = "NO_OF_FRAMES\t3\nFREQUENCY\t100\nMARKER_NAMES\ta\tb\nFrame\tTime\tm1 X\tm1 Y\n"
+    qualisys += "1\t0.00\t5\t6\n2\t0.01\t7\t8\n3\t0.02\t9\t9\n"
+    stream = the_stream(tmp_path / "qualisys.tsv", qualisys)
+    assert list(stream.fields) == ["Frame", "Time", "m1 X", "m1 Y"]
+    assert guess_fields(stream)["m1 X"].quantity == "marker_1_x"
+    assert the_stream(tmp_path / "excel.csv", "sep=;\nt;a\n0,5;1\n0,6;2\n0,7;4\n").fields["t"].values.tolist() == [0.5, 0.6, 0.7]
+
+
 def test_a_table_without_header_or_time_is_numbered(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     stream = the_stream(path, "1.5,2\n2.5,4\n3.5,8\n")
@@ -208,15 +224,14 @@ def test_a_motive_csv_comes_out_as_the_same_numbers(tmp_path: Path, parent: str)
     numbers = rng.normal(size=(20, 11)).round(6)
     numbers[5:8, :8] = np.nan  # the body was occluded
     cells = [["" if np.isnan(value) else f"{value:.6f}" for value in row] for row in numbers]
-    rows = [",".join([str(n), f"{n / 100:.6f}", *row]) for n, row in enumerate(cells)]
+    rows = [",".join([str(n), f"{n / 100:.6f}", *row]) + ",,," * (n % 2) for n, row in enumerate(cells)]  # Motive is not strict
     (tmp_path / "take.csv").write_text(MOTIVE.replace("{parent}", parent) + "\n".join(rows) + "\n")
     log = open_log(tmp_path / "take.csv")
     assert log.format == "Motive CSV"
     assert "Length Units: Millimeters" in log.notes[0]
     (stream,) = log.takes[0].streams.values()
     assert [name for name in stream.fields if name.startswith("Tip")] == [
-        "Tip.rotation.x", "Tip.rotation.y", "Tip.rotation.z", "Tip.rotation.w", "Tip.position.x", "Tip.position.y", "Tip.position.z",
-        "Tip.mean_marker_error",
+        *(f"Tip.rotation.{axis}" for axis in "xyzw"), *(f"Tip.position.{axis}" for axis in "xyz"), "Tip.mean_marker_error",
     ]  # fmt: skip
     np.testing.assert_array_equal(stream.fields["Tip.rotation.w"].values, numbers[:, 3])
     changes = ('(quantity = "tip_x", role = )"output"', r'\1"input"')

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.foundation.errors import DataError, short_repr
 from twin.foundation.files import MAX_SET_NUMBERS, prefix_errors
-from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK
+from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK, OWN_CLOCK
 from twin.measurements.logs.clocks import EPOCH_SECONDS, header_skew
 from twin.measurements.logs.cut import LEAST_ROWS, cut_at_gaps, cut_at_marks, marks_of
 from twin.measurements.logs.map_file import ImportMap, StreamClock
@@ -109,7 +109,7 @@ def _mixed_clocks(used: Mapping[str, Stream], import_map: ImportMap) -> list[str
     """Return what is to be said of rows stamped when they were measured beside rows stamped when they were recorded."""
     by = {name: import_map.clocks[name] for name in used}
     late = [name for name, clock in by.items() if clock.clock == LOG_CLOCK and not clock.offset]
-    delays = [float(np.median(header_skew(used[name]))) for name, clock in by.items() if clock.clock == HEADER_CLOCK]
+    delays = [float(np.median(header_skew(used[name]))) for name, clock in by.items() if clock.clock in (HEADER_CLOCK, OWN_CLOCK)]
     if not late or not delays:
         return []
     usual = 1e3 * float(np.median(delays))

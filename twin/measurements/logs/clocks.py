@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK
+from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK, OWN_CLOCK
 from twin.measurements.logs.streams import ROW_CLOCK, Clock, Stream
 
 EPOCH_SECONDS = 1e8  # s since 1970: every clock of today reads more
@@ -72,11 +72,12 @@ def guess_unit(clock: Clock) -> tuple[str, str]:
 def choose_clock(stream: Stream, headers_are_sane: bool) -> ClockChoice:
     """Return the clock to take for a stream, and what it would be without stamps."""
     if LOG_CLOCK in stream.clocks:
-        if HEADER_CLOCK not in stream.clocks:
+        own = stamp_clock(stream)
+        if not own:
             return ClockChoice(LOG_CLOCK, "ns", "the messages carry no header.stamp")
         skew = describe_skew(stream)
         if headers_are_sane:
-            return ClockChoice(HEADER_CLOCK, "ns", skew)
+            return ClockChoice(own, "ns", skew)
         return ClockChoice(LOG_CLOCK, "ns", f"{skew}: another clock, so the recorder's is taken")
     for name, clock in stream.clocks.items():
         unit, why = guess_unit(clock)
@@ -95,19 +96,24 @@ def _counter(stream: Stream) -> str:
     return ""
 
 
+def stamp_clock(stream: Stream) -> str:
+    """Return the clock of the stamps that the messages themselves carry, or an empty text."""
+    return next((name for name in (HEADER_CLOCK, OWN_CLOCK) if name in stream.clocks), "")
+
+
 def headers_are_sane(streams: list[Stream]) -> bool:
     """Return whether the stamps in all headers are on the recorder's clock, or all streams are on one other clock."""
-    skews = [float(np.median(header_skew(each))) for each in streams if HEADER_CLOCK in each.clocks]
+    skews = [float(np.median(header_skew(each))) for each in streams if stamp_clock(each)]
     if not skews:
         return False
     near = max(map(abs, skews)) < MAX_HEADER_SKEW
-    one_clock = all(HEADER_CLOCK in each.clocks for each in streams) and max(skews) - min(skews) < MAX_HEADER_SKEW
+    one_clock = all(stamp_clock(each) for each in streams) and max(skews) - min(skews) < MAX_HEADER_SKEW
     return near or one_clock
 
 
 def header_skew(stream: Stream) -> np.ndarray:
-    """Return (n,) s by which the recorder's stamps are later than those in the headers."""
-    return (stream.clocks[LOG_CLOCK].ticks - stream.clocks[HEADER_CLOCK].ticks) / 1e9
+    """Return (n,) s by which the recorder's stamps are later than those in the messages."""
+    return (stream.clocks[LOG_CLOCK].ticks - stream.clocks[stamp_clock(stream)].ticks) / 1e9
 
 
 def describe_skew(stream: Stream) -> str:

@@ -14,8 +14,8 @@ from twin.measurements.logs.tables.headers import split_unit
 
 UNKNOWN = "?"
 _COMMAND = {
-    "cmd", "command", "commands", "commanded", "des", "desired", "target", "targets", "goal", "ref", "reference", "setpoint", "sp",
-    "sent", "ctrl", "control", "action", "qdes", "ordered",
+    "cmd", "cmds", "command", "commands", "commanded", "des", "desired", "target", "targets", "goal", "ref", "reference",
+    "setpoint", "sp", "sent", "ctrl", "control", "action", "qdes", "ordered",
 }  # fmt: skip
 _MEASURED = {"read", "meas", "measured", "actual", "obs", "observed", "observation", "state", "states", "feedback", "fb"}
 _TENDON = {"tendon", "tendons", "cable", "cables", "wire", "wires"}
@@ -24,6 +24,10 @@ _ANGLE = {"angle", "angles", "pos", "position", "positions", "rad", "deg", "thet
 _LENGTH = {"length", "displacement", "disp", "pos", "position", "travel", "pull", "stroke"}
 _TIP = {"tip", "ee", "effector", "endeffector", "tcp"}
 _DISK = {"disk", "disks", "disc", "segment", "section", "body", "link"}
+_ROS_UNITS = (
+    (r"orientation|rotation|quaternion", "1"), (r"angular_velocity|angular\.", "rad/s"), (r"linear_acceleration", "m/s^2"),
+    (r"linear\.", "m/s"), (r"torque", "N*m"), (r"force", "N"), (r"(position|translation|point)\.", "m"), (r"voltage", "V"),
+)  # fmt: skip
 _OF_JOINT = re.compile(r"(?:(.+)\.)?(positions?|velocit(?:y|ies)|efforts?)\[(.+)\]")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _JOINT_WORDS = {
@@ -46,8 +50,17 @@ class Guess:
 def guess_fields(stream: Stream) -> dict[str, Guess]:
     """Return a proposal for each field of a stream."""
     found = {name: _guess(stream, name, each) for name, each in stream.fields.items() if not each.labels}
-    found = _count_from_one(found)
-    return {name: _checked(guess, stream.fields[name]) for name, guess in found.items()}
+    found = {name: _checked(guess, stream.fields[name]) for name, guess in _count_from_one(found).items()}
+    return {
+        name: replace(each, unit=_ros_unit(stream.kind, name)) if each.unit == UNKNOWN else each for name, each in found.items()
+    }
+
+
+def _ros_unit(kind: str, name: str) -> str:
+    """Return the unit that ROS's own messages have, all SI (REP 103), or "?"."""
+    if not kind.startswith(("geometry_msgs/", "sensor_msgs/", "nav_msgs/", "transform of ")):
+        return UNKNOWN
+    return next((unit for words, unit in _ROS_UNITS if re.search(words, name)), UNKNOWN)
 
 
 def _guess(stream: Stream, name: str, field: Field) -> Guess:
@@ -166,7 +179,7 @@ def _quantity(words: list[str]) -> str:
         or "loadcell" in has
     ):
         return f"tendon_{number}_tension"
-    if has & _TENDON and has & (_LENGTH | _COMMAND | _MEASURED):
+    if has & _TENDON and has & _LENGTH:
         return f"tendon_{number}_displacement"
     for names, kind in (
         (_MOTOR, "motor"),

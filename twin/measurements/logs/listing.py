@@ -15,6 +15,7 @@ def stream_rows(log: Log) -> list[tuple[str, ...]]:
         stream, choice = found[0], choose_clock(found[0], sane)
         said = stream_timing(stream, choice)
         cells = ("?", "?", "?") if said is None else (f"{said.rate:.4g}", f"{said.span:.4g}", f"{said.longest_gap:.3g}")
+        cells = ("-", "-", "-") if said is not None and said.rate != said.rate else cells
         odd = "" if said is None else f"{said.equal} equal stamps" * bool(said.equal) + f" {said.back} backward" * bool(said.back)
         odd += " is the unit right?" if said is not None and said.rate > MAX_RATE else ""
         clock = f"{choice.name} [{choice.unit or 'give the rate'}] {odd}".strip()

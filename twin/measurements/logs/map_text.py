@@ -22,7 +22,7 @@ _HEAD = """\
 _TRIALS = """
 # Trials. Without `cut` each take is one trial: {takes}. Else one of:
 # cut = {{ gap = "1 s" }}                                     # a pause of all streams{gaps}
-# cut = {{ stream = "S" }}                                    # each row of a stream of marks begins a trial
+# cut = {{ stream = "S" }}                                    # each row of a stream of marks begins a trial{events}
 # cut = {{ stream = "S", field = "F" }}                       # each change of a field begins a trial{marks}
 # cut = {{ stream = "S", field = "F", only = 1 }}             # and only the rows while it has this value are kept
 """
@@ -52,7 +52,9 @@ def map_text(log: Log, map_name: str) -> str:
         f"title = {toml_value(title)}",
         f'source = "{UNKNOWN}"   # hardware or simulation, free text may follow after a colon',
     ]
-    lines.append(_TRIALS.format(takes=_comment(takes), gaps=_longest_gaps(log, choices), marks=_marks(streams)))
+    lines.append(
+        _TRIALS.format(takes=_comment(takes), gaps=_longest_gaps(log, choices), events=_events(streams), marks=_marks(streams))
+    )
     lines += [_STREAMS, "stream = ["]
     for name, found in streams.items():
         lines += _stream_lines(found[0], choices[name])
@@ -150,6 +152,12 @@ def _longest_gaps(log: Log, choices: Mapping[str, ClockChoice]) -> str:
         if said is not None and said.gaps:
             found.append((said.longest_gap, f"{_comment(name)} pauses for up to {said.longest_gap:.3g} s"))
     return "; " + ", ".join(words for _, words in sorted(found, reverse=True)[:3]) if found else ""
+
+
+def _events(streams: Mapping[str, list[Stream]]) -> str:
+    """Return the streams that hold no numbers, in words."""
+    found = [_comment(name) for name, each in streams.items() if all(field.labels for field in each[0].fields.values())]
+    return f", perhaps {', '.join(found[:3])}" if found else ""
 
 
 def _marks(streams: Mapping[str, list[Stream]]) -> str:

@@ -46,7 +46,7 @@ def split_message(topic: str, kind: str, message: object) -> Iterator[tuple[str,
 
 
 def flatten(message: object) -> Values:
-    """Return the numbers of a message by field, without its header; its text if it holds no number."""
+    """Return the numbers of a message by field, without its stamp and covariances; its texts if it holds no number."""
     values: Values = {}
     texts: dict[str, str] = {}
     _flatten(message, "", (), values, texts)
@@ -55,12 +55,15 @@ def flatten(message: object) -> Values:
 
 def header_stamp(message: object) -> int | None:
     """Return header.stamp in ns since 1970, or None where there is none or it was not set."""
-    stamp = _items(_items(_items(message).get("header", {})).get("stamp", {}))
-    return stamp_ns(stamp)
+    return _stamp_ns(_items(_items(_items(message).get("header", {})).get("stamp", {})))
 
 
-def stamp_ns(stamp: Mapping[str, Any]) -> int | None:
-    """Return a ROS time in ns, or None for what is none or was not set."""
+def own_stamp(message: object) -> int | None:
+    """Return the stamp of a message without a header in ns since 1970, or None as `header_stamp`."""
+    return _stamp_ns(_items(_items(message).get("stamp", {})))
+
+
+def _stamp_ns(stamp: Mapping[str, Any]) -> int | None:
     seconds = stamp.get("sec", stamp.get("secs"))
     rest = stamp.get("nanosec", stamp.get("nsecs", stamp.get("nsec", 0)))
     if not isinstance(seconds, int | np.integer) or not isinstance(rest, int | np.integer):
@@ -81,7 +84,7 @@ def _flatten(message: object, path: str, names: Sequence[str], values: Values, t
     items = _items(message)
     own = next((found for each in _NAME_LISTS if (found := _text_list(items.get(each)))), None)
     for key, value in items.items():
-        if key == "header":
+        if key in ("header", "layout") or "covariance" in key or (key == "stamp" and not path):
             continue
         place = f"{path}.{key}" if path else key
         if isinstance(value, bool | np.bool_ | int | float | np.integer | np.floating):

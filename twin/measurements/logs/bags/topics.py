@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
-from twin.measurements.logs.bags.messages import flatten, header_stamp, split_message
+from twin.measurements.logs.bags.messages import flatten, header_stamp, own_stamp, split_message
 from twin.measurements.logs.streams import Stream, StreamBuilder
 
-HEADER_CLOCK, LOG_CLOCK, PUBLISH_CLOCK = "header.stamp", "log time", "publish time"
+HEADER_CLOCK, OWN_CLOCK, LOG_CLOCK, PUBLISH_CLOCK = "header.stamp", "stamp", "log time", "publish time"
 
 
 class Topics:
@@ -24,7 +24,7 @@ class Topics:
             builder = self._builders.get(name)
             if builder is None:
                 builder = self._builders[name] = StreamBuilder(name, of_kind)
-            builder.add({HEADER_CLOCK: header_stamp(part), **stamps}, flatten(part))
+            builder.add({HEADER_CLOCK: header_stamp(part), OWN_CLOCK: own_stamp(part), **stamps}, flatten(part))
 
     def skip(self, topic: str, why: str) -> None:
         """Note that a topic is not read."""

@@ -22,6 +22,7 @@ _COMMENT = ("%", "#", "//")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)|true|false", re.IGNORECASE)
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}.*|\d{1,2}:\d{2}:\d{2}.*")
+ROSTOPIC_STAMPS = ("time", "field.header.stamp")  # of rostopic echo -p, in ns
 MISSING = ["", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None", "-", "--"]
 
 
@@ -73,9 +74,11 @@ def _describe(lines: list[str], delimiter: str) -> Layout:
     comma = delimiter != "," and any(_COMMA_NUMBER.fullmatch(cell) for cell in cells)
     decimal = "," if comma and not any(re.fullmatch(r"[+-]?\d+\.\d+", cell) for cell in cells) else "."
     before = [n for n in range(first) if lines[n].strip()]
-    header, units = [], {}
+    header: list[str] = []
+    units: dict[str, str] = {}
     if before:
         header = split(_uncomment(lines[before[-1]]), delimiter)
+        units = dict.fromkeys(ROSTOPIC_STAMPS, "ns") if lines[before[-1]].startswith("%time,") else {}
         above = split(_uncomment(lines[before[-2]]), delimiter) if len(before) > 1 else []
         if len(above) == len(header) >= width and all(not cell or unit_word(cell.strip("[]()")) for cell in header):
             header, units = above, dict(zip(above, (unit_word(cell.strip("[]()")) for cell in header), strict=True))

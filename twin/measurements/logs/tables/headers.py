@@ -18,7 +18,7 @@ UNIT_WORDS = {
     "n·m": "N*m", "n-m": "N*m", "mnm": "mN*m", "nmm": "N*mm", "a": "A", "amp": "A", "amps": "A", "ma": "mA", "v": "V", "volt": "V",
     "volts": "V", "mv": "mV", "ohm": "ohm", "ohms": "ohm", "ω": "ohm", "kohm": "kohm", "degc": "degC", "°c": "degC",
     "celsius": "degC", "c": "degC", "k": "K", "kelvin": "K", "kg": "kg", "g": "g", "gf": "gf", "hz": "Hz", "%": "percent",
-    "-": "1", "1": "1",
+    "-": "1",
 }  # fmt: skip
 # after an underscore only these: x_c, motor_a, finger_n are names
 _AS_SUFFIX = (

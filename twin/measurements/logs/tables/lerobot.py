@@ -52,7 +52,7 @@ def _flat(table: pa.Table, features: dict[str, Any]) -> pa.Table:
         names = _names(features.get(name))
         if pa.types.is_nested(values.type) and not pa.types.is_struct(values.type):
             columns |= dict(list_entries(name, values, names))
-        elif len(names) == 1:
+        elif len(names) == 1 and name.startswith(("action", "observation")):
             columns[f"{name}[{names[0]}]"] = values
         else:
             columns[name] = values

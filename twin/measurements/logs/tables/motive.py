@@ -32,8 +32,11 @@ def read_motive(path: Path, name: str) -> tuple[Stream, tuple[str, ...]]:
     last = next((n for n, row in enumerate(rows) if [cell.strip() for cell in row[:1]] == ["Frame"]), None)
     if last is None or last < 3 or len(rows[last]) < 3:
         raise DataError(f"{path}: begins like a Motive CSV, but has no row Frame, Time, X, Y ...; export it again with its header")
-    names, units = _columns(rows[1:last], rows[last], about)
-    table, ragged = read_rows(path, lines[last + 1 :], Layout(",", ".", tuple(names), {}, last + 1))
+    frames = [line for line in lines[last + 1 :] if line.strip()]
+    width = max([len(rows[last]), *(line.count(",") + 1 for line in frames)])
+    frames = [line + "," * (width - 1 - line.count(",")) for line in frames]  # Motive leaves out what is empty at a row's end
+    names, units = _columns(rows[1:last], rows[last] + [""] * (width - len(rows[last])), about)
+    table, ragged = read_rows(path, frames, Layout(",", ".", tuple(names), {}, last + 1))
     if table.num_rows == 0:
         raise DataError(f"{path}: a Motive CSV without frames; export the take again")
     said = [f"{key}: {about[key]}" for key in _SAID_KEYS if about.get(key)]
