@@ -78,7 +78,7 @@ class ImportLog:
         large = max(trial.time.size for trial in recording.trials) * len(recording.channels) > MAX_CSV_NUMBERS
         write(recording, folder, file_format="parquet" if large else "csv")
         for note in (*clock_words(import_map), *notes, *read(folder, least_trials=1).notices):
-            out.print(printable(f"  {note}"), highlight=False)
+            out.print(printable(f"  {note}"), highlight=False, soft_wrap=True)
         trials = recording.trials
         counted = f"{len(trials)} trial{'s' if len(trials) != 1 else ''}, {recording.n_samples} rows"
         out.print(f"{counted}, {len(recording.channels)} channels: {folder}", highlight=False, markup=False)
@@ -94,7 +94,7 @@ def _robot(recording: Recording, path: Path, folder: Path) -> str:
     try:
         return robot_reference(load(recording.robot, path.absolute().parent), folder.absolute())
     except TwinError as fault:
-        out.print(f"  the robot is not there yet: {fault}", highlight=False, markup=False)
+        out.print(f"  the robot is not there yet: {fault}", highlight=False, markup=False, soft_wrap=True)
         return recording.robot
 
 
@@ -104,7 +104,7 @@ def _show(log: Log) -> None:
 
     out.print(printable(f"{log.path}: {log.format}, {len(log.takes)} take{'s' if len(log.takes) != 1 else ''}"), highlight=False)
     for note in log.notes[:6]:
-        out.print(printable(f"  {note}"), highlight=False)
+        out.print(printable(f"  {note}"), highlight=False, soft_wrap=True)
     if len(log.notes) > 6:
         out.print(f"  and {len(log.notes) - 6} more remarks, see the map", highlight=False)
     table = Table(
