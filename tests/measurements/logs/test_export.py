@@ -125,6 +125,20 @@ def test_lerobot_refuses_what_it_cannot_hold(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_lerobot_is_resampled_where_a_rate_is_given(tmp_path: Path) -> None:
+    time = np.array([0.0, 0.1, 0.25, 0.3, 0.55, 0.6])
+    channels = (Channel("tendon_1_tension", "input", "N"), Channel("tip_x", "output", "m"))
+    values = {"tendon_1_tension": np.array([1.0, np.nan, 2.0, 3.0, np.nan, np.nan]), "tip_x": np.array([np.nan, 1, 2.5, 3, 5.5, 6])}
+    uneven = Recording("continuum", "", "hardware", None, channels, (Trial("a.csv", time, values),))
+    write_lerobot(uneven, tmp_path / "dataset", rate=10.0)
+    frames = pyarrow.parquet.read_table(tmp_path / "dataset/data/chunk-000/file-000.parquet")
+    np.testing.assert_allclose(frames["action"].to_pylist(), [1, 1, 3, 3, 3, 3])  # from 0.1 s, where both have readings
+    np.testing.assert_allclose(frames["observation.state"].to_pylist(), [1, 2, 3, 4, 5, 6], rtol=1e-12)  # x = 10 t
+    for rate, said in ((0.0, "a positive rate"), (1e9, "fewer than")):
+        with pytest.raises(DataError, match=said):
+            write_lerobot(uneven, tmp_path / "other", rate=rate)
+
+
 def test_parquet_is_a_set_that_pyarrow_reads(tmp_path: Path) -> None:
     write_parquet(recording(empty=True), tmp_path / "set")
     table = pyarrow.parquet.read_table(tmp_path / "set/run_1.parquet")

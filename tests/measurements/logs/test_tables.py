@@ -18,6 +18,7 @@ from twin.measurements.logs.clocks import choose_clock
 from twin.measurements.logs.guess import guess_fields
 from twin.measurements.logs.streams import Stream
 
+WRITTEN_BY_LEROBOT = Path(__file__).parents[2] / "data/lerobot-0.4.4"
 NEWTON = ('unit = "[?]"', 'unit = "N"')
 
 
@@ -253,6 +254,18 @@ def test_a_lerobot_dataset_comes_out_as_the_same_numbers_with_a_trial_an_episode
             np.testing.assert_allclose(trial.values[f"joint.{joint}.position"], true["state"][rows, n], rtol=1e-12)
             np.testing.assert_allclose(trial.values[f"actuator.{joint}.ctrl"], true["action"][rows, n], rtol=1e-12)
     assert "observation.images.top" in " ".join(open_log(tmp_path / "dataset").notes)
+
+
+def test_a_dataset_that_lerobot_wrote_comes_out_as_the_same_numbers(tmp_path: Path) -> None:
+    """Written once by lerobot 0.4.4 (create, add_frame, save_episode), 3 episodes of 20 frames; its numbers are these draws."""
+    rng = np.random.default_rng(0)
+    true = np.array([[rng.normal(size=2), rng.normal(size=2)] for _ in range(60)]).astype(np.float32).reshape(60, 4)
+    recording = imported(WRITTEN_BY_LEROBOT, tmp_path / "set", ('unit = "[?]"', 'unit = "rad"'))
+    assert [len(trial.time) for trial in recording.trials] == [20, 20, 20]
+    np.testing.assert_allclose(recording.trials[2].time, np.arange(20) / 30, atol=1e-12)
+    names = ("joint.shoulder_pan.position", "joint.elbow_flex.position", "actuator.shoulder_pan.ctrl", "actuator.elbow_flex.ctrl")
+    for n, name in enumerate(names):
+        np.testing.assert_array_equal(np.concatenate([trial.values[name] for trial in recording.trials]), true[:, n])
 
 
 def test_broken_lerobot_datasets_are_refused(tmp_path: Path) -> None:

@@ -20,8 +20,12 @@ class Export:
     lerobot: Annotated[Path | None, arg(help="new folder for the set as a LeRobot v3 dataset, SI")] = None
     parquet: Annotated[Path | None, arg(help="new folder for the set with a Parquet table a trial, its own units")] = None
 
+    rate: Annotated[
+        float | None, arg(help="resample for --lerobot to this many frames a second: inputs are held, outputs interpolated")
+    ] = None
+
     def run(self) -> None:
-        written = export_set(self.set_or_report, {"mcap": self.mcap, "lerobot": self.lerobot, "parquet": self.parquet})
+        written = export_set(self.set_or_report, {"mcap": self.mcap, "lerobot": self.lerobot, "parquet": self.parquet}, self.rate)
         if not written:
             raise DataError(
                 "nothing to write; give a format with its target, such as --mcap FILE, --lerobot FOLDER or --parquet FOLDER"

@@ -2,7 +2,7 @@
 
 Layout: https://huggingface.co/docs/lerobot/lerobot-dataset-v3. Numbers are float64;
 `timestamp` is frame_index / fps in float32, as there. LeRobot knows neither empty cells nor uneven steps:
-sets with either are refused, not resampled.
+sets with either are refused unless a rate is given.
 """
 
 import json
@@ -18,6 +18,7 @@ import pyarrow.parquet
 
 from twin.foundation.errors import DataError, short_repr
 from twin.measurements.channels import Channel, Role
+from twin.measurements.logs.export.even_steps import at_even_steps
 from twin.measurements.recording import Recording, Trial
 
 VERSION, STEP_TOLERANCE = "v3.0", 1e-4  # s: LeRobot's own
@@ -26,13 +27,17 @@ _DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _INDICES = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64", "task_index": "int64"}
 
 
-def write_lerobot(recording: Recording, folder: Path) -> None:
+def write_lerobot(recording: Recording, folder: Path, rate: float | None = None) -> None:
     """Write a recording as a LeRobot dataset, whole or not at all.
 
-    Raises DataError for a folder that holds something, a channel with an empty cell, and trials without one even rate.
+    With a `rate` (frames a second) it is resampled as `at_even_steps` says. Raises DataError for a folder that holds something, and
+    without a rate for a channel with an empty cell and trials of uneven steps.
     """
-    rate = _even_rate(recording)
-    _check_complete(recording)
+    if rate is None:
+        _check_complete(recording)
+        rate = _even_rate(recording)
+    else:
+        recording = at_even_steps(recording, rate)
     draft = folder.absolute().parent / f".{folder.absolute().name}.{os.getpid()}.writing"
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -62,7 +67,7 @@ def _even_rate(recording: Recording) -> float:
         if (worst := int(np.argmax(off))) and off[worst] > STEP_TOLERANCE:
             raise DataError(
                 f"{trial.name}, row {worst + 2}: {off[worst]:.3g} s off an even rate of {rate:.6g} a second; LeRobot allows "
-                f"{STEP_TOLERANCE:g} s: resample the set to one rate first, or export --mcap or --parquet"
+                f"{STEP_TOLERANCE:g} s: give --rate {rate:.3g} to resample it"
             )
     return rate
 
@@ -71,7 +76,9 @@ def _check_complete(recording: Recording) -> None:
     for trial in recording.trials:
         for name, values in trial.values.items():
             if empty := int(np.count_nonzero(np.isnan(values))):
-                raise DataError(f"{trial.name}: {empty} empty cells in {name}; LeRobot has none; export --mcap or --parquet")
+                raise DataError(
+                    f"{trial.name}: {empty} empty cells in {name}; LeRobot has none; give --rate 50, say, to resample it"
+                )
 
 
 def _write(recording: Recording, rate: float, folder: Path) -> None:
