@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from tests.measurements.logs.sample_logs import (
     DELAY,
     JOINT_STATE,
+    POINT,
     RULE,
     T0,
     command_numbers,
@@ -69,6 +70,31 @@ def test_headers_that_were_never_stamped_are_not_taken(tmp_path: Path) -> None:
     recording = imported(write_mcap(tmp_path / "a.mcap", header=False), tmp_path / "set", NEWTON)
     time, _ = readings(recording, "tip_x")
     assert_same(time, (point_numbers()[0] - T0) / 1e9)  # all by the recorder, equally late
+
+
+def test_one_message_on_another_clock_does_not_cost_the_others_theirs(tmp_path: Path) -> None:
+    with (tmp_path / "a.mcap").open("wb") as file, McapWriter(file) as out:
+        kind = out.register_msgdef("geometry_msgs/msg/PointStamped", POINT)
+        for topic, shift, count in (
+            ("/tip", 0, 20),
+            ("/latched", -(10**13), 1),
+            ("/other_machine", 10**12, 20),
+            ("/unset", None, 20),
+        ):
+            for n in range(count):
+                stamp = T0 + n * 10**7
+                own = 0 if shift is None and n == 0 else stamp + (shift or 0)
+                out.write_message(topic, kind, {"header": stamped(own), "point": {"x": 1.0, "y": 2.0, "z": 3.0}}, stamp, stamp)
+    text = map_text(open_log(tmp_path / "a.mcap"), "m.toml")
+    for topic, clock in (
+        ("/tip", "header.stamp"),
+        ("/latched", "log time"),
+        ("/other_machine", "log time"),
+        ("/unset", "log time"),
+    ):
+        assert f'name = "{topic}", clock = "{clock}"' in text
+    assert "log time is later by -1000 s (90 % within -1000 s .. -1000 s): another clock" in text
+    assert "header.stamp is not set in 1 of 20 messages" in text
 
 
 def test_an_offset_moves_a_stream(tmp_path: Path) -> None:

@@ -90,7 +90,7 @@ def test_encodings_of_loggers_are_read(tmp_path: Path, encoding: str) -> None:
 def test_the_unit_of_a_clock_is_told_by_its_size_or_asked(tmp_path: Path, cells: list[str], unit: str, first: float) -> None:
     stream = the_stream(tmp_path / "a.csv", "time,a\n" + "".join(f"{cell},1\n" for cell in cells))
     assert stream.clocks["time"].ticks[0] == first
-    assert choose_clock(stream, headers_are_sane=False).unit == unit
+    assert choose_clock(stream, one_clock=False).unit == unit
 
 
 def test_nanoseconds_since_1970_keep_every_nanosecond(tmp_path: Path) -> None:

@@ -69,16 +69,17 @@ def guess_unit(clock: Clock) -> tuple[str, str]:
     return "?", "s, ms, us or ns cannot be told apart"
 
 
-def choose_clock(stream: Stream, headers_are_sane: bool) -> ClockChoice:
-    """Return the clock to take for a stream, and what it would be without stamps."""
+def choose_clock(stream: Stream, one_clock: bool) -> ClockChoice:
+    """Return the clock to take for a stream. `one_clock`: all messages are stamped on one, though not the recorder's."""
     if LOG_CLOCK in stream.clocks:
         own = stamp_clock(stream)
         if not own:
             return ClockChoice(LOG_CLOCK, "ns", "the messages carry no header.stamp")
         skew = describe_skew(stream)
-        if headers_are_sane:
+        if one_clock or abs(float(np.median(header_skew(stream)))) < MAX_HEADER_SKEW:
             return ClockChoice(own, "ns", skew)
-        return ClockChoice(LOG_CLOCK, "ns", f"{skew}: another clock, so the recorder's is taken")
+        aligned = f'{own} with offset = "{float(np.median(header_skew(stream))):.6f} s" keeps its finer spacing'
+        return ClockChoice(LOG_CLOCK, "ns", f"{skew}: another clock, so the recorder's is taken; {aligned}")
     for name, clock in stream.clocks.items():
         unit, why = guess_unit(clock)
         return ClockChoice(name, unit, f"unit: {why}")
@@ -101,14 +102,13 @@ def stamp_clock(stream: Stream) -> str:
     return next((name for name in (HEADER_CLOCK, OWN_CLOCK) if name in stream.clocks), "")
 
 
-def headers_are_sane(streams: list[Stream]) -> bool:
-    """Return whether the stamps in all headers are on the recorder's clock, or all streams are on one other clock."""
-    skews = [float(np.median(header_skew(each))) for each in streams if stamp_clock(each)]
-    if not skews:
+def share_one_clock(streams: list[Stream]) -> bool:
+    """Return whether the stamps in all messages are on one clock, such as a simulator's; single, latched messages do not count."""
+    several = [each for each in streams if each.count > 2 and LOG_CLOCK in each.clocks]
+    if not several or not all(stamp_clock(each) for each in several):
         return False
-    near = max(map(abs, skews)) < MAX_HEADER_SKEW
-    one_clock = all(stamp_clock(each) for each in streams) and max(skews) - min(skews) < MAX_HEADER_SKEW
-    return near or one_clock
+    skews = [float(np.median(header_skew(each))) for each in several]
+    return max(skews) - min(skews) < MAX_HEADER_SKEW
 
 
 def header_skew(stream: Stream) -> np.ndarray:

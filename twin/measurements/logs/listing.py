@@ -1,6 +1,6 @@
 """What is in a log, as rows of text for the terminal."""
 
-from twin.measurements.logs.clocks import MAX_RATE, choose_clock, headers_are_sane
+from twin.measurements.logs.clocks import MAX_RATE, choose_clock, share_one_clock
 from twin.measurements.logs.guess import guess_fields
 from twin.measurements.logs.map_text import describe_range, stream_timing
 from twin.measurements.logs.streams import Log
@@ -9,10 +9,10 @@ from twin.measurements.logs.streams import Log
 def stream_rows(log: Log) -> list[tuple[str, ...]]:
     """Return a row a stream: name, type, rows, rate, length, longest step, clock. Of several takes, those of the first."""
     streams = log.streams
-    sane = headers_are_sane([found[0] for found in streams.values()])
+    one_clock = share_one_clock([found[0] for found in streams.values()])
     rows = []
     for name, found in streams.items():
-        stream, choice = found[0], choose_clock(found[0], sane)
+        stream, choice = found[0], choose_clock(found[0], one_clock)
         said = stream_timing(stream, choice)
         cells = ("?", "?", "?") if said is None else (f"{said.rate:.4g}", f"{said.span:.4g}", f"{said.longest_gap:.3g}")
         cells = ("-", "-", "-") if said is not None and said.rate != said.rate else cells

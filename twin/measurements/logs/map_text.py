@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.measurements.logs.clocks import MAX_RATE, ClockChoice, Timing, choose_clock, headers_are_sane, timing
+from twin.measurements.logs.clocks import MAX_RATE, ClockChoice, Timing, choose_clock, share_one_clock, timing
 from twin.measurements.logs.guess import UNKNOWN, Guess, guess_fields
 from twin.measurements.logs.map_file import MAP_FORMAT
 from twin.measurements.logs.streams import Field, Log, Stream
@@ -40,9 +40,9 @@ _CHANNELS = """
 def map_text(log: Log, map_name: str) -> str:
     """Return the text of a map for a log."""
     streams = log.streams
-    sane = headers_are_sane([each[0] for each in streams.values()])
+    one_clock = share_one_clock([each[0] for each in streams.values()])
     takes = f"{len(log.takes)} ({', '.join(take.name for take in log.takes[:4])}{', ...' if len(log.takes) > 4 else ''})"
-    choices = {name: choose_clock(found[0], sane) for name, found in streams.items()}
+    choices = {name: choose_clock(found[0], one_clock) for name, found in streams.items()}
     title, log_name = _comment(stem(log.path)), _comment(str(log.path))
     lines = [_HEAD.format(name=log_name, format=_comment(log.format), map=_comment(map_name))]
     lines += [f"# {_comment(note)}" for note in log.notes[:20]]

@@ -143,13 +143,14 @@ class StreamBuilder:
         for name, column in self._columns.items():
             column.extend([np.nan] * (self._count - len(column)))
             fields[name] = Field(np.array(column), unit if name == "data" else "", tuple(self._texts.get(name, ())))
-        clocks = {}
+        clocks, remarks = {}, [f"only the first {MAX_FIELDS} fields are read"] * self._dropped
         for name, stamps in self._clocks.items():
-            stamps.extend([None] * (self._count - len(stamps)))
-            if all(stamp is not None for stamp in stamps):
+            missing = sum(stamp is None for stamp in stamps)
+            if missing == 0:
                 clocks[name] = Clock(np.array(stamps, np.int64), "ns")
-        remarks = (f"only the first {MAX_FIELDS} fields are read",) if self._dropped else ()
-        stream = Stream(self.name, self.kind, fields, clocks, self._count, remarks)
+            elif missing < self._count:
+                remarks.append(f"{name} is not set in {missing} of {self._count} messages, so it is no clock")
+        stream = Stream(self.name, self.kind, fields, clocks, self._count, tuple(remarks))
         if sort_by in clocks and np.any(np.diff(clocks[sort_by].ticks) < 0):
             stream = stream.rows(np.argsort(clocks[sort_by].ticks, kind="stable"))
         return stream

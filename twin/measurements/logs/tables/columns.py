@@ -109,7 +109,10 @@ def _text_field(name: str, values: pa.ChunkedArray, unit: str, remarks: list[str
     if (ticks := nanoseconds_of_texts(texts)) is not None:
         return Field(ticks, "ns")
     labels = list(dict.fromkeys(text for text in texts if text is not None))
-    if not labels or len(labels) > MAX_LABELS:
+    if not labels:
+        return None
+    if len(labels) > MAX_LABELS:
+        remarks.append(f"{name}: {len(labels)} different texts, not read")
         return None
     code = {text: float(n) for n, text in enumerate(labels)}
     return Field(np.array([np.nan if text is None else code[text] for text in texts]), "", tuple(labels))

@@ -40,7 +40,8 @@ def read_motive(path: Path, name: str) -> tuple[Stream, tuple[str, ...]]:
     if table.num_rows == 0:
         raise DataError(f"{path}: a Motive CSV without frames; export the take again")
     said = [f"{key}: {about[key]}" for key in _SAID_KEYS if about.get(key)]
-    return stream_of_table(name, "Motive CSV", table, units), (*notes, f"Motive says {', '.join(said)}", *ragged)
+    axes = "Motive's y axis points up unless exported otherwise: give each field the axis of the robot's base frame that it is"
+    return stream_of_table(name, "Motive CSV", table, units), (*notes, f"Motive says {', '.join(said)}", axes, *ragged)
 
 
 def _columns(header: list[list[str]], axes: list[str], about: dict[str, str]) -> tuple[list[str], dict[str, str]]:
