@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import twin
+from tests.measurements.measurement_sets import write_set
 from twin.measurements import read
 from twin.measurements.logs import libraries
-from twin.robots.robot import models_folder
 
-SAMPLE = models_folder() / "continuum/samples/friday"
 LOG = "time,tendon_1_tension [N],tip_x [mm]\n" + "".join(f"{n / 10},{n},{n / 7}\n" for n in range(20))
 
 
@@ -75,12 +74,14 @@ def test_a_missing_library_is_one_line(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_set_is_exported(tmp_path: Path) -> None:
-    done = twin("export", SAMPLE, "--mcap", "a.mcap", "--parquet", "table", cwd=tmp_path)
+    bench = write_set(tmp_path / "bench")
+    done = twin("export", bench, "--mcap", "a.mcap", "--parquet", "table", "--lerobot", "frames", "--rate", "20", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.mcap").read_bytes().startswith(b"\x89MCAP")
-    assert len(read(tmp_path / "table").trials) == len(read(SAMPLE).trials)
+    assert len(read(tmp_path / "table").trials) == len(read(bench).trials)
+    assert (tmp_path / "frames/meta/info.json").exists()
     listed = twin("import", "a.mcap", cwd=tmp_path)
     assert "/input/tendon_1_tension" in listed.stdout
-    nothing = twin("export", SAMPLE, cwd=tmp_path)
+    nothing = twin("export", bench, cwd=tmp_path)
     assert nothing.returncode == 2
     assert "--mcap FILE" in nothing.stderr

@@ -7,6 +7,8 @@ from twin.measurements.logs.streams import Stream, StreamBuilder
 
 HEADER_CLOCK, OWN_CLOCK, LOG_CLOCK, PUBLISH_CLOCK = "header.stamp", "stamp", "log time", "publish time"
 
+MAX_STAMP = 2**62  # ns since 1970: the year 2116
+
 
 class Topics:
     """Streams by topic, and the topics whose messages cannot be read, with the first reason."""
@@ -19,6 +21,9 @@ class Topics:
 
     def add(self, topic: str, kind: str, message: object, stamps: Mapping[str, int]) -> None:
         """Add a decoded message with the recorder's stamps in ns."""
+        if not all(isinstance(stamp, int) and 0 <= stamp < MAX_STAMP for stamp in stamps.values()):
+            self.skip(topic, "a message whose recorded stamp is no time; it is left out")
+            return
         self.count += 1
         for name, of_kind, part in split_message(topic, kind, message):
             builder = self._builders.get(name)
