@@ -131,7 +131,8 @@ def read_map(path: Path) -> ImportMap:
             raise DataError(join_problems(problems))
         channels = [validate_table(ChannelTable, each, _place(lines, each), problems) for each in top.channel]
         kept = [each for each in channels if each is not None]
-        used = {each.stream for each in kept} | {top.cut.get("stream") if isinstance(top.cut, dict) else None}
+        cut, gap = _cut(top.cut, problems)
+        used = {each.stream for each in kept} | ({cut.stream} if cut is not None else set())
         streams = [validate_table(StreamTable, each, _place(lines, each), problems) for each in top.stream]
         if problems:
             raise DataError(join_problems(problems))
@@ -140,7 +141,6 @@ def read_map(path: Path) -> ImportMap:
         tables = [*kept, *(each for each in streams if each is not None and each.name in used)]
         if unknown := _to_fill_in(top, tables, lines):
             raise DataError(join_problems(unknown))
-        cut, gap = _cut(top.cut, problems)
         clocks = {each.name: made for each in streams if each and each.name in used and (made := _clock(each, lines, problems))}
         mapped = [made for each in kept if (made := _channel(each, lines, problems))]
         gravity = None if top.gravity is None else parse_vector(top.gravity, "m/s^2")
@@ -190,7 +190,10 @@ def _cut(table: Any, problems: list[str]) -> tuple[CutTable | None, float | None
         problems.append('cut: give either gap = "1 s", or stream with field (and only) or without')
         return None, None
     try:
-        return cut, None if cut.gap is None else parse_quantity(cut.gap, "s")
+        gap = None if cut.gap is None else parse_quantity(cut.gap, "s")
+        if gap is not None and gap <= 0.0:
+            raise DataError(f"{short_repr(cut.gap)} is no pause; write a positive time")
+        return cut, gap
     except DataError as fault:
         problems.append(f"cut: gap: {fault}")
         return None, None
