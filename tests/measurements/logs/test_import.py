@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.measurements.logs.sample_logs import filled_in, imported, write_mcap
+from tests.measurements.logs.sample_logs import T0, filled_in, imported, readings, write_mcap
 from twin.foundation.errors import DataError
 from twin.measurements.logs import assemble, open_log, read_map
 
@@ -87,6 +87,20 @@ def test_streams_on_different_clocks_are_refused(tmp_path: Path) -> None:
     said = refusal(folder, KNOWN)
     assert "a and b share no time" in said
     assert "offset" in said
+
+
+def test_a_table_beside_a_bag_is_aligned_by_an_offset(tmp_path: Path) -> None:
+    folder = tmp_path / "day"
+    folder.mkdir()
+    write_mcap(folder / "a.mcap")
+    (folder / "cells.csv").write_text("time,tendon_2_tension [N]\n" + "".join(f"{n / 100},{n / 7!r}\n" for n in range(50)))
+    newton = ('unit = "[?]"', 'unit = "N"')
+    assert "share no time" in refusal(folder, newton, KNOWN)
+    moved = ('clock = "time", time_unit = "s"', f'clock = "time", time_unit = "s", offset = "{T0 / 1e9 + 0.25:.2f} s"')
+    recording = imported(folder, tmp_path / "set", newton, KNOWN, moved)
+    time, values = readings(recording, "tendon_2_tension")
+    np.testing.assert_allclose(time, 0.25 + np.arange(50) / 100, atol=3e-7)  # what a float holds of seconds since 1970
+    np.testing.assert_allclose(values, np.arange(50) / 7, rtol=1e-12)
 
 
 def test_close_stamps_of_two_streams_are_one_row(tmp_path: Path) -> None:

@@ -45,15 +45,30 @@ def _open_folder(path: Path) -> Log:
     if (path / BAG_FILE).exists() or any(path.glob("*.db3")):
         return read_ros2_bag(path)
     bags = sorted([*path.glob("*.mcap"), *path.glob("*.bag")])
-    if bags:
-        logs = [_open_file(bag) for bag in bags]
-        takes = [Take(log.path.stem, take.streams) for log in logs for take in log.takes]
-        unread = {topic: why for log in logs for topic, why in log.unread.items()}
-        return Log(path, f"folder of {len(bags)} bags", takes, tuple(note for log in logs for note in log.notes), unread)
     files = sorted(each for each in path.iterdir() if each.is_file() and not each.name.startswith(".") and not _is_about(each))
-    if not files:
+    tables = [each for each in files if each not in bags]
+    if bags:
+        return _open_bags(path, bags, tables)
+    if not tables:
         raise DataError(f"{path}: a folder without a log; name a log ({FORMATS})")
-    return read_folder(path, files, _read_table)
+    return read_folder(path, tables, _read_table)
+
+
+def _open_bags(path: Path, bags: list[Path], tables: list[Path]) -> Log:
+    """Return the log of a folder of bags, one take each; tables beside a single bag are further streams of its take."""
+    logs = [_open_file(bag) for bag in bags]
+    takes = [Take(log.path.stem, take.streams) for log in logs for take in log.takes]
+    name = f"folder of {len(bags)} bag{'s' if len(bags) > 1 else ''}"
+    if tables and len(takes) == 1:
+        beside = read_folder(path, tables, _read_table)
+        if len(beside.takes) == 1:
+            takes = [Take(takes[0].name, {**takes[0].streams, **beside.takes[0].streams})]
+            logs.append(beside)
+            tables = []
+            name += " and tables"
+    unread = {topic: why for log in logs for topic, why in log.unread.items()}
+    unread |= {each.name: "a table beside several runs, which cannot be told apart" for each in tables}
+    return Log(path, name, takes, tuple(note for log in logs for note in log.notes), unread)
 
 
 def _is_about(path: Path) -> bool:
