@@ -67,7 +67,8 @@ def map_text(log: Log, map_name: str) -> str:
     }
     taken = _repeated(proposals)
     for name, found in streams.items():
-        lines.append(f"  # {_comment(name)}: {_comment(found[0].kind)}")
+        units = "; ROS counts in rad, for a sliding joint in m" if found[0].kind.endswith("JointState") else ""
+        lines.append(f"  # {_comment(name)}: {_comment(found[0].kind)}{units}")
         lines += _channel_lines(found[0], proposals[name], taken)
     return "\n".join([*lines, "]", ""])
 
