@@ -43,11 +43,16 @@ def assemble(log: Log, import_map: ImportMap) -> tuple[Recording, tuple[str, ...
         check_roles(channels)
         _check_names(log, import_map)
         pieces: list[Piece] = []
+        of_take: dict[str, list[str]] = {}
         for take in log.takes:
             if missing := _used(import_map) - set(take.streams):
                 notes.append(f"{take.name} is left out: it has no {', '.join(sorted(missing))}")
                 continue
-            pieces += _pieces(take, import_map, notes, absolute=len(log.takes) == 1)
+            said: list[str] = []
+            with prefix_errors(take.name):
+                pieces += _pieces(take, import_map, said, absolute=len(log.takes) == 1)
+            of_take[take.name] = said
+        notes += _told(of_take)
         pieces = _long_enough(pieces, notes)
         if not pieces:
             raise DataError(f"no trial is left ({short_repr('; '.join(notes[-3:]), 300)}); correct the map")
@@ -60,6 +65,13 @@ def assemble(log: Log, import_map: ImportMap) -> tuple[Recording, tuple[str, ...
     notes.append("time of each trial counts from its first row, in s")
     head = (import_map.robot, import_map.title or log.path.name, import_map.source, import_map.gravity)
     return Recording(*head, channels, tuple(trials)), tuple(dict.fromkeys(notes))
+
+
+def _told(of_take: Mapping[str, list[str]]) -> list[str]:
+    """Return what was said of takes: once where it is the same of all, else with the take's name."""
+    texts = list(of_take.values())
+    of_all = [note for note in texts[0] if all(note in others for others in texts)] if texts else []
+    return of_all + [f"{name}: {note}" for name, notes in of_take.items() for note in notes if note not in of_all]
 
 
 def _used(import_map: ImportMap) -> set[str]:
