@@ -10,6 +10,7 @@
     clouds.py                    point clouds (NPZ)
     patches.py                   point clouds as outputs that can be predicted
     notices.py                   remarks on a set that is otherwise in order
+    logs/                        other programs' logs to sets, and sets to their formats
     parsing/tables.py            CSV and Parquet to columns; names the cell at fault
     parsing/plausible.py         checks on the numbers
     parsing/quantity_strings.py  "10 g" to SI
