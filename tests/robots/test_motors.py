@@ -125,3 +125,14 @@ def test_a_motor_of_one_tendon_may_be_driven_by_its_torque(tmp_path: Path) -> No
 def test_contradictions_are_refused(tmp_path: Path, structure: str, more: str, said: str) -> None:
     with pytest.raises(DataError, match=said.replace(".", r"\.")):
         robot(tmp_path / "r", structure, more)
+
+
+def test_a_bound_that_another_number_contradicts_is_narrowed_and_said(tmp_path: Path) -> None:
+    """Holes lie within the disks' rim, 10 mm: a fit may not leave them 14 mm from the axis, or its twin could not be read again."""
+    text = (models_folder() / "continuum/robot.toml").read_text("utf-8").replace("low = 7.5, high = 8.5", "low = 7.5, high = 14.0")
+    (tmp_path / "robot.toml").write_text(text, "utf-8")
+    loose = load(str(tmp_path))
+    (hole,) = (p for p in loose.parameters if p.name == "tendons.radius")
+    assert hole.high == pytest.approx(0.01, rel=1e-9)
+    assert loose.find_conflicts({"tendons.radius": hole.high}) == []
+    assert [n.split(";")[0] for n in loose.notices] == ["tendons.radius is fitted as far as 0.01 m"]

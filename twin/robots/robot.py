@@ -1,7 +1,7 @@
 """Robots as data: the numbers of a `robot.toml`, each with unit and source, and the name of the family that builds it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -22,6 +22,7 @@ from twin.mechanics.silicone import HandBody, SoftBody
 from twin.robots.effect_tables import read_effects, read_uncertain
 from twin.robots.family import load_family
 from twin.robots.schema import (
+    BOUND_STDS,
     GRAVITY_ROW,
     ExactEntry,
     Row,
@@ -35,6 +36,7 @@ from twin.robots.schema import (
 from twin.robots.schemas.motor_rows import Motorised, drive_train
 
 ROBOT_FORMAT = "twin-robot/1"
+BISECTIONS = 40  # of a bound: to 1e-12 of it
 ROBOT_FILE = "robot.toml"
 T = TypeVar("T")
 
@@ -218,19 +220,48 @@ def _build_robot(folder: Path, table: Mapping[str, Any]) -> Robot:
     if problems:
         raise DataError(join_problems(problems))
     checked_only = {row.name for row in schema.rows if row.checked_only}
+    kept = [p for p in parameters if p.name not in checked_only]
+    narrowed, notices = _narrowed(schema, structure, kept)
     return Robot(
         name=folder.name,
         family=file.family,
         title=file.title,
         folder=folder,
         structure=counts,
-        parameters=tuple(p for p in parameters if p.name not in checked_only),
+        parameters=narrowed,
         gravity=gravity_vector,
         accuracy=accuracy[0].value,
         effects=tuple((e.id, e.values) for e in effects),
         uncertain=read_uncertain(file.effect, effects, size),
-        notices=schema.model_file.notices(counts, file.parameters or {}) if schema.model_file else (),
+        notices=schema.model_file.notices(counts, file.parameters or {}) if schema.model_file else notices,
     )
+
+
+def _narrowed(
+    schema: Schema, structure: Structure, parameters: Sequence[Parameter]
+) -> tuple[tuple[Parameter, ...], tuple[str, ...]]:
+    """Return the parameters with bounds of fits within which none alone contradicts the others, and what was
+    narrowed of what a file says."""
+    nominal, out, notices = {p.name: p.value for p in parameters}, list(parameters), []
+    if schema.model_file is not None:
+        return tuple(out), ()
+    for k, p in enumerate(parameters):
+        for side, bound in (("low", p.low), ("high", p.high)) if p.std is not None else ():
+
+            def conflicts(x: float, name: str = p.name) -> list[str]:
+                return schema.find_conflicts(structure, {**nominal, name: x})
+
+            if not (why := conflicts(bound)):
+                continue
+            good, bad = p.value, bound
+            for _ in range(BISECTIONS):
+                middle = 0.5 * (good + bad)
+                good, bad = (good, middle) if conflicts(middle) else (middle, bad)
+            out[k] = replace(out[k], **{side: good})
+            if np.isclose(abs(bound - p.value), BOUND_STDS * (p.std or 0.0)):
+                continue  # the default, which nobody wrote
+            notices.append(f"{p.name} is fitted as far as {good:.4g} {p.unit}; beyond, {why[0]}")
+    return tuple(out), tuple(notices)
 
 
 def _missing(file: RobotFile, schema: Schema) -> list[str]:
