@@ -103,6 +103,7 @@ class Body:
     marker_sites: tuple[str, ...] = ()
     imu_sites: tuple[str, ...] = ()
     payload_places: frozenset[str] = frozenset()
+    damping_time: float = 0.0  # s, damping over stiffness, where statics stands for motion
 
     @property
     def size(self) -> Size:

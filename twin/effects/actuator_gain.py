@@ -31,9 +31,16 @@ class ActuatorGain(Effect):
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
-        """Start with each drive alone, then with all of them; where tensions or currents drive there are none."""
-        if (predicted[0].driven_by_control | predicted[0].driven_by_length).any():
-            yield from super().fit_starts(predicted, n_tendon)
+        """Start with each drive alone, then with all of them; with none where tensions or currents drive.
+
+        Lengths start shorter, as the body always allows.
+        """
+        (gain,) = cls.per_tendon
+        driven = predicted[0].driven_by_control | predicted[0].driven_by_length
+        way = -1.0 if predicted[0].driven_by_length.any() else 1.0
+        single = [{f"gain_{i + 1}": gain.value + way * gain.step} for i in np.flatnonzero(driven)]
+        for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
+            yield FitStart(values, tuple(values))
 
     def edit(self, body: Body) -> None:
         gain = self.per_tendon_values("gain")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twin.body import SOLVE_TOLERANCE, Body, Drive, Heating, Loads, Problem, Signals, Solution, Solver
+from twin.body.lag import damped
 from twin.body.orientation import angles, followed, rates_and_forces, turned_by
 from twin.body.spring import Spring
 from twin.foundation.errors import SolveError
@@ -57,6 +58,7 @@ class TrialSimulator:
     body: Body
     solver: Solver
     options: SolveOptions = field(default_factory=SolveOptions)
+    steps: bool = False  # whether the solver steps through motion
 
     @cached_property
     def springs(self) -> Spring:
@@ -74,9 +76,10 @@ class TrialSimulator:
         """
         chain, options = self.twin.effect_chain, self.options
         driven = chain.drive(chain.command(inputs.signals.with_changes(antagonists=self.body.antagonists)))
+        felt = driven if self.steps else damped(driven, self.body.damping_time)
         heating = Heating(inputs.temperature, self.springs) if Drive.CURRENT in inputs.drives else None
         problem = Problem(
-            inputs.time, driven.command, chain.surround(inputs.loads), chain.route, inputs.drives, chain.creep, delayed,
+            inputs.time, felt.command, chain.surround(inputs.loads), chain.route, inputs.drives, chain.creep, delayed,
             chain.stiffness(inputs.temperature, inputs.clock), heating, near, options.keep, options.once, options.tolerance,
             inputs.clouds, inputs.start,
         )  # fmt: skip
@@ -86,11 +89,13 @@ class TrialSimulator:
             reason = solution.end_reason
             excess = driven.displacement[bad] - (self.solver.straight_path - solution.path[bad])
             raise SolveError(f"{inputs.name}: {reason}" if reason else _describe_failure(inputs.name, problem, bad, excess), bad)
-        shortening = self.solver.straight_path - solution.path + problem.route.elongation(solution.tension)
+        # a load cell reads the tension itself, which the shape follows
+        tension = solution.tension + (np.maximum(driven.tension, 0.0) - np.maximum(felt.tension, 0.0))
+        shortening = self.solver.straight_path - solution.path + problem.route.elongation(tension)
         travel = np.where(driven.driven_by_length, driven.displacement, shortening)
         markers = self.body.frame.to_marker_frame(solution.markers)
         others = {**solution.others, **(self._orientations(inputs.time, solution, problem.loads) if inputs.turned else {})}
-        return Trace(driven.with_changes(tension=solution.tension, displacement=travel, markers=markers, others=others), solution)
+        return Trace(driven.with_changes(tension=tension, displacement=travel, markers=markers, others=others), solution)
 
     def _orientations(self, time: np.ndarray, solution: Solution, loads: Loads) -> dict[str, np.ndarray]:
         """Return the rotation vectors (n, n_marker, 3) rad of markers in their frame, and what IMUs read."""
@@ -130,7 +135,9 @@ def iterate_traces(
     """Yield trials and their traces, as `simulate`; with creep also all before the last wanted one, since creep has memory."""
     options = options or SolveOptions()
     if dynamic and set(prepared.drives) <= (body := twin.body()).dynamic_drives:
-        yield from _iterate(TrialSimulator(twin, body, twin.robot.solver(body, dynamic=True), options), prepared, wanted)
+        yield from _iterate(
+            TrialSimulator(twin, body, twin.robot.solver(body, dynamic=True), options, steps=True), prepared, wanted
+        )
         return
     with twin.statics() as (body, solver):
         yield from _iterate(TrialSimulator(twin, body, solver, options), prepared, wanted)

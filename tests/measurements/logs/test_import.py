@@ -166,3 +166,13 @@ def test_infinite_readings_and_wild_names_do_no_harm(tmp_path: Path) -> None:
     recording = imported(path, tmp_path / "set", KNOWN)
     assert recording.trials[0].label == "a_b_c"
     np.testing.assert_allclose(recording.trials[0].values["tip_x"], [np.nan, 0.005, np.nan, 0.006])
+
+
+def test_a_continuous_log_is_cut_into_trials_of_a_length(tmp_path: Path) -> None:
+    log = table(tmp_path / "a.csv", [0.1 * k for k in range(10)])
+    recording = imported(log, tmp_path / "set", KNOWN, cut('{ every = "0.4 s" }'))
+    assert [len(trial.time) for trial in recording.trials] == [4, 4]  # the last two rows are too few
+    assert [trial.start for trial in recording.trials] == pytest.approx([0.0, 0.4])
+    said = refusal(log, KNOWN, cut('{ every = "0.4 s", gap = "1 s" }'))
+    assert "give one of gap" in said
+    assert "no time" in refusal(log, KNOWN, cut('{ every = "-1 s" }'))

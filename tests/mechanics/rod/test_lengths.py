@@ -278,8 +278,9 @@ def test_a_mixed_set_is_predicted_and_repeats_the_one_by_tension() -> None:
         # times as much (0.12 m of body, 8 mm from its axis: 15).
         np.testing.assert_allclose(again[name], logged[name], rtol=0, atol=15 * lost)
     for i in (2, 3):
-        # N: the same at 2 mm/N.
-        np.testing.assert_allclose(again[f"tendon_{i}_tension"], T[:, i - 1], rtol=0, atol=lost / 2e-3)
+        # N: the same at 2 mm/N; and shapes that follow tensions by the damping time, 10 ms, are held by those of then.
+        late = 0.01 * np.abs(np.diff(T, axis=0)).max()  # rows of a second
+        np.testing.assert_allclose(again[f"tendon_{i}_tension"], T[:, i - 1], rtol=0, atol=lost / 2e-3 + 1.3 * late)
 
 
 @pytest.mark.parametrize(

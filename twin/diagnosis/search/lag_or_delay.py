@@ -22,6 +22,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize, minimize_scalar
 
 from twin.body import Drive, Signals
+from twin.body.lag import lag_response
 from twin.diagnosis.calibration.fit import fit
 from twin.diagnosis.calibration.objective import sensitivity
 from twin.diagnosis.evidence.scored_model import ScoredModel, score_model
@@ -29,7 +30,7 @@ from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.command_spline import SmoothedCommand, smooth_command
 from twin.diagnosis.search.search import Search
 from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LAG_OR_DELAY_ROWS, STUDENT_DEGREES
-from twin.effects.actuator_lag import ActuatorLag, lag_response
+from twin.effects.actuator_lag import ActuatorLag
 from twin.effects.time_delay import TimeDelay
 from twin.foundation.errors import SolveError
 from twin.prediction.prepared import PreparedRecording

@@ -11,7 +11,7 @@ from twin.foundation.errors import DataError, short_repr
 from twin.foundation.files import MAX_SET_NUMBERS, prefix_errors
 from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK, OWN_CLOCK
 from twin.measurements.logs.clocks import EPOCH_SECONDS, header_skew
-from twin.measurements.logs.cut import LEAST_ROWS, cut_at_gaps, cut_at_marks, marks_of
+from twin.measurements.logs.cut import LEAST_ROWS, cut_at_gaps, cut_at_marks, cut_into_lengths, marks_of
 from twin.measurements.logs.map_file import ImportMap, StreamClock
 from twin.measurements.logs.stamps import Readings, in_order, on_one_line, stamp_streams, without_infinities
 from twin.measurements.logs.streams import Log, Stream, Take
@@ -154,6 +154,8 @@ def _cut(
         return [("", np.arange(len(merged.stamps)))]
     if import_map.gap is not None:
         return cut_at_gaps(merged.stamps, import_map.gap)
+    if import_map.every is not None:
+        return cut_into_lengths(merged.stamps, import_map.every)
     assert cut.stream is not None
     return cut_at_marks(merged.stamps, marks_of(used[cut.stream], stamps[cut.stream], cut), notes)
 

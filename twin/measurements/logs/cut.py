@@ -1,4 +1,4 @@
-"""Where trials begin and end: at pauses of all streams, or at marks."""
+"""Where trials begin and end: at pauses of all streams, at marks, or after a time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,6 +55,12 @@ def _wanted(cut: CutTable, labels: Sequence[str]) -> float:
 def cut_at_gaps(stamps: np.ndarray, gap: float) -> list[tuple[str, np.ndarray]]:
     """Return the pieces between pauses longer than `gap` (s): a label, empty, and the rows of each."""
     return [("", part) for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(stamps) > gap) + 1)]
+
+
+def cut_into_lengths(stamps: np.ndarray, every: float) -> list[tuple[str, np.ndarray]]:
+    """Return pieces of a continuous log, each `every` (s) long: a label, empty, and the rows of each."""
+    piece = np.floor((stamps - stamps[0]) / every).astype(int) if len(stamps) else np.zeros(0, int)
+    return [("", part) for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(piece)) + 1)]
 
 
 def cut_at_marks(stamps: np.ndarray, marks: Marks, notes: list[str]) -> list[tuple[str, np.ndarray]]:

@@ -2,7 +2,7 @@
 
     format = "twin-import/1"
     robot, title, source, gravity        as in measurements.toml
-    cut     = { gap = "1 s" } | { stream = S } | { stream = S, field = F } | { stream = S, field = F, only = VALUE }
+    cut     = { gap = "1 s" } | { every = "25 s" } | { stream = S } | { stream = S, field = F } | { stream = S, field = F, only = VALUE }
     stream  = [{ name, clock, time_unit, rate, offset, equal_stamps, backward_stamps }, ...]
     channel = [{ stream, field, quantity, role, unit, name, scale, offset, noise }, ...]
 
@@ -37,6 +37,7 @@ class CutTable(TableSchema):
     """How a take is cut into trials."""
 
     gap: str | None = Field(None, description="a pause of all streams that ends a trial")
+    every: str | None = Field(None, description="how long each trial is; the last may be shorter")
     stream: str | None = Field(None, description="the stream of marks; without field each of its rows begins a trial")
     field: str | None = Field(None, description="the field of marks: each change of its value begins a trial")
     only: Any = Field(None, description="keep only the rows while the field has this value")
@@ -113,6 +114,7 @@ class ImportMap:
     gravity: Any
     cut: CutTable | None
     gap: float | None  # s
+    every: float | None  # s
     clocks: Mapping[str, StreamClock]
     channels: tuple[MappedChannel, ...]
 
@@ -131,7 +133,7 @@ def read_map(path: Path) -> ImportMap:
             raise DataError(join_problems(problems))
         channels = [validate_table(ChannelTable, each, _place(lines, each), problems) for each in top.channel]
         kept = [each for each in channels if each is not None]
-        cut, gap = _cut(top.cut, problems)
+        cut, gap, every = _cut(top.cut, problems)
         used = {each.stream for each in kept} | ({cut.stream} if cut is not None else set())
         streams = [validate_table(StreamTable, each, _place(lines, each), problems) for each in top.stream]
         if problems:
@@ -147,7 +149,7 @@ def read_map(path: Path) -> ImportMap:
         _check_names(mapped, problems)
         if problems:
             raise DataError(join_problems(problems))
-    return ImportMap(path, top.robot, top.title, top.source, gravity, cut, gap, clocks, tuple(mapped))
+    return ImportMap(path, top.robot, top.title, top.source, gravity, cut, gap, every, clocks, tuple(mapped))
 
 
 def _place(lines: list[str], table: Any) -> str:
@@ -180,23 +182,25 @@ def _to_fill_in(top: MapTable, tables: list[Any], lines: list[str]) -> list[str]
     return found
 
 
-def _cut(table: Any, problems: list[str]) -> tuple[CutTable | None, float | None]:
-    if table is None:
-        return None, None
-    cut = validate_table(CutTable, table, "cut", problems)
+def _cut(table: Any, problems: list[str]) -> tuple[CutTable | None, float | None, float | None]:
+    """Return what a map says of trials, and the pause that ends one and the length of each (s), where it says so."""
+    cut = None if table is None else validate_table(CutTable, table, "cut", problems)
     if cut is None:
-        return None, None
-    if (cut.gap is None) == (cut.stream is None) or (cut.only is not None and cut.field is None):
-        problems.append('cut: give either gap = "1 s", or stream with field (and only) or without')
-        return None, None
-    try:
-        gap = None if cut.gap is None else parse_quantity(cut.gap, "s")
-        if gap is not None and gap <= 0.0:
-            raise DataError(f"{short_repr(cut.gap)} is no pause; write a positive time")
-        return cut, gap
-    except DataError as fault:
-        problems.append(f"cut: gap: {fault}")
-        return None, None
+        return None, None, None
+    ways = [way for way in (cut.gap, cut.every, cut.stream) if way is not None]
+    if len(ways) != 1 or (cut.only is not None and cut.field is None):
+        problems.append('cut: give one of gap = "1 s", every = "25 s", and stream with field (and only) or without')
+        return None, None, None
+    times: list[float | None] = []
+    for written in (cut.gap, cut.every):
+        try:
+            times.append(None if written is None else parse_quantity(written, "s"))
+            if times[-1] is not None and not times[-1] > 0.0:
+                raise DataError(f"{short_repr(written)} is no time; write a positive one")
+        except DataError as fault:
+            problems.append(f"cut: {fault}")
+            return None, None, None
+    return cut, times[0], times[1]
 
 
 def _clock(table: StreamTable, lines: list[str], problems: list[str]) -> StreamClock | None:

@@ -22,6 +22,7 @@ _HEAD = """\
 _TRIALS = """
 # Trials. Without `cut` each take is one trial: {takes}. Else one of:
 # cut = {{ gap = "1 s" }}                                     # a pause of all streams{gaps}
+# cut = {{ every = "25 s" }}                                  # a continuous log, into trials of this length
 # cut = {{ stream = "S" }}                                    # each row of a stream of marks begins a trial{events}
 # cut = {{ stream = "S", field = "F" }}                       # each change of a field begins a trial{marks}
 # cut = {{ stream = "S", field = "F", only = 1 }}             # and only the rows while it has this value are kept

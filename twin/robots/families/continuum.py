@@ -97,6 +97,7 @@ def _assemble_body(
         | marker_senses([*markers, "tip"])
         | turn_senses([*markers, "tip"], len(shape.imus)),
         frame=Frame.from_values(values),
+        damping_time=values["damping.time"],
         joints=joints,
         tendon_sites=tendons,
         marker_sites=(*markers, tip if listed else f"disk_{n_disk}"),

@@ -67,6 +67,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> SoftB
         ),
         marker_rest=seen,
         turn=values["mounting.angle"],
+        damping_time=values["silicone.damping"],
         youngs_modulus=values["silicone.youngs_modulus"],
         poisson=values["silicone.poisson_ratio"],
         density=values["silicone.density"],

@@ -321,7 +321,7 @@ CONTINUUM_ROWS = (
         _all.row(f"frame.shift_{a}", "m mm", f"{a} component of the shift from base to markers' frame", -10.0, 10.0, default=0.0)
         for a in "xyz"
     ),
-    _all.row("damping.time", "s ms", "damping over stiffness (Rayleigh); counts in fast recordings only", 0.0, 10.0),
+    _all.row("damping.time", "s ms", "damping over stiffness (Rayleigh): the shape follows tensions that late", 0.0, 10.0),
     *MOTOR_ROWS,
     *SPRING_ROWS,
 )
