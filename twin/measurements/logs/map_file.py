@@ -2,7 +2,8 @@
 
     format = "twin-import/1"
     robot, title, source, gravity        as in measurements.toml
-    cut     = { gap = "1 s" } | { every = "25 s" } | { stream = S } | { stream = S, field = F } | { stream = S, field = F, only = VALUE }
+    cut     = { gap = "1 s" } | { every = "25 s" } | { stream = S } | { stream = S, field = F }
+              | { stream = S, field = F, only = VALUE }
     stream  = [{ name, clock, time_unit, rate, offset, equal_stamps, backward_stamps }, ...]
     channel = [{ stream, field, quantity, role, unit, name, scale, offset, noise }, ...]
 
