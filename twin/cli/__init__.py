@@ -12,6 +12,7 @@ import tyro
 from twin.cli.data.calibrate import Calibrate
 from twin.cli.data.diagnose import Diagnose
 from twin.cli.data.evaluate import Evaluate
+from twin.cli.data.export import Export
 from twin.cli.data.simulate import Simulate
 from twin.cli.finger.align import Align
 from twin.cli.finger.generate import Generate
@@ -32,7 +33,7 @@ from twin.foundation.errors import TwinError
 PROGRAM_SUMMARY = "A digital twin of tendon-driven soft and continuum robots that learns from measured data what it is missing."
 Command = (
     New | Robots | Diagnose | Evaluate | Simulate | Rollout | View | Calibrate | Effects | Generate | Train | Align | Shape | Tasks
-    | Demonstrate | Imitate
+    | Demonstrate | Imitate | Export
 )  # fmt: skip
 
 
