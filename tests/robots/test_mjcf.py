@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
+from tests.command_line import twin
 from tests.mechanics.mjcf.models import CAPSTAN, PENDULUM, robot
 from twin.body import Counts, Drive
 from twin.diagnosis import Settings, diagnose
@@ -238,6 +241,28 @@ def test_friction_of_an_independent_servo_is_named_with_its_size(tmp_path: Path)
     assert law["torque_hinge"] == pytest.approx(0.1, rel=0.1)
     found.twin.save(tmp_path / "twin.toml")
     assert read_twin(tmp_path / "twin.toml").effects == found.twin.effects  # names of joints survive the file
+    # The report has the twin as an MJCF; the command writes the same from the report.
+    found.save(tmp_path / "report")
+    text = (tmp_path / "report/robot.xml").read_text()
+    number = next(line for line in text.splitlines() if "joint_friction: torque_hinge" in line)
+    assert re.fullmatch(r" *<!-- joint_friction: torque_hinge = 0\.\d+ \+- 0\.\d+ N\*m, probability [01]\.?\d* -->", number)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "report/robot.xml"))
+    assert model.joint("hinge").frictionloss[0] == law["torque_hinge"]
+    done = twin("export", "report", "--mjcf", "better", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "better/robot.xml").read_text() == text
+
+
+def test_export_says_what_it_needs(tmp_path: Path) -> None:
+    for arguments, said in (
+        (("tendon_leg",), "nothing to write; give a format with its folder, such as --mjcf better"),
+        (("continuum", "--mjcf", "better"), "robot 'continuum' is of family 'continuum'"),
+        (("nowhere", "--mjcf", "better"), "nowhere"),
+    ):
+        done = twin("export", *arguments, cwd=tmp_path)
+        assert done.returncode == 2
+        assert said in done.stderr
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_servo_without_a_fault_is_noise(tmp_path: Path) -> None:
