@@ -1,8 +1,7 @@
 """A twin of an MJCF as a better MJCF, and the steps of what MuJoCo cannot say.
 
-export.py    the MJCF and its comments     natives.py   effects as attributes of MuJoCo
-stepper.py   the laws beside it            delivery.py  delay and lag of drives, step by step
-comments.py  what is said of the numbers
+export.py    the MJCF                      natives.py   joint friction as attributes of MuJoCo
+comments.py  what is said of its numbers   stepper.py   the laws beside it
 """
 
 from twin.prediction.mjcf.comments import Origins, origins_of

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from twin.body.counts import joint_names, tendon_names
 from twin.effects import Effect
 from twin.foundation.errors import DataError
@@ -41,11 +43,6 @@ def origins_of(source: str | Path) -> Origins:
     return Origins(standard_errors(source), said)
 
 
-def is_ahead(effect: Effect) -> bool:
-    """Return whether an effect is a log whose outputs come before its inputs, which no model can do."""
-    return effect.id == "time_delay" and effect["delay"] <= 0.0
-
-
 def heading(twin: Twin, body: ModelBody, origins: Origins) -> str:
     """Return what is said on top: what the file is, and the parameters that belong to no element."""
     lines = [
@@ -56,8 +53,8 @@ def heading(twin: Twin, body: ModelBody, origins: Origins) -> str:
         places = _elements(effect, body.loaded.names("actuator"))
         own = [p for p in effect.all_parameters(effect.n_tendon) if p.name not in places]
         lines += [_said(effect, p, origins) for p in own if effect[p.name] != p.value]
-        if is_ahead(effect):
-            lines.append(f"{effect.id}: not written; the log's outputs run ahead of its inputs, which no model does")
+        if effect.acts_in("by_step") and effect.by_step(1.0, np.zeros(int(effect.n_tendon))) is None:
+            lines[-1] += ": not written, since the log's outputs run ahead of its inputs, which no model does"
     return "\n       ".join(lines)
 
 

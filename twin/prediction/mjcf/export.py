@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import mujoco
-import numpy as np
 
-from twin.body import Loads
+from twin.body import Loads, Route, Rubbing
 from twin.effects import Effect
 from twin.foundation.atomic_write import write_all_atomically
 from twin.foundation.errors import DataError
@@ -22,14 +21,13 @@ from twin.mechanics.mjcf import (
     with_comments,
     written_model,
 )
-from twin.prediction.mjcf.comments import Origins, element_comments, heading, is_ahead
-from twin.prediction.mjcf.natives import CARRIED, FILTERED, takes_zero, write_delay, write_friction, write_lag, write_zero
+from twin.prediction.mjcf.comments import Origins, element_comments, heading
+from twin.prediction.mjcf.natives import write_friction
 from twin.prediction.mjcf.stepper import PREFIX, numbers_of
 from twin.prediction.twin import Twin
 
 MODEL_FILE = "robot.xml"
-_CHANGES_NUMBERS = ("edit", "surround")  # places of effects whose result is a number of the compiled model
-_CHANGES_SIGNALS = ("command", "drive", "soften", "route", "spring", "deform", "sense")
+_STEPPED = ("command", "drive", "route", "sense")  # places of effects that go along as laws
 _LAWS = "laws that MuJoCo has not, for twin.prediction.mjcf.ModelStepper; what stands above in their place is said there"
 
 
@@ -62,18 +60,16 @@ def export_mjcf(twin: Twin, origins: Origins) -> WrittenModel:
             f"robot {twin.robot.name!r} is of family {twin.robot.family!r}, which has no MJCF of its own; only robots of family "
             "'mjcf' are written as one"
         )
-    lost = [e.id for e in twin.effects if e.acts_in(*_CHANGES_SIGNALS) and e.id not in CARRIED]
-    if lost:
+    if lost := [e.id for e in twin.effects if not _has_place(e)]:
         raise DataError(f"effect {lost[0]} has no place in an MJCF; remove it from the twin")
     chain = twin.effect_chain
     wanted = ModelSolver(body).loaded_model(chain.surround(Loads(twin.robot.gravity)))
-    viscous = chain.route.rubbing.viscous
-    wanted.dof_damping[wanted.jnt_dofadr[list(body.joints)]] += np.array(viscous or np.zeros(len(body.joints)))
     spec, described = written_model(body.loaded, wanted)
     spec.option.timestep = body.longest_step
     comments = element_comments(twin, body, origins)
     for kind, name in comments:
         name_element(spec, body.loaded, kind, name)
+    write_friction(spec, chain.route.rubbing)
     _write_effects(spec, twin.effects)
     compiled = spec.compile()
     made = WrittenModel(with_comments(exact_text(spec), heading(twin, body, origins), comments, _LAWS), described.files)
@@ -81,23 +77,21 @@ def export_mjcf(twin: Twin, origins: Origins) -> WrittenModel:
     return made
 
 
+def _has_place(effect: Effect) -> bool:
+    """Return whether an effect's law can be written or stepped."""
+    route = replace(effect.route(), mu=0.0, presliding=Route().presliding, mu_shares=(), rubbing=Rubbing())
+    return (
+        not effect.acts_in("soften", "spring", "deform")
+        and route == Route()
+        and (not effect.acts_in("command", "drive") or effect.acts_in("by_step"))
+    )
+
+
 def _write_effects(spec: mujoco.MjSpec, effects: tuple[Effect, ...]) -> None:
     """Write the effects that act on signals and between steps."""
     for number in [n for n in spec.numerics if n.name.startswith(PREFIX)]:  # of an export that this robot was made from
         spec.delete(number)
-    carried = tuple(e for e in effects if e.id in CARRIED and not is_ahead(e))
-    numbers: dict[str, Any] = {}
-    for effect in carried:
-        if effect.id == "drive_zero" and takes_zero(spec):
-            write_zero(spec, effect)
-            continue
-        if effect.id == "time_delay":
-            write_delay(spec, effect["delay"])
-        elif effect.id == "actuator_lag" and effect["time"] > 0.0:
-            numbers[PREFIX + FILTERED] = write_lag(spec, effect["time"])
-        elif effect.id == "joint_friction":
-            write_friction(spec, effect.per_joint_values("torque"))
-        numbers |= numbers_of((effect,))
-    for name, value in numbers.items():
-        values = np.atleast_1d(np.array(value, float))
-        spec.add_numeric(name=name, size=len(values), data=values)
+    for effect in effects:
+        if effect.acts_in(*_STEPPED) and not effect.write(spec):
+            for name, value in numbers_of(effect).items():
+                spec.add_numeric(name=name, size=1, data=[value])

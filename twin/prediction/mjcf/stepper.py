@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import mujoco
@@ -13,8 +13,7 @@ from twin.effects import Effect, effect_class
 from twin.effects.base.chain import EffectChain
 from twin.foundation.errors import DataError, TwinError, short_repr
 from twin.mechanics.mjcf import LoadedModel, ModelSolver
-from twin.prediction.mjcf.delivery import Delivery
-from twin.prediction.mjcf.natives import FILTERED, without_natives
+from twin.prediction.mjcf.natives import erase_friction
 from twin.robots.families.mjcf import body_of
 from twin.robots.schemas.mjcf import counts_of
 
@@ -47,11 +46,6 @@ class ModelStepper:
         self._chain = EffectChain(self.effects)
         self._chain.check_body(self._body, Path(path).name)
         self._solver = ModelSolver(self._body)
-        self._zero = sum((e.per_tendon_values("zero") for e in self.effects if e.id == "drive_zero"), np.zeros(loaded.model.nu))
-        lag, delay = self._effect("actuator_lag"), self._effect("time_delay")
-        self._deliver = Delivery(
-            self.step_length, delay["delay"] if delay else 0.0, lag["time"] if lag else 0.0, lag["inertia"] if lag else 0.0
-        )
         self.reset(np.zeros(loaded.model.nu), settle=0.0)
 
     @property
@@ -71,13 +65,22 @@ class ModelStepper:
         problem = Problem(
             np.zeros(1), control[None], loads, self._chain.route, (Drive.CONTROL,) * len(control), start=Start(settle, pose)
         )
-        self._motion = self._solver.begin(problem, self.step_length, control + self._zero)
-        self._deliver.begin(control + self._zero)
+        first, self._laws = control, list[Callable[[np.ndarray], np.ndarray]]()
+        for effect in (
+            *(e for e in reversed(self.effects) if e.acts_in("command")),
+            *(e for e in self.effects if e.acts_in("drive")),
+        ):
+            if (law := effect.by_step(self.step_length, first)) is not None:
+                self._laws.append(law)
+                first = first if effect.acts_in("drive") else law(first)
+        self._motion = self._solver.begin(problem, self.step_length, first)
         self._scratch = mujoco.MjData(self._motion.model)
 
     def step(self, control: np.ndarray) -> None:
         """Advance by one step under controls (nu,). Raises TwinError for a motion that diverges."""
-        delivered = self._deliver(np.asarray(control, float) + self._zero)
+        delivered = np.array(control, float)
+        for law in self._laws:
+            delivered = law(delivered)
         if not self._motion.stands or self._motion.advance(delivered[None], _NO_ROW, _NOTHING) < 1:
             raise TwinError("the model's motion diverges; check the controls, or give the file a shorter timestep")
 
@@ -98,9 +101,6 @@ class ModelStepper:
         senses = {name: s for name, s in self._body.senses.items() if s.group in _POSITIONS}
         return {name: float(seen.group(s.group)[0, s.index, s.axis]) for name, s in senses.items()}
 
-    def _effect(self, name: str) -> Effect | None:
-        return next((e for e in self.effects if e.id == name), None)
-
 
 def _read(path: Path) -> tuple[tuple[Effect, ...], LoadedModel]:
     """Return the laws of an exported file, and its model without what stands there in their place."""
@@ -111,16 +111,17 @@ def _read(path: Path) -> tuple[tuple[Effect, ...], LoadedModel]:
         found: dict[str, dict[str, float]] = {}
         for name, value in numbers.items():
             effect, _, parameter = name.removeprefix(PREFIX).partition(".")
-            if effect != FILTERED:
-                found.setdefault(effect, {})[parameter] = float(value[0])
+            found.setdefault(effect, {})[parameter] = float(value[0])
         counts = counts_of(LoadedModel(path, spec, spec.compile()))
         effects = tuple(effect_class(name)(values, counts) for name, values in found.items())
-        without_natives(spec, effects, numbers.get(PREFIX + FILTERED, np.zeros(0)))
+        erase_friction(spec, EffectChain(effects).route.rubbing)
+        for effect in effects:
+            effect.erase(spec)
         return effects, LoadedModel(path, spec, spec.compile())
     except (ValueError, TwinError, mujoco.FatalError) as error:
         raise DataError(f"{short_repr(str(path), 300)}: {' '.join(str(error).split())}; export it again") from None
 
 
-def numbers_of(effects: tuple[Effect, ...]) -> Mapping[str, float]:
-    """Return the custom numbers that hold laws, for `_read`."""
-    return {f"{PREFIX}{effect.id}.{name}": value for effect in effects for name, value in effect.values.items()}
+def numbers_of(effect: Effect) -> Mapping[str, float]:
+    """Return the custom numbers that hold a law, for `_read`."""
+    return {f"{PREFIX}{effect.id}.{name}": value for name, value in effect.values.items()}
