@@ -15,7 +15,7 @@ An effect acts in the following places, in the order of the signal. It has no st
 An effect that acts in `sense` only needs no new simulation: it is applied to the existing prediction.
 
 In an exported MJCF (`twin.prediction.mjcf`) effects that act in `edit` and `surround` are numbers of the model, friction is known
-from `route`, and readings go through `sense`. An effect that acts in `command` or `drive` says how it does there: `write`, `by_step`.
+from `route`, and readings go through `sense`. One that acts in `command` or `drive` says how by `write` and `by_step`.
 """
 
 from __future__ import annotations

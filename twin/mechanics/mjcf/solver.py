@@ -161,7 +161,12 @@ class ModelSolver:
         angle, speed, effort = found["qpos"][:, qpos], found["qvel"][:, dof], found["qfrc_actuator"][:, dof]
         length, force = found["actuator_length"], found["actuator_force"]
         others = {"joint angle": angle, "joint shift": angle, "joint rate": speed, "joint speed": speed, "joint torque": effort}
-        others |= {"joint force": effort, "actuator angle": length, "actuator length": length}
+        others |= {
+            "joints": angle[:, list(self.body.joints)],
+            "joint force": effort,
+            "actuator angle": length,
+            "actuator length": length,
+        }
         others |= {"actuator rate": found["actuator_velocity"], "actuator speed": found["actuator_velocity"]}
         others |= {"actuator torque": force, "actuator force": force, "tendon length": found["ten_length"]}
         others |= {"tendon speed": found["ten_velocity"], "tendon tension": force @ now.pull.T + _own_tension(model, found)}

@@ -98,6 +98,7 @@ def _write_joints(spec: mujoco.MjSpec, old: mujoco.MjModel, new: mujoco.MjModel)
             joint.springref = float(new.qpos_spring[qpos])
         if (old.jnt_range[k] != new.jnt_range[k]).any() or old.jnt_limited[k] != new.jnt_limited[k]:
             joint.range, joint.limited = new.jnt_range[k], int(new.jnt_limited[k])
+            joint.solref_limit, joint.solimp_limit = new.jnt_solref[k], new.jnt_solimp[k]
         joint.pos = joint.pos + _in_frames(joint.frame, new.jnt_pos[k] - old.jnt_pos[k])
 
 

@@ -73,7 +73,7 @@ class _Known:
             for k, name in enumerate(loaded.names("actuator"))
         )
         self.tendon_sites = tendon_sites(loaded)
-        features = {"controls", "start", "servos", "joints", "encoders", "friction of joints", "load friction", "markers"}
+        features = {"controls", "start", "servos", "joints", "encoders", "friction of joints", "load friction", "markers", "stops"}
         if np.linalg.norm(model.opt.gravity) > 0.0:
             features |= {"weight"}
         self.features = frozenset(features)
