@@ -99,7 +99,7 @@ LEG = (
     *(Channel(f"joint.{joint}.position", "output", "rad", 1e-3) for joint in ("hip", "knee")),
     *(Channel(f"site.foot_tip.{a}", "output", "m", 2e-4) for a in "xz"),
 )  # fmt: skip
-OF_MODELS = {"load friction", "joints", "controls", "servos", "encoders"}  # features that an MJCF's body alone has
+OF_MODELS = {"load friction", "joints", "controls", "servos", "encoders", "stops"}  # features that an MJCF's body alone has
 
 
 def stepped(name: str, start: float, size: float) -> Trial:

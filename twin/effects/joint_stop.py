@@ -17,7 +17,11 @@ ENDS = {"upper": 1.0, "lower": -1.0}
 
 
 class JointStop(Effect):
-    """Each joint stays between `lower` and `upper`: a hard stop, without play or bounce, that pushes and never pulls.
+    """Each joint stays between two hard stops that push and never pull: lower <= q <= upper, and at the upper one (the lower alike)
+
+        tau >= 0,    tau (upper - q) = 0,
+
+    tau the torque (N m; N of a slide) by which the stop pushes back. It neither gives way nor throws back.
 
     Where the description has a stop as well, the nearer one holds. The drive does not give way: a servo pushes on.
 
