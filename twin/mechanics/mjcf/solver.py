@@ -119,7 +119,7 @@ class ModelSolver:
         mujoco.mj_resetData(now.model, now.data)
         mujoco.mj_setState(now.model, now.data, state, _WHOLE_STATE)
         mujoco.mj_forward(now.model, now.data)
-        slip = Slip(memory.slip.z.copy(), memory.slip.beyond.copy())  # type: ignore[attr-defined]
+        slip = memory.slip._replace(z=memory.slip.z.copy(), beyond=memory.slip.beyond.copy())  # type: ignore[attr-defined]
         copied = memory._replace(z=memory.z.copy(), before=memory.before.copy(), slip=slip, started=memory.started.copy(),
                                  **_at_rest(now.model))  # fmt: skip
         rates = now.data.qvel
@@ -245,7 +245,11 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
 def _memory(now: _Compiled, laws: Laws) -> Memory:
     """Return the laws' memory of a body at its start: nothing slips, no bristle is bent."""
     points = 2 * int(now.model.tendon_num.max(initial=0)) + 2
-    slip = Slip(np.zeros((now.model.ntendon, points)), np.zeros((now.model.ntendon, points)))
+    each, room = (
+        (now.model.ntendon, points),
+        (np.empty(points, np.int64), np.empty((points, 3)), np.empty(points), np.empty(points)),
+    )
+    slip = Slip(np.zeros(each), np.zeros(each), *room)
     before = now.data.qpos[laws.joints.qpos].copy()  # type: ignore[attr-defined]
     return Memory(np.zeros(len(before)), before, slip, np.zeros(1, bool), **_at_rest(now.model))
 
