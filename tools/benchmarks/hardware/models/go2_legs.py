@@ -46,9 +46,11 @@ def write_sets(raw: Path, folder: Path) -> tuple[Path, Path]:
     for name, kept in (("fitted", time < FITTED_UNTIL), ("judged", np.ones(len(time), bool))):
         trials = []
         for leg in LEGS:
-            sign = {"hip": -1.0 if leg[1] == "R" else 1.0}
-            column = lambda what, j, leg=leg, sign=sign: sign.get(j, 1.0) * table[kept, head.index(f"{what}_{leg}_{j}")]  # noqa: E731
-            values = {f"{j}_command": column("qdes", j) for j in JOINTS} | {f"{j}_angle": column("q", j) for j in JOINTS}
+            values = {}
+            for joint in JOINTS:
+                sign = -1.0 if (leg[1], joint) == ("R", "hip") else 1.0
+                for logged, kind in (("qdes", "command"), ("q", "angle")):
+                    values[f"{joint}_{kind}"] = sign * table[kept, head.index(f"{logged}_{leg}_{joint}")]
             trials.append(Trial(f"{leg}.csv", time[kept], values))
         source = "hardware: iit-DLSLab/sim2real-robot-identification, BSD-3"
         write(Recording("../robot", f"Go2 legs, {name}", source, None, channels, tuple(trials)), folder / name)

@@ -1,9 +1,9 @@
-"""A Dynamixel XL330 servo that swings a pendulum (Rhoban/bam, Apache-2.0): twelve logs at three gains are fitted, four others judged.
+"""A Dynamixel XL330 servo that swings a pendulum (Rhoban/bam, Apache-2.0): twelve logs at three gains are fitted, four judged.
 
-The firmware's law is duty = clip(gain (goal - q) 4096 / (2 pi 256 885), -1, 1), and torque = kt U duty / R - kt^2 / R q' while it is
-switched on. Its gain is another in each log, so the torque is made of three controls: the gain over the angle, gain times goal, and
-the back-EMF's damping, all logged or described; the joint's `actuatorfrcrange` is the clip. kt and R are those of the data sheet's
-stall (XL330-M288: 0.52 N m, 1.47 A at 5 V).
+The firmware's law is duty = clip(gain (goal - q) 4096 / (2 pi 256 885), -1, 1), and torque = kt U duty / R - kt^2 / R q' while it
+is switched on. Its gain is another in each log, so the torque is made of three controls: gain times goal, the gain over the angle,
+and the back-EMF's damping. The first two act through a tendon of which `actuatorfrcrange` is the clip. kt and R are those of the
+data sheet's stall (XL330-M288: 0.52 N m, 1.47 A at 5 V).
 """
 
 import gzip
@@ -16,6 +16,7 @@ from twin.measurements import Channel, Recording, Trial, write
 from twin.prediction.twin import Twin
 
 KT, R, NOMINAL = 0.52 / 1.47, 5.0 / 1.47, 7.4  # N m/A, ohm, V
+STALL = KT * NOMINAL / R  # N m
 FIRMWARE = 4096.0 / (2.0 * np.pi) / (256.0 * 885.0)  # duty per rad and unit of gain
 JUDGED_GAIN = 400
 ENCODER = 2.0 * np.pi / 4096.0 / np.sqrt(12.0)  # rad
@@ -25,13 +26,14 @@ MODEL = f"""<mujoco model="xl330_pendulum">
   <worldbody>
     <body name="pendulum">
       <inertial pos="0 0 -0.1" mass="0.49" diaginertia="1e-6 1e-6 1e-6"/>
-      <joint name="output" axis="0 -1 0" armature="0.002" damping="0.005" actuatorfrcrange="{-KT * NOMINAL / R} {KT * NOMINAL / R}"/>
+      <joint name="output" axis="0 -1 0" armature="0.002" damping="0.005"/>
       <site name="tip" pos="0 0 -0.1"/>
     </body>
   </worldbody>
+  <tendon><fixed name="bridge" actuatorfrcrange="{-STALL} {STALL}"><joint joint="output" coef="1"/></fixed></tendon>
   <actuator>
-    <motor name="goal" joint="output"/>
-    <general name="stiffness" joint="output" gaintype="affine" gainprm="0 -1 0"/>
+    <motor name="goal" tendon="bridge"/>
+    <general name="stiffness" tendon="bridge" gaintype="affine" gainprm="0 -1 0"/>
     <general name="back_emf" joint="output" gaintype="affine" gainprm="0 0 -1"/>
   </actuator>
 </mujoco>
