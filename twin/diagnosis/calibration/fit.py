@@ -471,7 +471,7 @@ class _Penalty:
 
 
 def _broyden(columns: np.ndarray, d: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Return the least correction (n, n_free) of derivatives that makes them right for the last step: J d = change (Broyden 1965)."""
+    """Return the least correction (n, n_free) that makes derivatives right for the last step: J d = change (Broyden 1965)."""
     return np.outer(change - columns @ d, d / max(float(d @ d), 1e-300))
 
 
