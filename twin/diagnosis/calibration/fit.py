@@ -375,8 +375,10 @@ def fit(
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
     Derivatives for the robot's own parameters, nearly linear, are computed once, or given as `J`, the whitened columns (n, m) of
-    the first m free parameters from a neighbouring fit. Those for effects are computed at every step. `refresh` computes all again
-    at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
+    the first m free parameters from a neighbouring fit. Those for effects are computed at every step. Of motion, all are corrected
+    by what each step showed, and computed again where a step fell short: those for effects first, then the robot's own. `refresh`
+    computes all again at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its
+    start.
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
@@ -389,11 +391,13 @@ def fit(
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping, own = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None]
     derived = now if J is None else np.inf  # the cost where the derivatives for the robot's own parameters were computed
+    stale = True  # whether those for effects were computed before the last step
     for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
-        columns[:, moving] = objective.jacobian(at, moving)
+        if stale or not objective.bends:
+            columns[:, moving], stale, behind = objective.jacobian(at, moving), False, False
         x = at.model.vector()
         H, g = penalty.normal_equations(x, columns, at.z)
-        better, whole, enough = None, damping, max(objective.smallest_fall(stop, now), stop.worth)
+        better, whole, before, enough = None, damping, behind, max(objective.smallest_fall(stop, now), stop.worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, penalty.low - x, penalty.high - x)
             predicted_fall = -float(2.0 * g @ d + d @ H @ d)
@@ -405,13 +409,16 @@ def fit(
         if better is not None:
             if objective.bends:
                 columns += _broyden(columns, better.model.vector() - x, better.z - at.z)
-            at, now = better, penalty.cost(better)
+            at, now, behind = better, penalty.cost(better), bool(moving)
             if fall > TRUSTED_FALL_SHARE * predicted_fall:
                 damping = max(0.1 * damping, 1e-6)
             if now - left * fall > stop.beat:
                 break
         slow = objective.bends and fall < SLOW_FALL_SHARE * predicted_fall
         if better is None or fall < enough or slow:
+            stale, damping = True, 1e-4 if before else damping
+            if before and left:
+                continue
             if not (renewals and left and derived - now > enough):
                 if slow and better is not None and fall >= enough:
                     continue
