@@ -37,9 +37,7 @@ MOTION_DIFFERENCE = 0.5
 SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came of motion, they are renewed
 MOST_MOTION_STEPS = 24  # at most, of a fit of motion
 MOST_RENEWALS = 3  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
-# Of |z|^2, in units of the residual's own variance, by which a fit of motion ends: fast logs have so many rows that a share of them
-# is a lot, and where a residual exceeds its noise, errors are as much larger.
-LARGEST_LAST_FALL = 3.0
+LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 MOST_FIT_STEPS = 12  # at most, of a fit
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
@@ -130,10 +128,9 @@ class Objective:
         """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
         return Drive.CONTROL in getattr(self.prepared, "drives", ())
 
-    def smallest_fall(self, stop: StopRule, now: float) -> float:
-        """Return the fall of |z|^2, `now`, at which a fit may end."""
-        share = stop.tolerance * now
-        return min(share, LARGEST_LAST_FALL * max(1.0, now / max(self.n, 1))) if self.bends and not stop.rough else share
+    def smallest_fall(self, fall: float) -> float:
+        """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
+        return min(fall, LARGEST_LAST_FALL) if self.bends else fall
 
     def of(self, which: Sequence[int]) -> Objective:
         """Return the objective of some of its trials, given by their positions."""
@@ -362,7 +359,6 @@ class StopRule:
     tolerance: float = 1e-5
     worth: float = 0.0
     beat: float = np.inf
-    rough: bool = False  # a fit of motion ends by the share too (`LARGEST_LAST_FALL`)
 
 
 USUAL_STOP = StopRule()
@@ -375,10 +371,8 @@ def fit(
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
     Derivatives for the robot's own parameters, nearly linear, are computed once, or given as `J`, the whitened columns (n, m) of
-    the first m free parameters from a neighbouring fit. Those for effects are computed at every step. Of motion, all are corrected
-    by what each step showed, and computed again where a step fell short: those for effects first, then the robot's own. `refresh`
-    computes all again at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its
-    start.
+    the first m free parameters from a neighbouring fit. Those for effects are computed at every step. `refresh` computes all again
+    at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
@@ -389,15 +383,12 @@ def fit(
     if J is not None:
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
-    now, damping, own = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None]
-    derived = now if J is None else np.inf  # the cost where the derivatives for the robot's own parameters were computed
-    stale = True  # whether those for effects were computed before the last step
+    now, damping, own, moved = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
     for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
-        if stale or not objective.bends:
-            columns[:, moving], stale, behind = objective.jacobian(at, moving), False, False
+        columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
         H, g = penalty.normal_equations(x, columns, at.z)
-        better, whole, before, enough = None, damping, behind, max(objective.smallest_fall(stop, now), stop.worth)
+        better, whole, enough = None, damping, max(objective.smallest_fall(stop.tolerance * now), stop.worth)
         while better is None and damping < 1e4:
             d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, penalty.low - x, penalty.high - x)
             predicted_fall = -float(2.0 * g @ d + d @ H @ d)
@@ -407,24 +398,19 @@ def fit(
             damping *= 1.0 if better else 10.0
         fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
-            if objective.bends:
-                columns += _broyden(columns, better.model.vector() - x, better.z - at.z)
-            at, now, behind = better, penalty.cost(better), bool(moving)
+            at, now, moved = better, penalty.cost(better), True
             if fall > TRUSTED_FALL_SHARE * predicted_fall:
                 damping = max(0.1 * damping, 1e-6)
             if now - left * fall > stop.beat:
                 break
         slow = objective.bends and fall < SLOW_FALL_SHARE * predicted_fall
         if better is None or fall < enough or slow:
-            stale, damping = True, 1e-4 if before else damping
-            if before and left:
-                continue
-            if not (renewals and left and derived - now > enough):
+            if not (renewals and moved and left):
                 if slow and better is not None and fall >= enough:
                     continue
                 break
-            columns[:, own], derived, renewals, damping = objective.jacobian(at, own), now, renewals - 1, 1e-4
-    if refresh and (not objective.bends or derived - now > enough):
+            columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
+    if refresh:
         columns = objective.jacobian(at, range(len(model.free)))
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))
 
@@ -475,11 +461,6 @@ class _Penalty:
             D[:, i] = (self.cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
         H = columns.T @ columns + D.T @ D + np.diag(self.weight)
         return H, columns.T @ z + D.T @ cut + self.weight * (x - self.prior)
-
-
-def _broyden(columns: np.ndarray, d: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Return the least correction (n, n_free) that makes derivatives right for the last step: J d = change (Broyden 1965)."""
-    return np.outer(change - columns @ d, d / max(float(d @ d), 1e-300))
 
 
 def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

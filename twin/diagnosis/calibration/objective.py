@@ -29,7 +29,7 @@ def objective_of(
     first = Noise(rough, np.zeros(prepared.n_tendon), np.zeros(len(rough)), "start")
     none = [np.zeros((*y.shape, prepared.n_tendon)) for y in measured]
     rough_fit = Objective(prepared, fitted, Whitener(first, measured, none, command), settings.jobs)
-    start = fit(rough_fit, Model.base(twin.robot, twin), stop=StopRule(tolerance=1e-3, rough=True))
+    start = fit(rough_fit, Model.base(twin.robot, twin), stop=StopRule(tolerance=1e-3))
     unmeasured = rough_fit.predict(start.model.twin, start.evaluation.traces)[1]
     taut = sensitivity(_unslackened(prepared), fitted, start.model.twin, unmeasured, start.evaluation.traces)
     G = [g * _taut_share(prepared, k)[:, None, :] for g, k in zip(taut, fitted, strict=True)]
