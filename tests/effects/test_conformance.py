@@ -29,7 +29,8 @@ FIXED = {
     "sma_hysteresis", "sma_cooling", "backbone_creep", "backbone_precurvature", "stiffness_asymmetry", "stiffness_gradient",
     "temperature_softening", "base_tilt", "camera_misalignment", "tip_payload", "contact", "load_cell_gain", "load_cell_bias",
     "load_cell_drift", "load_cell_crosstalk", "sensor_gain", "sensor_drift", "sensor_hysteresis",
-    "drive_zero", "load_dependent_friction", "reflected_inertia", "actuator_gain", "joint_stiffness", "encoder_offset",
+    "drive_zero", "load_dependent_friction", "reflected_inertia", "actuator_gain", "joint_stiffness", "joint_stop",
+    "encoder_offset",
 }  # fmt: skip
 NEW = {
     "backbone_ageing",
@@ -98,7 +99,7 @@ LEG = (
     *(Channel(f"joint.{joint}.position", "output", "rad", 1e-3) for joint in ("hip", "knee")),
     *(Channel(f"site.foot_tip.{a}", "output", "m", 2e-4) for a in "xz"),
 )  # fmt: skip
-OF_MODELS = {"load friction", "joints", "encoders"}  # features that an MJCF's body alone has
+OF_MODELS = {"load friction", "joints", "encoders", "stops"}  # features that an MJCF's body alone has
 
 
 def stepped(name: str, start: float, size: float) -> Trial:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
+from tests.command_line import twin
 from tests.mechanics.mjcf.models import CAPSTAN, PENDULUM, robot
 from twin.body import Counts, Drive
 from twin.diagnosis import Settings, diagnose
@@ -199,9 +202,9 @@ UNCERTAIN = """[parameters]
 
 
 @jit
-def swing(time, command, F, presliding, out):
+def swing(time, command, F, presliding, stop, out):
     """Angles at `time` (n,) s: J q'' = kp (c - q) - (kv + d) q' - m g l sin q - F z, z' = q' - |q'| z / presliding, by Euler's
-    method in steps of 20 us, the rate first."""
+    method in steps of 20 us, the rate first; at the angle `stop` the rate is lost."""
     q, v, z, h = command[0], 0.0, 0.0, 2e-5
     inertia = J + M * L * L
     for i in range(-1, time.size - 1):
@@ -210,11 +213,13 @@ def swing(time, command, F, presliding, out):
             c = command[0] if i < 0 else command[i] + (command[i + 1] - command[i]) * k * h / (t1 - t0)
             v += h * (KP * (c - q) - (KV + D) * v - M * 9.81 * L * np.sin(q) - F * z) / inertia
             q += h * v
+            if q > stop:
+                q, v = stop, 0.0
             z += h * (v - abs(v) * z) / presliding
         out[i + 1] = q
 
 
-def day(folder: Path, F: float) -> Recording:
+def day(folder: Path, F: float, stop: float = 10.0) -> Recording:
     rng, channels = np.random.default_rng(5), (
         Channel("actuator.servo.ctrl", "input", "rad"), Channel("joint.hinge.position", "output", "rad", 1e-3),
     )  # fmt: skip
@@ -224,7 +229,7 @@ def day(folder: Path, F: float) -> Recording:
     ):
         command = size * np.sin(rate * time) * np.minimum(1.0, time)
         angle = np.empty_like(time)
-        swing(time, command, F, 1e-3, angle)
+        swing(time, command, F, 1e-3, stop, angle)
         angle += 1e-3 * rng.standard_normal(time.size)
         trials.append(Trial(f"{k}.csv", time, {"actuator.servo.ctrl": command, "joint.hinge.position": angle}, start=20.0 * k))
     return Recording(str(folder), "made", "simulation: by hand", None, channels, tuple(trials))
@@ -238,6 +243,36 @@ def test_friction_of_an_independent_servo_is_named_with_its_size(tmp_path: Path)
     assert law["torque_hinge"] == pytest.approx(0.1, rel=0.1)
     found.twin.save(tmp_path / "twin.toml")
     assert read_twin(tmp_path / "twin.toml").effects == found.twin.effects  # names of joints survive the file
+    # The report has the twin as an MJCF; the command writes the same from the report.
+    found.save(tmp_path / "report")
+    text = (tmp_path / "report/robot.xml").read_text()
+    number = next(line for line in text.splitlines() if "joint_friction: torque_hinge" in line)
+    assert re.fullmatch(r" *<!-- joint_friction: torque_hinge = 0\.\d+ \+- 0\.\d+ N\*m, probability [01]\.?\d* -->", number)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "report/robot.xml"))
+    assert model.joint("hinge").frictionloss[0] == law["torque_hinge"]
+    done = twin("export", "report", "--mjcf", "better", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "better/robot.xml").read_text() == text
+
+
+def test_export_says_what_it_needs(tmp_path: Path) -> None:
+    for arguments, said in (
+        (("tendon_leg",), "nothing to write; give a format with its folder, such as --mjcf better"),
+        (("continuum", "--mjcf", "better"), "robot 'continuum' is of family 'continuum'"),
+        (("nowhere", "--mjcf", "better"), "nowhere"),
+    ):
+        done = twin("export", *arguments, cwd=tmp_path)
+        assert done.returncode == 2
+        assert said in done.stderr
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_stop_of_an_independent_servo_is_named_with_its_place(tmp_path: Path) -> None:
+    robot(tmp_path, ARM, UNCERTAIN)
+    found = diagnose(day(tmp_path, 0.0, stop=0.5), settings=Settings(jobs=1))
+    assert [c.effect for c in found.claims] == ["joint_stop"]
+    # rad: the encoder's noise is 1e-3 and the stop is met in six trials; a soft stop gives by as much
+    assert found.claims[0].parameters["upper_hinge"].value == pytest.approx(0.5, abs=2e-3)
 
 
 def test_a_servo_without_a_fault_is_noise(tmp_path: Path) -> None:

@@ -85,6 +85,7 @@ class Body:
         friction of joints  a joint may rub                    load friction  a gear may rub with its load
         joints        inertia and stiffness of joints change  servos         strengths of actuators change
         encoders      joints' angles are read                 start          a trial may start from a pose, and settle
+        stops         joints may end earlier
         controls      actuators' controls drive it      drive zeros    drives have a zero and a gain of their own
 
     `payload_places` are the sites and bodies that a declared mass may hang at.
@@ -135,6 +136,10 @@ class Body:
 
     def add_joint_inertia(self, inertia: np.ndarray) -> None:
         """Add inertias (n_joint,) kg m^2 or kg to the joints."""
+        raise self._unchangeable("joints")
+
+    def limit_joints(self, lower: np.ndarray, upper: np.ndarray) -> None:
+        """Keep the joints between stops (n_joint,) rad or m, hard ones, where these are nearer than their own."""
         raise self._unchangeable("joints")
 
     def add_joint_stiffness(self, stiffness: np.ndarray) -> None:

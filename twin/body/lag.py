@@ -9,6 +9,33 @@ from twin.foundation.compiled import jit
 
 
 @jit
+def lag_over(x, v, cubic, t, lag, inertia):
+    """Return x and x' after t s of the lag that `lag_response` solves, from x and x' = v, behind one `cubic` (4,)."""
+    b = inertia * lag * lag
+    second, third = lag * lag - b, lag * (lag * lag - 2.0 * b)
+    jerk, bend, slope, c = 6.0 * cubic[0], 2.0 * cubic[1], cubic[2], cubic[3]
+    e = x - (c - lag * slope + second * bend - third * jerk)
+    u = v - (slope - lag * bend + second * jerk)
+    c += t * (slope + t * (bend / 2.0 + t * jerk / 6.0))
+    slope += t * (bend + t * jerk / 2.0)
+    bend += t * jerk
+    if inertia == 0.0:
+        e *= np.exp(-t / lag)
+    else:
+        s = 0.5 * lag / b
+        w = np.sqrt(abs(s * s - 1.0 / b))
+        if w * t < 1e-6:  # critically damped: the error is of the order of its square
+            C, S = np.exp(-s * t), t * np.exp(-s * t)
+        elif s * s > 1.0 / b:
+            fast, slow = np.exp(-(s + w) * t), np.exp(-t / (b * (s + w)))
+            C, S = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
+        else:
+            C, S = np.exp(-s * t) * np.cos(w * t), np.exp(-s * t) * np.sin(w * t) / w
+        e, u = e * C + (u + s * e) * S, u * C - (e / b + s * u) * S
+    return c - lag * slope + second * bend - third * jerk + e, slope - lag * bend + second * jerk + u
+
+
+@jit
 def lag_response(time, cubics, lag, inertia, delivered):
     """Solve inertia lag^2 x'' + lag x' + x = c exactly, from rest at the first of `time` (n,), and write x to `delivered` (n, m).
 
@@ -17,34 +44,11 @@ def lag_response(time, cubics, lag, inertia, delivered):
     as exp(-t / a) in first order, and in second order as exp(-s t) (e C + (e' + s e) S) with s = a / (2 b), w^2 = s^2 - 1 / b,
     C = cosh(w t), S = sinh(w t) / w.
     """
-    b = inertia * lag * lag
-    second, third = lag * lag - b, lag * (lag * lag - 2.0 * b)
     for j in range(cubics.shape[2]):
         x, v = cubics[3, 0, j], 0.0
         delivered[0, j] = x
         for i in range(1, time.size):
-            t = time[i] - time[i - 1]
-            jerk, bend, slope, c = 6.0 * cubics[0, i - 1, j], 2.0 * cubics[1, i - 1, j], cubics[2, i - 1, j], cubics[3, i - 1, j]
-            e = x - (c - lag * slope + second * bend - third * jerk)
-            u = v - (slope - lag * bend + second * jerk)
-            c += t * (slope + t * (bend / 2.0 + t * jerk / 6.0))
-            slope += t * (bend + t * jerk / 2.0)
-            bend += t * jerk
-            if inertia == 0.0:
-                e *= np.exp(-t / lag)
-            else:
-                s = 0.5 * lag / b
-                w = np.sqrt(abs(s * s - 1.0 / b))
-                if w * t < 1e-6:  # critically damped: the error is of the order of its square
-                    C, S = np.exp(-s * t), t * np.exp(-s * t)
-                elif s * s > 1.0 / b:
-                    fast, slow = np.exp(-(s + w) * t), np.exp(-t / (b * (s + w)))
-                    C, S = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
-                else:
-                    C, S = np.exp(-s * t) * np.cos(w * t), np.exp(-s * t) * np.sin(w * t) / w
-                e, u = e * C + (u + s * e) * S, u * C - (e / b + s * u) * S
-            x = c - lag * slope + second * bend - third * jerk + e
-            v = slope - lag * bend + second * jerk + u
+            x, v = lag_over(x, v, cubics[:, i - 1, j], time[i] - time[i - 1], lag, inertia)
             delivered[i, j] = x
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
+import mujoco
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.body.lag import lag_response
+from twin.body.lag import lag_over, lag_response
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
@@ -29,6 +30,25 @@ def lag_held_current(time, command, lag, delivered):
             delivered[i, j] = np.sqrt(max(0.0, square))
             x = c + d * np.exp(-a)
         delivered[-1, j] = x
+
+
+class LaggingSteps:
+    """Commands (nu,) that come every `step` s and run straight between, behind a lag (`lag_response`), from rest under `first`."""
+
+    def __init__(self, step: float, lag: float, inertia: float, first: np.ndarray) -> None:
+        self._step, self._lag, self._inertia = step, lag, inertia
+        self._before: np.ndarray | None = None
+        self._x, self._v = np.array(first, float), np.zeros(len(first))
+
+    def __call__(self, command: np.ndarray) -> np.ndarray:
+        if self._before is None:
+            self._x[:] = command
+        else:
+            for k, slope in enumerate((command - self._before) / self._step):
+                cubic = np.array([0.0, 0.0, slope, self._before[k]])
+                self._x[k], self._v[k] = lag_over(self._x[k], self._v[k], cubic, self._step, self._lag, self._inertia)
+        self._before = np.array(command, float)
+        return self._x.copy()
 
 
 class ActuatorLag(Effect):
@@ -77,6 +97,23 @@ class ActuatorLag(Effect):
                 lag_held_current(np.asarray(command.time, float), np.ascontiguousarray(command.current), self["time"], current)
             return command.with_commands(lambda c: self._lagged(command, c), current=current)
         return command
+
+    def write(self, spec: mujoco.MjSpec) -> bool:
+        """Write the first order as a filter of actuators without dynamics, of commands that MuJoCo holds from step to step."""
+        for actuator in spec.actuators:
+            if actuator.dyntype == mujoco.mjtDyn.mjDYN_NONE and self["time"] > 0.0:
+                constants = np.zeros(len(actuator.dynprm))
+                constants[0] = self["time"]
+                actuator.dyntype, actuator.dynprm = mujoco.mjtDyn.mjDYN_FILTEREXACT, constants
+        return False
+
+    def erase(self, spec: mujoco.MjSpec) -> None:
+        for actuator in spec.actuators:
+            if actuator.dyntype == mujoco.mjtDyn.mjDYN_FILTEREXACT and actuator.dynprm[0] == self["time"]:
+                actuator.dyntype = mujoco.mjtDyn.mjDYN_NONE
+
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        return LaggingSteps(step, self["time"], self["inertia"], first) if self["time"] > 0.0 else lambda command: command
 
     def _lagged(self, signals: Signals, command: np.ndarray) -> np.ndarray:
         out = np.empty_like(command)

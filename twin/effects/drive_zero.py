@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 
+import mujoco
 import numpy as np
 
 from twin.body import Signals
 from twin.effects.base.effect import Effect, FitStart
 from twin.foundation.parameters import Parameter
+
+AFFINE = (mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE)
 
 
 class DriveZero(Effect):
@@ -52,6 +55,20 @@ class DriveZero(Effect):
     @classmethod
     def form(cls, free: Collection[str]) -> str:
         return "alike" if "length" in free else "one" if len(free) == 1 else "each"
+
+    def write(self, spec: mujoco.MjSpec) -> bool:
+        """Write gain (c + zero) + bias, of controls limited to [low - zero, high - zero], where all forces are gain c + bias."""
+        if any(a.gaintype != mujoco.mjtGain.mjGAIN_FIXED or a.biastype not in AFFINE for a in spec.actuators):
+            return False
+        for actuator, zero in zip(spec.actuators, self.per_tendon_values("zero"), strict=True):
+            bias = np.array(actuator.biasprm)
+            bias[0] += actuator.gainprm[0] * zero
+            actuator.biasprm, actuator.biastype = bias, mujoco.mjtBias.mjBIAS_AFFINE
+            actuator.ctrlrange = np.array(actuator.ctrlrange) - zero
+        return True
+
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda command: command + self.per_tendon_values("zero")
 
     def command(self, reported: Signals) -> Signals:
         zero, length = self.per_tendon_values("zero"), self._lengths()

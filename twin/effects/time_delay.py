@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from collections.abc import Callable
+
+import mujoco
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
 from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
+
+STRAIGHT = 1  # interpolation of an MJCF's delayed commands
+
+
+class DelayedSteps:
+    """Commands (nu,) that come every `step` s, late by `delay` s and straight between steps; before the first they were `first`."""
+
+    def __init__(self, step: float, delay: float, first: np.ndarray) -> None:
+        self._steps = delay / step
+        self._late = deque([np.array(first, float)] * math.ceil(self._steps - 1e-9))
+
+    def __call__(self, command: np.ndarray) -> np.ndarray:
+        if not self._late:
+            return command
+        self._late.append(np.array(command, float))
+        oldest = self._late.popleft()
+        return oldest + (len(self._late) - self._steps) * (self._late[0] - oldest)
 
 
 class TimeDelay(Effect):
@@ -37,6 +59,24 @@ class TimeDelay(Effect):
             return reported
         earlier = np.clip(t - self["delay"], t[0], t[-1])
         return reported.with_commands(lambda c: interpolate_commands(reported, c)(earlier), current=self._heating(reported))
+
+    def write(self, spec: mujoco.MjSpec) -> bool:
+        """Write a delay of all actuators, straight between steps. Nothing of a log that runs ahead, which no model does."""
+        if self["delay"] <= 0.0:
+            return True
+        for actuator in spec.actuators:
+            actuator.delay += self["delay"]
+            actuator.nsample = max(int(actuator.nsample), math.ceil(actuator.delay / spec.option.timestep) + 2)
+            actuator.interp = STRAIGHT
+        return False
+
+    def erase(self, spec: mujoco.MjSpec) -> None:
+        for actuator in spec.actuators:
+            actuator.delay -= self["delay"]
+            actuator.nsample = actuator.nsample if actuator.delay > 0.0 else 0
+
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+        return DelayedSteps(step, self["delay"], first) if self["delay"] >= 0.0 else None
 
     def _heating(self, reported: Signals) -> np.ndarray:
         """Return the shifted currents, constant over each row, that heat as much; zero before the log."""

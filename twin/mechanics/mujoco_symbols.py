@@ -9,10 +9,10 @@ import llvmlite.binding as llvm
 import mujoco
 from numba.core import types
 
-_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*.so*"), None) or next(
+MUJOCO_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*.so*"), None) or next(
     Path(mujoco.__file__).parent.glob("*mujoco*.d*l*")
 )
-llvm.load_library_permanently(str(_LIBRARY))
+llvm.load_library_permanently(str(MUJOCO_LIBRARY))
 
 _MODEL_DATA = types.void(types.uintp, types.uintp)
 mj_kinematics = types.ExternalFunction("mj_kinematics", _MODEL_DATA)

@@ -40,14 +40,20 @@ def read_twin(source: str | Path) -> Twin:
 
 
 def standard_errors(source: str | Path) -> dict[str, float]:
-    """Return the standard errors (SI) of a twin's parameters, where its file has them; none for a robot's name alone."""
+    """Return the standard errors (SI) of a twin's parameters, and as EFFECT.PARAMETER of its effects', where its file has them.
+
+    There are none for a robot's name alone.
+    """
     path = Path(source)
     path = path / "twin.toml" if is_file(path / "twin.toml") else path
     if path.suffix != ".toml":
         return {}
     with open_toml(path, TWIN_FORMAT) as table:
         file = validate_table(TwinFile, table, "", [])
-    entries = file.parameters if file is not None else {}
+    entries: dict[str, Any] = dict(file.parameters) if file is not None else {}
+    for effect in file.effect if file is not None else []:
+        if isinstance(effect, dict) and isinstance(effect.get("parameters"), dict):
+            entries |= {f"{effect.get('id')}.{n}": e for n, e in effect["parameters"].items()}
     return {n: float(e["std"]) for n, e in entries.items() if isinstance(e, dict) and isinstance(e.get("std"), float)}
 
 

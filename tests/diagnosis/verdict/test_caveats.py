@@ -101,3 +101,11 @@ def test_what_no_known_trial_measured_is_not_predicted() -> None:
     (found,) = predict_by_polynomial(blind, [1, 2], [0])
     assert np.isnan(found[:, 0]).all()
     assert np.isfinite(found[:, 1:]).all()
+
+
+def test_what_one_trial_alone_measured_is_no_reason_to_stop() -> None:
+    """Left out in turn, that trial leaves no row of these outputs."""
+    day = recorded(TWICE, lag=0.0, drift=0.0, noise=1e-9)
+    alone = [np.where((np.arange(y.shape[1]) == 0) & (k != 1), np.nan, y) for k, y in enumerate(day.measured)]
+    (found,) = predict_by_polynomial(replace(day, measured=tuple(alone)), [0, 1, 2], [0])
+    assert np.isfinite(found).all()

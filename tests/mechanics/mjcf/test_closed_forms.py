@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from tests.mechanics.mjcf.models import CAPSTAN, PENDULUM, robot, solved
-from twin.body import Loads, Route, Rubbing, Start
+from twin.body import Drive, Loads, Problem, Route, Rubbing, Start
+from twin.effects import JointStop
 from twin.foundation.errors import DataError
 from twin.mechanics.mjcf import ModelBody, half_step
+from twin.robots import Robot
 
 G, LENGTH, MASS = 9.81, 0.2, 0.5  # m/s^2, m, kg of the pendulum
 
@@ -98,6 +100,42 @@ def test_load_friction_grows_with_the_torque_of_the_drive(tmp_path: Path) -> Non
     u = np.interp(time, [0, 6, 8], [0.0, 0.6, 0.6])[:, None]
     angle = solved(rod, time, u, rub, loads=Loads(np.zeros(3)), start=Start(0.2)).others["joint angle"][:, 0]
     assert k * angle[-1] == pytest.approx(0.6 * (1 - c), rel=0.02)
+
+
+def stopped(rod: Robot, time: np.ndarray, u: np.ndarray, start: Start, **stops: float) -> np.ndarray:
+    """The angle (n,) rad of a rod without weight under a torque u (n,) N m, with stops."""
+    body = rod.build()
+    JointStop(stops, rod.n_tendon).edit(body)
+    problem = Problem(time, u[:, None], Loads(np.zeros(3)), Route(), (Drive.CONTROL,), start=start)
+    return rod.solver(body).solve(problem).others["joint angle"][:, 0]
+
+
+def test_a_joint_ends_at_its_stops(tmp_path: Path) -> None:
+    """On a spring k without gravity, slowly pushed by u: q = clip(u / k, lower, upper); the nearer of two stops holds."""
+    k, time = 0.8, np.arange(0.0, 60.0, 0.05)
+    u = 0.6 * np.sin(2 * np.pi * time / 60.0)
+    free = robot(tmp_path / "free", PENDULUM.format(joint=f' stiffness="{k}" damping="0.05"', key=""))
+    near = robot(tmp_path / "near", PENDULUM.format(joint=f' stiffness="{k}" damping="0.05" range="-30 15"', key=""))
+    for rod, upper in ((free, 0.4), (near, np.deg2rad(15.0))):
+        angle = stopped(rod, time, u, Start(0.5), upper_hinge=0.4, lower_hinge=-0.2)
+        away = np.abs(angle - np.clip(u / k, -0.2, upper))
+        # rad: it lags by 0.05 / 0.8 s behind 0.08 rad/s, and swings by 0.08 / 6.3 as it is set going: 0.02; a stop is to be hard
+        assert away.max() < 0.025
+        assert away[(u / k > upper + 0.05) | (u / k < -0.25)].max() < 1e-3
+    assert np.ptp(stopped(free, time, u, Start(0.5))) == pytest.approx(1.5, abs=0.02)  # without stops
+
+
+def test_a_stop_does_not_throw_back(tmp_path: Path) -> None:
+    """Set going by a spring, the rod stays where it meets the stop until the spring pulls it back: it does not bounce."""
+    key = '<keyframe><key qpos="-0.3"/></keyframe>'
+    rod = robot(tmp_path, PENDULUM.format(joint=' stiffness="0.8" springref="20"', key=key))
+    time = np.arange(0.0, 2.0, 0.01)
+    angle = stopped(rod, time, np.zeros(len(time)), Start(0.0), upper_hinge=0.1)  # its spring rests at 0.35 rad, beyond the stop
+    met = int(np.argmax(angle > 0.1 - 1e-3))
+    # The spring holds it at the stop with 10 rad/s^2: thrown back with a tenth of its 4 rad/s it would go back by 0.4^2 / 20 rad.
+    assert 0 < met < len(time) // 2
+    assert np.abs(angle[met:] - 0.1).max() < 0.008
+    assert angle[-1] == pytest.approx(0.1, abs=1e-4)
 
 
 @pytest.mark.parametrize(("way", "sign"), [("pulled", -1.0), ("released", 1.0)])

@@ -15,20 +15,32 @@ from twin.foundation.errors import DataError
 class Export:
     """Write what was measured or learnt in the formats of other programs."""
 
-    set_or_report: Positional[Annotated[Path, arg(help="folder of a measurement set: measured, simulated or predicted")]]
+    set_or_report: Positional[
+        Annotated[Path, arg(help="folder of a measurement set; for --mjcf a report's folder, a twin.toml or the folder of a robot")]
+    ]
     mcap: Annotated[Path | None, arg(help="new MCAP file for the set: ROS 2 messages, SI")] = None
     lerobot: Annotated[Path | None, arg(help="new folder for the set as a LeRobot v3 dataset, SI")] = None
     parquet: Annotated[Path | None, arg(help="new folder for the set with a Parquet table a trial, its own units")] = None
-
+    mjcf: Annotated[Path | None, arg(help="new folder for the twin as a better MJCF (robots of family mjcf)")] = None
     rate: Annotated[
         float | None, arg(help="resample for --lerobot to this many frames a second: inputs are held, outputs interpolated")
     ] = None
 
     def run(self) -> None:
         written = export_set(self.set_or_report, {"mcap": self.mcap, "lerobot": self.lerobot, "parquet": self.parquet}, self.rate)
+        if self.mjcf is not None:
+            written = [*written, export_model(self.set_or_report, self.mjcf)]
         if not written:
             raise DataError(
-                "nothing to write; give a format with its target, such as --mcap FILE, --lerobot FOLDER or --parquet FOLDER"
+                "nothing to write; give a format with its target: --mcap FILE, --lerobot FOLDER, --parquet FOLDER or --mjcf FOLDER"
             )
         for path in written:
             out.print(f"written: {path}", highlight=False, markup=False)
+
+
+def export_model(source: Path, folder: Path) -> Path:
+    """Write the twin of a report, a twin.toml or a robot's folder as an MJCF to `folder`; return the file."""
+    from twin.prediction.mjcf import origins_of, write_mjcf
+    from twin.prediction.storage import read_twin
+
+    return write_mjcf(read_twin(str(source)), folder, origins_of(source))

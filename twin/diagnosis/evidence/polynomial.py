@@ -72,7 +72,9 @@ def _left_out_errors(products: Sequence[_Products], ridge: float) -> np.ndarray:
 
 
 def _ridge(gram: np.ndarray, moment: np.ndarray, ridge: float) -> np.ndarray:
-    """Return weights (p, m); the constant, whose square sum is the number of rows, is not shrunk."""
+    """Return weights (p, m), zero without rows; the constant, whose square sum is the number of rows, is not shrunk."""
+    if not gram[0, 0] > 0.5:  # less than one row: one trial alone measures these outputs, and it is left out
+        return np.zeros_like(moment)
     shrink = ridge * gram[0, 0] * np.eye(len(gram))
     shrink[0, 0] = 1e-12
     return np.linalg.solve(gram + shrink, moment)

@@ -13,17 +13,21 @@ An effect acts in the following places, in the order of the signal. It has no st
     sense     true output -> reported output    (frame, delay, drift)
 
 An effect that acts in `sense` only needs no new simulation: it is applied to the existing prediction.
+
+In an exported MJCF (`twin.prediction.mjcf`) effects that act in `edit` and `surround` are numbers of the model, friction is known
+from `route`, and readings go through `sense`. One that acts in `command` or `drive` says how by `write` and `by_step`.
 """
 
 from __future__ import annotations
 
 import re
 from abc import ABC
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import ClassVar
 
+import mujoco
 import numpy as np
 
 from twin.body import Body, Creep, Loads, Route, Signals
@@ -187,6 +191,22 @@ class Effect(ABC):
     def acts_on_robot(self) -> bool:
         """Whether the effect acts on the robot or its drives, not only on reported outputs."""
         return self.acts_in("command", "drive", "edit", "soften", "surround", "route", "spring", "deform")
+
+    # ---- in an MJCF that is stepped -----------------------------------------------------------------------------------
+
+    def write(self, spec: mujoco.MjSpec) -> bool:
+        """Write into an MJCF what it can say of a law of commands; return whether that is all of it."""
+        return False
+
+    def erase(self, spec: mujoco.MjSpec) -> None:
+        """Take out of an MJCF what `write` put there in place of a law that is stepped."""
+
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+        """Return what makes delivered commands (nu,) of those given, one call every `step` s from rest under the `first`.
+
+        None for an effect that does not act on commands, or not in time order.
+        """
+        return None
 
     # ---- the places, in the order of the signal -----------------------------------------------------------------------
 

@@ -3,13 +3,16 @@
 loading.py   an MJCF, or why not         numbers.py   its numbers by address
 body.py      channels and changes        poses.py     starts and payloads
 solver.py    trials                      stepping.py  the compiled loop
-friction.py  joints and tendons that rub
+friction.py  joints and tendons that rub        written.py    numbers back into the MJCF
+precise_xml.py  an MJCF as text to the last digit
 """
 
 from twin.mechanics.mjcf.body import ModelBody, element_senses, payload_places, tip_site
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
-from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, half_step
+from twin.mechanics.mjcf.precise_xml import WrittenModel, exact_text, with_comments
+from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
+from twin.mechanics.mjcf.written import check_same, name_element, written_model
 
 __all__ = [
     "ATTRIBUTES",
@@ -20,12 +23,19 @@ __all__ = [
     "LoadedModel",
     "ModelBody",
     "ModelSolver",
+    "Motion",
+    "WrittenModel",
     "applies",
+    "check_same",
     "element_senses",
+    "exact_text",
     "half_step",
     "load_model",
+    "name_element",
     "payload_places",
     "si_unit",
     "slides",
     "tip_site",
+    "with_comments",
+    "written_model",
 ]

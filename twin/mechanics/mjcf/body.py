@@ -11,10 +11,13 @@ import numpy as np
 
 from twin.body import Body, Sense
 from twin.body.hinge_chain import REFERENCE_SIZE
+from twin.effects.joint_stop import NO_STOP
 from twin.foundation.parameters import Size
 from twin.mechanics.mjcf.loading import SCALAR_JOINTS, LoadedModel
 from twin.mechanics.mjcf.numbers import slides
 
+LEAST_TRAVEL = 1e-4  # rad or m between a joint's stops
+HARD_STOP = ((0.004, 1.0), (0.99, 0.999, 1e-4, 0.5, 2.0))  # solref, solimp: without bounce, milliradians soft under a light link
 SPRING_SWING = 0.5  # rad (or a tenth of that in m): the deflection of a spring that gives a joint its scale of torque
 # group of signals of what turns, of what slides or pulls, and their SI units
 _JOINT_GROUPS = {
@@ -107,6 +110,15 @@ class ModelBody(Body):
             if total > 0.0:
                 model.qpos_spring[at] = (own * model.qpos_spring[at] + more * model.qpos0[at]) / total
                 model.jnt_stiffness[joint] = total
+
+    def limit_joints(self, lower: np.ndarray, upper: np.ndarray) -> None:
+        model = self.model
+        for joint, low, high in zip(self.joints, lower, upper, strict=True):
+            own = model.jnt_range[joint].copy() if model.jnt_limited[joint] else np.array([-np.inf, np.inf])
+            new = np.array([max(own[0], low), min(own[1], high)])
+            if (new != own).any() and (np.abs(new) < NO_STOP).any():
+                model.jnt_limited[joint], model.jnt_range[joint] = 1, [new[0], max(new[1], new[0] + LEAST_TRAVEL)]
+                model.jnt_solref[joint], model.jnt_solimp[joint] = HARD_STOP
 
     def scale_actuators(self, share: np.ndarray) -> None:
         self.model.actuator_gainprm[:, :3] *= share[:, None]

@@ -73,10 +73,14 @@ class Paths(NamedTuple):
 
 
 class Slip(NamedTuple):
-    """Slip states of tendons' points, and the paths beyond them in the step before."""
+    """Slip states of tendons' points, the paths beyond them in the step before, and room to work in."""
 
     z: np.ndarray  # (ntendon, most points)
     beyond: np.ndarray  # (ntendon, most points) m
+    body: np.ndarray  # (most points,) of each point of one tendon
+    u: np.ndarray  # (most points, 3) direction to the next point
+    length: np.ndarray  # (most points,) m to the next point
+    turn: np.ndarray  # (most points,) rad at each point
 
 
 @jit_internal
@@ -149,12 +153,11 @@ def tendon_forces(pulled, law, tree, paths, slip, started, work):
     Advances the slip states by the travel since the step before, unless not yet `started`.
     """
     (t, T), (mu, presliding, h), (gradient, applied, damping) = pulled, law, work
-    nv = applied.size
-    body = np.empty(paths.ten_wrapnum[t], np.int64)
+    nv, (body, u, length, turn) = applied.size, (slip.body, slip.u, slip.length, slip.turn)
     n = path_bodies(t, tree, paths, body)
     first = paths.ten_wrapadr[t]
-    u, length = np.zeros((n, 3)), np.zeros(n)
     for k in range(n - 1):
+        turn[k], length[k], u[k, 0], u[k, 1], u[k, 2] = 0.0, 0.0, 0.0, 0.0, 0.0
         if body[k] == PULLEY_POINT or body[k + 1] == PULLEY_POINT:
             continue
         for c in range(3):
@@ -164,7 +167,7 @@ def tendon_forces(pulled, law, tree, paths, slip, started, work):
             u[k, c] /= max(length[k], 1e-12)
     for i in range(nv):
         gradient[i] = 0.0
-    beyond, extra = 0.0, np.zeros((n, 2))  # turn of each point, and how far it is from sliding
+    beyond = 0.0
     for k in range(n - 2, 0, -1):
         beyond += length[k]
         if body[k] != body[k + 1]:
@@ -172,7 +175,7 @@ def tendon_forces(pulled, law, tree, paths, slip, started, work):
             add_point(paths.wrap_xpos[first + k], u[k], -1.0, body[k], tree, paths, gradient)
         dot = u[k - 1, 0] * u[k, 0] + u[k - 1, 1] * u[k, 1] + u[k - 1, 2] * u[k, 2]
         if length[k] > 0.0 and length[k - 1] > 0.0:
-            extra[k, 0] = math.acos(min(1.0, max(-1.0, dot)))
+            turn[k] = math.acos(min(1.0, max(-1.0, dot)))
         travel = slip.beyond[t, k] - beyond if started else 0.0
         slip.beyond[t, k] = beyond
         s = 1.0 if travel > 0.0 else -1.0 if travel < 0.0 else 0.0
@@ -182,12 +185,10 @@ def tendon_forces(pulled, law, tree, paths, slip, started, work):
             for i in range(nv):
                 size += abs(gradient[i])
             for i in range(nv):
-                damping[i] += (
-                    TENDON_SHARE * h * T * mu * extra[k, 0] * (1.0 - s * slip.z[t, k]) / presliding * abs(gradient[i]) * size
-                )
+                damping[i] += TENDON_SHARE * h * T * mu * turn[k] * (1.0 - s * slip.z[t, k]) / presliding * abs(gradient[i]) * size
     lost = 0.0
     for k in range(1, n - 1):
-        lost += mu * slip.z[t, k] * extra[k, 0]
+        lost += mu * slip.z[t, k] * turn[k]
         if body[k] != body[k + 1] and T > 0.0:
             less = T * (1.0 - math.exp(-min(lost, LARGEST_LOSS)))
             add_point(paths.wrap_xpos[first + k + 1], u[k], less, body[k + 1], tree, paths, applied)

@@ -35,6 +35,32 @@ class _Compiled:
     settled: dict[bytes, tuple[np.ndarray, Memory]] = field(default_factory=dict)  # states where trials begin
 
 
+@dataclass(frozen=True)
+class Motion:
+    """A model in motion under its loads and laws, in steps of `step` s; `stands` is whether it has a state to go on from."""
+
+    under: _Compiled
+    laws: Laws
+    memory: Memory
+    step: float
+    stands: bool
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The model that is stepped."""
+        return self.under.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """Its state."""
+        return self.under.data
+
+    def advance(self, commands: np.ndarray, rows: np.ndarray, out: np.ndarray) -> int:
+        """Step through commands (n, nu) as `twin.mechanics.mjcf.stepping.run`; return the number of steps."""
+        now = self.under
+        return run((now.model._address, now.data._address, self.step), now.views, self.laws, self.memory, commands, rows, out)
+
+
 class ModelSolver:
     """Simulates trials of an MJCF. Its statics are its dynamics: what is slow is stepped like what is fast.
 
@@ -51,19 +77,25 @@ class ModelSolver:
 
     def solve(self, problem: Problem) -> Solution:
         """Simulate a trial. Raises DataError for a payload or a start that the model does not have."""
-        now = self._under(problem.loads)
-        laws = _laws(now, self.body, problem.route)
         time, h, rows = _grid(problem.time, self.body.longest_step)
         commands = np.stack([np.interp(time, problem.time, u) for u in np.asarray(problem.command, float).T], axis=1)
-        now.model.opt.timestep = h
-        memory, stands = self._settled(now, laws, problem, h, commands[:1])
+        motion = self.begin(problem, h, commands[0])
+        now = motion.under
         out = np.full((len(time) if rows is None else len(problem.time), _width(now)), np.nan)
         each = np.append(np.arange(len(time)) if rows is None else rows, -1)
         commands = np.vstack([commands, commands[-1:]])
-        done = run((now.model._address, now.data._address, h), now.views, laws, memory, commands, each, out) if stands else 0
+        done = motion.advance(commands, each, out) if motion.stands else 0
         if rows is None:
             out = np.stack([np.interp(problem.time, time, column) for column in out.T], axis=1)
         return self._solution(out, now, done == len(commands))
+
+    def begin(self, problem: Problem, h: float, first: np.ndarray) -> Motion:
+        """Return a problem's motion in steps of h s where it begins: settled under the `first` command (nu,). Raises as `solve`."""
+        now = self._under(problem.loads)
+        laws = _laws(now, self.body, problem.route)
+        now.model.opt.timestep = h
+        memory, stands = self._settled(now, laws, problem, h, first[None])
+        return Motion(now, laws, memory, h, stands)
 
     def _settled(self, now: _Compiled, laws: Laws, problem: Problem, h: float, first: np.ndarray) -> tuple[Memory, bool]:
         """Settle under the `first` command (1, nu), or take what was settled before; return the laws' memory and whether it stands.
@@ -87,13 +119,18 @@ class ModelSolver:
         mujoco.mj_resetData(now.model, now.data)
         mujoco.mj_setState(now.model, now.data, state, _WHOLE_STATE)
         mujoco.mj_forward(now.model, now.data)
-        slip = Slip(memory.slip.z.copy(), memory.slip.beyond.copy())  # type: ignore[attr-defined]
-        copied = Memory(memory.z.copy(), memory.before.copy(), slip, memory.started.copy())
+        slip = memory.slip._replace(z=memory.slip.z.copy(), beyond=memory.slip.beyond.copy())  # type: ignore[attr-defined]
+        copied = memory._replace(z=memory.z.copy(), before=memory.before.copy(), slip=slip, started=memory.started.copy(),
+                                 **_at_rest(now.model))  # fmt: skip
         rates = now.data.qvel
         return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
 
+    def loaded_model(self, loads: Loads) -> mujoco.MjModel:
+        """Return a copy of the model that is stepped under these loads."""
+        return copy(self._under(loads).model)
+
     def _under(self, loads: Loads) -> _Compiled:
-        """Return the model with the loads' gravity, payloads and force."""
+        """Return the model with the loads' gravity and payloads."""
         body = self.body
         tip = [(body.loaded.names("site")[body.tip], loads.payload)] if loads.payload and body.tip >= 0 else []
         masses = [*loads.payloads, *tip]
@@ -124,7 +161,12 @@ class ModelSolver:
         angle, speed, effort = found["qpos"][:, qpos], found["qvel"][:, dof], found["qfrc_actuator"][:, dof]
         length, force = found["actuator_length"], found["actuator_force"]
         others = {"joint angle": angle, "joint shift": angle, "joint rate": speed, "joint speed": speed, "joint torque": effort}
-        others |= {"joint force": effort, "actuator angle": length, "actuator length": length}
+        others |= {
+            "joints": angle[:, list(self.body.joints)],
+            "joint force": effort,
+            "actuator angle": length,
+            "actuator length": length,
+        }
         others |= {"actuator rate": found["actuator_velocity"], "actuator speed": found["actuator_velocity"]}
         others |= {"actuator torque": force, "actuator force": force, "tendon length": found["ten_length"]}
         others |= {"tendon speed": found["ten_velocity"], "tendon tension": force @ now.pull.T + _own_tension(model, found)}
@@ -203,9 +245,18 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
 def _memory(now: _Compiled, laws: Laws) -> Memory:
     """Return the laws' memory of a body at its start: nothing slips, no bristle is bent."""
     points = 2 * int(now.model.tendon_num.max(initial=0)) + 2
-    slip = Slip(np.zeros((now.model.ntendon, points)), np.zeros((now.model.ntendon, points)))
+    each, room = (
+        (now.model.ntendon, points),
+        (np.empty(points, np.int64), np.empty((points, 3)), np.empty(points), np.empty(points)),
+    )
+    slip = Slip(np.zeros(each), np.zeros(each), *room)
     before = now.data.qpos[laws.joints.qpos].copy()  # type: ignore[attr-defined]
-    return Memory(np.zeros(len(before)), before, slip, np.zeros(1, bool))
+    return Memory(np.zeros(len(before)), before, slip, np.zeros(1, bool), **_at_rest(now.model))
+
+
+def _at_rest(model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """Return what is remembered of a step before where there is none."""
+    return {"raised": np.zeros(model.nv), "rate": np.zeros(model.nv), "act_rate": np.zeros(model.nu), "moving": np.zeros(1, bool)}
 
 
 def _grid(time: np.ndarray, longest: float) -> tuple[np.ndarray, float, np.ndarray | None]:

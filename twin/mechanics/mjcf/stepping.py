@@ -47,12 +47,16 @@ class Laws(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the laws remember from step to step."""
+    """What is remembered from step to step: the states of the laws, and the rates and the added damping of the step before."""
 
     z: np.ndarray  # (n_joint,)
     before: np.ndarray  # (n_joint,)
     slip: object
     started: np.ndarray  # (1,) whether tendons' paths are those of a step before
+    raised: np.ndarray  # (nv,) N m s/rad, by what sticks
+    rate: np.ndarray  # (nv,)
+    act_rate: np.ndarray  # (nu,)
+    moving: np.ndarray  # (1,) whether these rates are those of a step before
 
 
 @jit_internal
@@ -121,8 +125,7 @@ def run(engine, views, laws, memory, commands, rows, out):
     """
     model, data, h = engine
     nv, nt = views.qvel.size, laws.pull.shape[0]
-    own, raised, gradient, slow = views.damping.copy(), np.zeros(nv), np.zeros(nv), 0
-    before, before_act = np.zeros(nv), np.zeros(views.ctrl.size)
+    own, raised, gradient, slow = views.damping.copy(), memory.raised, np.zeros(nv), 0
     mu = laws.mu.max() if nt else 0.0
     settling, last = rows.size == 0, -1
     done = commands.shape[0]
@@ -149,7 +152,8 @@ def run(engine, views, laws, memory, commands, rows, out):
                 law, work = (laws.mu[t], laws.presliding, h), (gradient, views.applied, raised)
                 tendon_forces((t, T), law, laws.tree, laws.paths, memory.slip, memory.started[0], work)
             memory.started[0] = True
-        center_damping(views, own, before, before_act, i > 0, views.applied)
+        center_damping(views, own, memory.rate, memory.act_rate, memory.moving[0], views.applied)
+        memory.moving[0] = True
         if row >= 0:
             write_row(views, out[row])
         mj_step2(model, data)

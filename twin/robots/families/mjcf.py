@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from copy import copy
 from functools import lru_cache
@@ -10,7 +9,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
-from twin.body import Body, Counts, Drive, Port, Sense
+from twin.body import Body, Drive, Port, Sense
 from twin.mechanics.mjcf import (
     LONGEST_STEP,
     LoadedModel,
@@ -22,26 +21,28 @@ from twin.mechanics.mjcf import (
     tip_site,
 )
 from twin.robots.schemas.mjcf import MJCF_SCHEMA as SCHEMA
-from twin.robots.schemas.mjcf import Address, addresses, joint_names, scalar_joints
+from twin.robots.schemas.mjcf import address_of, counts_of, joint_names, scalar_joints
 
 __all__ = ["SCHEMA", "build", "chain", "dynamics", "figure", "hand", "silicone", "statics"]
-
-_COMPONENT = re.compile(r"_([123])$")
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> ModelBody:
     """Return the model with these values (SI, by address) written into a copy of the compiled model."""
-    loaded = load_model(str(structure["model"]))
+    return body_of(load_model(str(structure["model"])), structure, values)
+
+
+def body_of(loaded: LoadedModel, structure: Mapping[str, object], values: Mapping[str, float]) -> ModelBody:
+    """Return the body of a loaded model, as `build`."""
     model = copy(loaded.model)
     for name, value in values.items():
-        address, component = _address(loaded, name)
+        address, component = address_of(loaded, name)
         numbers = address.of.read(model, address.element)
         numbers[component] = value
         address.of.write(model, address.element, numbers)
     known = _known(loaded, structure)
     return ModelBody(
         spec=loaded.spec.copy(),
-        n_tendon=Counts.of(model.nu, known.joint_names, loaded.names("tendon")),
+        n_tendon=counts_of(loaded),
         features=known.features,
         ports=known.ports,
         senses=known.senses,
@@ -55,18 +56,6 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Model
         tip=known.tip,
         longest_step=float(str(structure.get("timestep", LONGEST_STEP))),
     )
-
-
-@lru_cache(maxsize=4096)
-def _address(loaded: LoadedModel, name: str) -> tuple[Address, int]:
-    """Return the number that a parameter is, and its component (from 0)."""
-    found = _COMPONENT.search(name)
-    if found is not None:
-        plain = name[: found.start()]
-        attribute = plain.rpartition(".")[2]
-        if attribute in ("pos", "ipos", "range", "springlength", "forcerange"):
-            return addresses(loaded, plain)[0], int(found[1]) - 1
-    return addresses(loaded, name)[0], 0
 
 
 class _Known:
@@ -94,6 +83,7 @@ class _Known:
             "friction of joints",
             "load friction",
             "markers",
+            "stops",
         }
         if np.linalg.norm(model.opt.gravity) > 0.0:
             features |= {"weight"}

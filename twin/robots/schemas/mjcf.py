@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,7 @@ from twin.robots.schema import BOUND_STDS, ModelFile, Row, Schema, Structure
 
 LEAST_SHARE = 1e-3  # of its own value: the lower bound of a number that cannot be negative, where nothing else is written
 DEFAULT_SOURCE = "not written: usual of its kind"
+_COMPONENT = re.compile(r"_([123])$")
 MJCF_DIAGRAM = """\
      robot.toml ---- [structure] model = "leg.xml" ----> the MJCF beside it
      z ^
@@ -61,7 +64,7 @@ class ModelStructure(Structure):
             raise DataError(f"structure: tip {self.tip!r} is no site of the model; it has {', '.join(there)}")
         return {
             **self.model_dump(exclude_none=True), "model": str(path),
-            "tendons": Counts.of(loaded.model.nu, joint_names(loaded), loaded.names("tendon")),
+            "tendons": counts_of(loaded),
         }  # fmt: skip
 
 
@@ -73,6 +76,11 @@ def scalar_joints(loaded: LoadedModel) -> tuple[int, ...]:
 def joint_names(loaded: LoadedModel) -> tuple[str, ...]:
     """Return the names of those."""
     return tuple(loaded.names("joint")[j] for j in scalar_joints(loaded))
+
+
+def counts_of(loaded: LoadedModel) -> Counts:
+    """Return the number of a model's actuators, with the names of its joints and tendons."""
+    return Counts.of(loaded.model.nu, joint_names(loaded), loaded.names("tendon"))
 
 
 class NumberEntry(TableSchema):
@@ -129,6 +137,18 @@ def addresses(loaded: LoadedModel, key: str) -> list[Address]:
     if any(not applies(loaded.model, kind, k, attribute) for k in found):
         raise DataError(f"{key}: joint {name!r} has more than one axis; only its pos can be given")
     return [Address(kind, k, names[k], attribute) for k in found]
+
+
+@lru_cache(maxsize=4096)
+def address_of(loaded: LoadedModel, name: str) -> tuple[Address, int]:
+    """Return the number that a parameter is, and its component (from 0)."""
+    found = _COMPONENT.search(name)
+    if found is not None:
+        plain = name[: found.start()]
+        attribute = plain.rpartition(".")[2]
+        if attribute in ("pos", "ipos", "range", "springlength", "forcerange"):
+            return addresses(loaded, plain)[0], int(found[1]) - 1
+    return addresses(loaded, name)[0], 0
 
 
 def model_parameters(structure: Mapping[str, object], table: Mapping[str, Any], problems: list[str]) -> list[Parameter]:

@@ -7,6 +7,7 @@ frames.py       markers mirrored, turned, shifted
 order.py        tendons and markers exchanged
 trials.py       duplicates, another robot, clocks, milliseconds
 channels.py     dead channels, lost markers, declared noise, room temperature
+stops.py        joints that end earlier than described
 clouds.py       point clouds in another unit, or away from their markers
 description.py  robot.toml off by a thousand
 """
@@ -15,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from twin.diagnosis.checks.suspicions import channels, clouds, description, frames, order, signs, trials, units
+from twin.diagnosis.checks.suspicions import channels, clouds, description, frames, order, signs, stops, trials, units
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
 from twin.diagnosis.split import blind
 from twin.diagnosis.thresholds import UNDECIDED_CHANGES_RATIO
@@ -25,7 +26,7 @@ from twin.prediction.twin import Twin
 Kind = Callable[[Case], Iterable[Suspicion]]
 SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs,
-    channels.lost_markers, channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
+    channels.lost_markers, channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds, stops.ends,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, signs.zeros, order.tendons, channels.inputs,

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion, called, rms
+from twin.diagnosis.checks.suspicions.stops import ends
 from twin.diagnosis.checks.suspicions.units import others
 from twin.diagnosis.thresholds import (
     HIDING_NOISE_RATIO,
@@ -48,7 +49,7 @@ def lost_markers(case: Case) -> Iterator[Suspicion]:
 
 def inputs(case: Case) -> Iterator[Suspicion]:
     """Yield a drive that never changes although the robot moves as if it did."""
-    if case.predicted is None or not case.few():
+    if case.predicted is None or not case.few() or any(ends(case)):
         return
     command = np.concatenate([i.command for i in case.prepared.inputs])
     columns, few = case.columns(case.group), case.few()

@@ -1,0 +1,137 @@
+"""An MJCF as text with every digit, its comments, and the files it needs beside it."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+
+import mujoco
+import numpy as np
+
+from twin.foundation.errors import DataError
+from twin.mechanics.mujoco_symbols import MUJOCO_LIBRARY
+
+ASSETS = "assets"  # the folder of meshes, textures and height fields beside a written model
+ALL_DIGITS, USUAL_DIGITS = 17, 6
+_LONG_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+_precision = ctypes.CDLL(str(MUJOCO_LIBRARY))._mjPRIVATE__set_xml_precision  # of all threads; MuJoCo's own way to write every digit
+_writing = Lock()
+_FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}  # the attribute with the folder
+_SECTIONS = {
+    "body": "worldbody", "joint": "worldbody", "geom": "worldbody", "site": "worldbody", "tendon": "tendon", "actuator": "actuator",
+}  # fmt: skip
+_TAGS = {"body": ("body",), "joint": ("joint", "freejoint"), "geom": ("geom",), "site": ("site",)}
+
+
+@dataclass(frozen=True)
+class WrittenModel:
+    """An MJCF as text, and the files beside it by their names relative to it."""
+
+    text: str
+    files: Mapping[str, bytes]
+
+    def compile(self) -> mujoco.MjModel:
+        """Return the model that MuJoCo makes of it."""
+        return mujoco.MjModel.from_xml_string(self.text, dict(self.files))
+
+    def spec(self) -> mujoco.MjSpec:
+        """Return it for editing."""
+        return mujoco.MjSpec.from_string(self.text, assets=dict(self.files))
+
+
+def exact_text(spec: mujoco.MjSpec) -> str:
+    """Return a compiled spec as MJCF whose numbers are read back to the last bit, with as few digits as that takes.
+
+    MuJoCo writes six digits, by which a prediction would change.
+    """
+    with _writing:
+        _precision(ALL_DIGITS)
+        try:
+            text = spec.to_xml()
+        finally:
+            _precision(USUAL_DIGITS)
+    return re.sub(r'="[^"]*"', lambda value: _LONG_NUMBER.sub(_shortest, value[0]), text)
+
+
+def _shortest(number: re.Match[str]) -> str:
+    """Return a number of 12 digits or more in the fewest that mean the same, one of single precision as such."""
+    text = number[0]
+    if sum(map(str.isdigit, text)) < 12:
+        return text
+    value = float(text)
+    if np.isfinite(np.float32(value)) and float(np.float32(value)) == value:
+        return str(np.float32(value))
+    return repr(value).removesuffix(".0")
+
+
+def self_contained(spec: mujoco.MjSpec, folder: Path) -> WrittenModel:
+    """Return a compiled spec, whose files lie about `folder`, with includes resolved and its files in one folder beside it.
+
+    Raises DataError for a file that cannot be read.
+    """
+    root = _tree(exact_text(spec))
+    compiler, files = root.find("compiler"), dict[str, bytes]()
+    folders = compiler.attrib if compiler is not None else {}
+    for element in root.iterfind("asset/*"):
+        for name in [n for n in element.keys() if n.startswith("file")]:  # noqa: SIM118
+            there = folder / folders.get(_FOLDERS.get(element.tag, ""), "") / element.get(name, "")
+            try:
+                content = there.read_bytes()
+            except OSError as error:
+                raise DataError(f"{there}: cannot be read ({error.strerror or error}); the model needs it") from None
+            if not element.get("name"):
+                element.set("name", there.stem)
+            element.set(name, _file_name(files, there.name, content))
+    for attribute in {*_FOLDERS.values(), "assetdir", "strippath"}:
+        folders.pop(attribute, None)
+    return WrittenModel(ET.tostring(root, encoding="unicode"), files)
+
+
+def _file_name(files: dict[str, bytes], name: str, content: bytes) -> str:
+    """Add a file under a name that no other content has; return its path."""
+    stem, dot, ending = name.partition(".")
+    path, k = f"{ASSETS}/{name}", 1
+    while files.get(path, content) != content:
+        k += 1
+        path = f"{ASSETS}/{stem}_{k}{dot}{ending}"
+    files[path] = content
+    return path
+
+
+def with_comments(text: str, heading: str, comments: Mapping[tuple[str, str], list[str]], numbers: str) -> str:
+    """Return MJCF text with comments: before each element (kind, name), on top, and before its custom `numbers`."""
+    root = _tree(text)
+    parents = {child: parent for parent in root.iter() for child in parent}
+    for (kind, name), said in comments.items():
+        section = root.find(_SECTIONS[kind])
+        inside = section.iter() if section is not None else ()
+        found = next(e for e in inside if e.tag in _TAGS.get(kind, (e.tag,)) and e is not section and e.get("name") == name)
+        indent = "\n" + "  " * _depth(found, parents)
+        for line in said:
+            _insert_comment(parents[found], list(parents[found]).index(found), line, indent)
+    if (custom := root.find("custom")) is not None and numbers:
+        _insert_comment(root, list(root).index(custom), numbers, "\n  ")
+    _insert_comment(root, 0, heading, "\n  ")
+    return ET.tostring(root, encoding="unicode").replace(" />", "/>") + "\n"
+
+
+def _insert_comment(parent: ET.Element, at: int, said: str, indent: str) -> None:
+    comment = ET.Comment(f" {said.replace('--', '- -')} ")
+    comment.tail = indent
+    parent.insert(at, comment)
+
+
+def _depth(element: ET.Element, parents: Mapping[ET.Element, ET.Element]) -> int:
+    depth = 0
+    while (above := parents.get(element)) is not None:
+        element, depth = above, depth + 1
+    return depth
+
+
+def _tree(text: str) -> ET.Element:
+    return ET.fromstring(text, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))

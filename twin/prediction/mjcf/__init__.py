@@ -1,0 +1,11 @@
+"""A twin of an MJCF as a better MJCF, and the steps of what MuJoCo cannot say.
+
+export.py    the MJCF                      natives.py   joint friction as attributes of MuJoCo
+comments.py  what is said of its numbers   stepper.py   the laws beside it
+"""
+
+from twin.prediction.mjcf.comments import Origins, origins_of
+from twin.prediction.mjcf.export import MODEL_FILE, export_mjcf, write_mjcf
+from twin.prediction.mjcf.stepper import ModelStepper
+
+__all__ = ["MODEL_FILE", "ModelStepper", "Origins", "export_mjcf", "origins_of", "write_mjcf"]
