@@ -39,10 +39,14 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         raise DataError(f"{table.cell(int(short[0]) + 1, 'time')}: {step}")
     if len(time) and not abs(time[0]) + (time[-1] - time[0]) <= MAX_TRIAL_TIME:
         last = float(time[-1])
-        divided = next((f"divide by {10.0**n:g} and " for n in (9, 6, 3) if last / 10.0**n > EPOCH_SECONDS), "")
+        unit, divided = next(
+            ((u, f"divide by {10.0**n:g} and ") for n, u in ((9, "ns"), (6, "us"), (3, "ms")) if last / 10.0**n > EPOCH_SECONDS),
+            ("epoch", ""),
+        )
         raise DataError(
-            f"{table.cell(len(time) - 1, 'time')}: {last!r} s; time is in seconds since a start of your choice, and at most "
-            f"{MAX_TRIAL_TIME:g} s: {divided}subtract the first trial's first stamp, with `start` in [[trial]] for when each began"
+            f"{table.cell(len(time) - 1, 'time')}: {last!r} s; time is in seconds since a start of your choice, and at "
+            f"most {MAX_TRIAL_TIME:g} s: {divided}subtract the first trial's first stamp, with `start` in [[trial]] for when each "
+            f'began, or write time = "{unit}" at the top of measurements.toml'
         )
     for channel in channels:
         column = channel.scale.to_si(table.columns[channel.name])

@@ -139,4 +139,4 @@ def _read_parquet(path: Path, names: Sequence[str]) -> Table:
 
 
 def _numbers(column: pa.ChunkedArray) -> np.ndarray:
-    return column.cast(pa.float64()).to_numpy(zero_copy_only=False)
+    return column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)  # nanoseconds since 1970, to 256 of them
