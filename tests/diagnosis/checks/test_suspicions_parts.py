@@ -14,7 +14,7 @@ from tools.simulators.two_link import write_day
 from twin.diagnosis import Settings
 from twin.diagnosis.checks.preview import preview_data
 from twin.diagnosis.checks.suspicions.case import Case
-from twin.diagnosis.checks.suspicions.channels import lost_markers
+from twin.diagnosis.checks.suspicions.no_readings.repeats import lost_markers
 from twin.diagnosis.checks.suspicions.clouds import _nearest
 from twin.diagnosis.checks.suspicions.frames import _axes
 from twin.diagnosis.checks.suspicions.trials import times

@@ -29,23 +29,6 @@ def outputs(case: Case) -> Iterator[Suspicion]:
         yield Suspicion("dead channel", words, f"remove the [[channel]] {', '.join(found)}, or log again")
 
 
-def lost_markers(case: Case) -> Iterator[Suspicion]:
-    """Yield markers at exactly 0, 0, 0 in some rows and elsewhere in most.
-
-    Trackers write zeros for a marker that they have lost.
-    """
-    y, found = np.concatenate(case.prepared.measured), []
-    for marker in dict.fromkeys(o.index for o in case.prepared.outputs if o.group == "marker"):
-        columns = [j for j, o in enumerate(case.prepared.outputs) if o.group == "marker" and o.index == marker]
-        at_zero = (y[:, columns] == 0.0).all(axis=1)
-        known = np.isfinite(y[:, columns]).all(axis=1)
-        if len(columns) == 3 and 0 < at_zero.sum() < 0.5 * known.sum():
-            found.append(f"{case.prepared.outputs[columns[0]].channel.name.rpartition('_')[0]} in {at_zero.sum()} rows")
-    if found:
-        words = f"{', '.join(found)}: exactly 0, 0, 0, and elsewhere in all others: trackers write this for a lost marker"
-        yield Suspicion("lost markers", words, "leave these cells empty in the trials' files")
-
-
 def inputs(case: Case) -> Iterator[Suspicion]:
     """Yield a drive that never changes although the robot moves as if it did."""
     if case.predicted is None or not case.few():
