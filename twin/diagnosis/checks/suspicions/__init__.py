@@ -27,8 +27,8 @@ from twin.prediction.twin import Twin
 Kind = Callable[[Case], Iterable[Suspicion]]
 SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs,
-    repeats.lost_markers, repeats.fills, repeats.stuck, jumps.exchanged, jumps.rolled, channels.noise, signs.outputs, signs.size,
-    frames.frame, order.markers, clouds.clouds,
+    repeats.lost_markers, repeats.fills, repeats.stuck, repeats.frozen, jumps.exchanged, jumps.rolled,
+    channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, signs.zeros, order.tendons, channels.inputs,

@@ -1,7 +1,8 @@
 """What is no reading: zeros of a lost marker, a fill far from its neighbours, a value that repeats while the robot moves."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,40 +41,60 @@ def lost_markers(case: Case) -> Iterator[Suspicion]:
 def fills(case: Case) -> Iterator[Suspicion]:
     """Yield a value that stands, in several rows, far from the readings before and after, where the robot does not go."""
     for name, trials in of_outputs(case).items():
-        typical = _typical(trials)
-
-        def away(s: Series, a: int, b: int, typical: float = typical) -> bool:
-            return not s.at_zero[a] and all(_apart(v, a, b) > SPIKE_SIZE * typical for v in (s.read, s.left))
-
+        far = SPIKE_SIZE * _typical(trials)
+        away = [
+            (s, r)
+            for s in trials
+            for r in np.flatnonzero(s.apart > far).tolist()
+            if not s.at_zero[s.runs[r, 0]] and _left_by(s, r) > far
+        ]
         yield from _filled(case, name, trials, away)
-    if case.predicted is not None:
-        seen = headline(case)
-        for name, trials in of_drives(case).items():
-            yield from _filled(
-                case, name, trials, lambda s, a, b: _apart(s.read, a, b) > 0.0 and not _followed(seen[s.trial], a, b)
-            )
+    seen = headline(case)
+    for name, trials in of_drives(case).items():
+        equal, whole = _equal(trials), np.concatenate([s.read for s in trials])
+        away = []
+        for s in trials:
+            for r in np.flatnonzero(s.apart):
+                a, b = s.runs[r]
+                alike = sum(
+                    int(np.ptp(o.runs[k])) - 1 for o in trials for k in np.flatnonzero(o.read[o.runs[:, 0], 0] == s.read[a, 0])
+                )
+                soon = 0 if _by_chance(alike, equal, whole.size) < CHANCE_OF_REPEATS else b - a + SPIKE_WINDOW
+                others = whole[np.isfinite(whole) & (whole != s.read[a])]
+                if not _followed(seen[s.trial], a, b, soon) if seen else 0.0 < float(np.ptp(others)) < s.apart[r]:
+                    away.append((s, int(r)))
+        yield from _filled(case, name, trials, away)
 
 
-def _filled(case: Case, name: str, trials: Sequence[Series], away: Callable[[Series, int, int], bool]) -> Iterator[Suspicion]:
-    """Yield the values of which every run between two readings is `away` from these."""
-    at: dict[tuple[float, ...], list[tuple[Series, int, int]]] = defaultdict(list)
-    for s in trials:
-        for a, b in s.runs():
-            at[tuple(s.read[a])].append((s, a, b))
-    for runs in at.values():
-        inner = [(s, a, b) for s, a, b in runs if a > 0 and b < len(s.time)]
-        if sum(b - a for _, a, b in runs) < 2 or not inner or not all(away(*run) for run in inner):
+def _left_by(s: Series, run: int) -> float:
+    """Return how far the error of a run is from that of the runs beside it, at least; 0 where these are as far apart."""
+    (a, b), before, after = s.runs[run], s.left[s.runs[run - 1, 1] - 1], s.left[s.runs[run + 1, 0]]
+    least = min(float(np.linalg.norm(s.left[a:b] - v, axis=1).min()) for v in (before, after))
+    return least if least > float(np.linalg.norm(after - before)) else 0.0
+
+
+def _filled(case: Case, name: str, trials: Sequence[Series], away: Sequence[tuple[Series, int]]) -> Iterator[Suspicion]:
+    """Yield the values that stand in several rows of those runs of a channel."""
+    at: dict[tuple[float, ...], Rows] = defaultdict(lambda: defaultdict(list))
+    for s, run in away:
+        a, b = s.runs[run]
+        at[tuple(s.read[a])][s.trial] += range(a, b)
+    for value, rows in at.items():
+        n = sum(map(len, rows.values()))
+        if n < 2:
             continue
-        rows: Rows = defaultdict(list)
-        for s, a, b in runs:
-            rows[s.trial] += range(a, b)
-        s, a, _ = runs[0]
-        value, one = [float(f"{v:.12g}") for v in s.written[a]], len(s.channels) == 1
-        words = (
-            f"{name}: exactly {', '.join(f'{v:g}' for v in value)} in {where(case, rows)}, far from the readings around: no reading"
+        s = next(s for s in trials if s.trial in rows)
+        written = [float(f"{v:.12g}") for v in s.written[min(rows[s.trial])]]
+        words = f"exactly {', '.join(f'{v:g}' for v in written)} in {where(case, rows)}, far from the readings around"
+        key = (
+            f"missing = {written[0]:g} in its [[channel]]"
+            if len(written) == 1
+            else f"missing = {written} at the top of measurements.toml"
         )
-        key = f"missing = {value[0]:g} in its [[channel]]" if one else f"missing = {value} at the top of measurements.toml"
-        yield Suspicion("filled cells", words, f"leave these cells empty, or write {key}")
+        elsewhere = sum(int((s.read == value).all(axis=1).sum()) for s in trials) - n
+        yield Suspicion(
+            "filled cells", f"{name}: {words}", "leave these cells empty" + (f", or write {key}" if elsewhere < n else "")
+        )
 
 
 def _typical(trials: Sequence[Series]) -> float:
@@ -83,23 +104,8 @@ def _typical(trials: Sequence[Series]) -> float:
     return max(trials[0].noise, float(np.median(off)) if off.size else 0.0)
 
 
-def _neighbours(values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, np.ndarray] | None:
-    known = np.flatnonzero(np.isfinite(values).all(axis=1))
-    before, after = known[known < a], known[known >= b]
-    return (values[before[-1]], values[after[0]]) if before.size and after.size else None
-
-
-def _apart(values: np.ndarray, a: int, b: int) -> float:
-    """Return how far rows a to b of values (n, d) are from the rows beside them, at least; 0 where these are as far apart."""
-    beside = _neighbours(values, a, b)
-    if beside is None:
-        return 0.0
-    least = min(float(np.linalg.norm(values[a:b] - v, axis=1).min()) for v in beside)
-    return least if least > float(np.linalg.norm(beside[1] - beside[0])) else 0.0
-
-
-def _followed(seen: Seen, a: int, b: int) -> bool:
-    """Return whether the outputs went, by part of the way and soon, where the robot as described goes with rows a to b of a drive.
+def _followed(seen: Seen, a: int, b: int, soon: int) -> bool:
+    """Return whether the outputs went, in part and in as many rows, where the robot as described goes with rows a to b of a drive.
 
     True where it hardly goes anywhere.
     """
@@ -107,7 +113,7 @@ def _followed(seen: Seen, a: int, b: int) -> bool:
     way = shown[a:b].mean(axis=0) - 0.5 * (shown[a - 1] + shown[b])
     if np.linalg.norm(way / noise) <= UNMISSABLE_MOTION * np.sqrt(len(way)):
         return True
-    then = (read[a : 2 * b - a + SPIKE_WINDOW] - read[a - 1]) / noise
+    then = (read[a : b + soon] - read[a - 1]) / noise
     known = np.isfinite(then)
     along = (np.where(known, then, 0.0) * (way / noise)).sum(axis=1)
     size = (known * (way / noise) ** 2).sum(axis=1)
@@ -119,27 +125,71 @@ def stuck(case: Case) -> Iterator[Suspicion]:
     if case.predicted is None:
         return
     seen = headline(case)
-    for name, trials in {**of_outputs(case), **of_drives(case)}.items():
+    for name, trials in (of_outputs(case) | (of_drives(case) if seen else {})).items():
         rows: Rows = defaultdict(list)
-        long = _improbable(trials)
+        equal, readings = _equal(trials), sum(len(s.time) for s in trials)
         for s in trials:
-            for a, b in s.runs():
-                if b - a >= long and (_driven(seen[s.trial], a, b) if s.drives else _held(s, a, b)):
+            for a, b in s.runs[np.ptp(s.runs, axis=1) > 2]:
+                if _by_chance(b - a - 1, equal, readings) < CHANCE_OF_REPEATS and (
+                    _driven(seen[s.trial], a, b) if s.drives else _held(s, a, b)
+                ):
                     rows[s.trial] += range(a, b)
         if rows:
             words = f"{name}: one value, to the last digit, over {where(case, rows)}, while the robot moves"
             yield Suspicion("stuck value", words, f"leave the cells of {name} empty where it repeats")
 
 
-def _improbable(trials: Sequence[Series]) -> int:
-    """Return the length from which on a run of equal readings is no chance, by how often two readings in a row are equal.
+def frozen(case: Case) -> Iterator[Suspicion]:
+    """Yield rows in which every channel repeats, where chance does not, and after which the robot is further on its way."""
+    seen, every = headline(case), [*of_outputs(case).values(), *of_drives(case).values()]
+    whole = [replace(of[0], read=np.concatenate([s.read for s in of], axis=1)) for of in zip(*every, strict=True)]
+    equal, readings = _equal(whole), sum(len(s.time) for s in whole)
+    noisy = bool(seen) and _scatter(seen) > LEFT_BY_PATTERN
+    rows: Rows = defaultdict(list)
+    for s in whole if seen else []:
+        for a, b in s.runs[np.ptp(s.runs, axis=1) > 2]:
+            if (
+                a > 0
+                and b + 1 < len(s.time)
+                and _by_chance(b - a - 1, equal, readings) < CHANCE_OF_REPEATS
+                and _skips(seen[s.trial], a, b, noisy)
+            ):
+                rows[s.trial] += range(a + 1, b)
+    if rows:
+        words = (
+            f"all channels: {where(case, rows)} repeat the row before to the last digit, and then the robot is further on its way"
+        )
+        yield Suspicion("frozen rows", words, "remove these rows: the logger repeated the last readings that it had")
 
-    Every run of more than two counts once, so that a channel that is stuck for long does not make that usual.
+
+def _scatter(seen: Sequence[Seen]) -> float:
+    """Return by how much readings usually scatter about a smooth error of the prediction, in their noise."""
+    second = np.concatenate([np.diff((read - shown) / noise, n=2, axis=0) for read, shown, noise in seen])
+    return float(np.sqrt(np.nanmedian(second**2) / 6.0))
+
+
+def _skips(seen: Seen, a: int, b: int, noisy: bool) -> bool:
+    """Return whether the outputs jump after rows a to b.
+
+    Where readings do not scatter a robot that stands repeats its rows too: further than, and the way that, it went before and after.
     """
-    lengths = [b - a for s in trials for a, b in s.runs()]
-    steps = sum(lengths)
-    equal = (1 + sum(min(n - 1, 1) for n in lengths)) / max(len(lengths), 2)
-    return 2 if equal <= 0.0 else 1 + int(np.ceil(np.log(CHANCE_OF_REPEATS / max(steps, 1)) / np.log(min(equal, 1.0 - 1e-9))))
+    read, _, noise = seen
+    before, jump, after = ((read[i] - read[i - 1]) / noise for i in (a, b, b + 1))
+    known = np.isfinite(before + jump + after)
+    size = float(jump[known] @ jump[known])
+    beside = [float(way[known] @ jump[known]) for way in (before, after)]
+    return size > UNMISSABLE_MOTION**2 * max(1, known.sum()) and (noisy or all(0.0 < along < size for along in beside))
+
+
+def _equal(trials: Sequence[Series]) -> float:
+    """Return how often a reading equals the one before."""
+    readings, runs = (sum(f(s) for s in trials) for f in (lambda s: int(np.ptp(s.runs, axis=1).sum()), lambda s: len(s.runs)))
+    return (1 + readings - runs) / max(readings, 2)
+
+
+def _by_chance(repeats: int, equal: float, readings: int) -> float:
+    """Return how many times so many readings that equal the one before are expected somewhere in so many readings."""
+    return readings * min(equal, 1.0) ** repeats
 
 
 def _held(s: Series, a: int, b: int) -> bool:

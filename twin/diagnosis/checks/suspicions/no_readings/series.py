@@ -40,13 +40,24 @@ class Series:
         zero = np.array([float(c.scale.to_si(0.0)) for c in self.channels])
         return (self.read == zero).all(axis=1) & (len(zero) == len("xyz"))
 
-    def runs(self) -> list[tuple[int, int]]:
-        """Return the beginning and end of each run of rows that read exactly the same; rows without a reading are none."""
+    @cached_property
+    def runs(self) -> np.ndarray:
+        """The beginning and end (m, 2) of each run of rows that read exactly the same; rows without a reading are in none."""
         known = np.flatnonzero(np.isfinite(self.read).all(axis=1))
         if not known.size:
-            return []
+            return np.empty((0, 2), int)
         new = np.flatnonzero((np.diff(known) > 1) | (np.diff(self.read[known], axis=0) != 0.0).any(axis=1)) + 1
-        return [(int(rows[0]), int(rows[-1]) + 1) for rows in np.split(known, new)]
+        return np.stack([known[np.insert(new, 0, 0)], known[np.append(new - 1, -1)] + 1], axis=1)
+
+    @cached_property
+    def apart(self) -> np.ndarray:
+        """How far (m,) each run is from those before and after it, at least; 0 at the ends, and where these are as far apart."""
+        out, value = np.zeros(len(self.runs)), self.read[self.runs[:, 0]]
+        if len(out) > 2:
+            least = np.linalg.norm(np.diff(value, axis=0), axis=1)
+            least = np.minimum(least[1:], least[:-1])
+            out[1:-1] = np.where(least > np.linalg.norm(value[2:] - value[:-2], axis=1), least, 0.0)
+        return out
 
     @cached_property
     def written(self) -> np.ndarray:
@@ -95,10 +106,15 @@ def called_as_one(channels: Sequence[Channel]) -> str:
 
 
 def headline(case: Case) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return the readings (n, m) of the headline outputs in each trial, their prediction, and their noise (m,)."""
+    """Return the readings (n, m) of the headline outputs in each trial, their prediction, and their noise (m,).
+
+    Nothing where they are not in the file, or where nothing is predicted.
+    """
     group = {case.prepared.outputs[j].channel.name for j in case.columns(case.group)}
     every = [trials for trials in of_outputs(case).values() if trials[0].channels[0].name in group]
-    noise = np.concatenate([np.full(len(trials[0].channels), trials[0].noise) for trials in every] or [np.empty(0)])
+    if not every or case.predicted is None:
+        return []
+    noise = np.concatenate([np.full(len(trials[0].channels), trials[0].noise) for trials in every])
     return [
         (np.concatenate([s.read for s in of], axis=1), np.concatenate([s.shown for s in of], axis=1), noise)
         for of in zip(*every, strict=True)
