@@ -57,7 +57,10 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
             slack = max(
                 MAX_SLACK_SIGMAS * (channel.noise or 0.0), _ZERO_OFFSET, _ZERO_OFFSET_SHARE * np.nanmax(column, initial=0.0)
             )
-            advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign, or declare it missing"
+            advice = (
+                f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign, or declare it "
+                "`missing`"
+            )
             _check_floor(table, channel, column, -slack, advice)
 
 

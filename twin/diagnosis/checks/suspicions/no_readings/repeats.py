@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
+from twin.diagnosis.checks.suspicions.channels import white
 from twin.diagnosis.checks.suspicions.no_readings.series import Series, headline, of_drives, of_outputs, where
 from twin.diagnosis.thresholds import (
     CHANCE_OF_REPEATS,
@@ -51,18 +52,14 @@ def fills(case: Case) -> Iterator[Suspicion]:
         yield from _filled(case, name, trials, away)
     seen = headline(case)
     for name, trials in of_drives(case).items():
-        equal, whole = _equal(trials), np.concatenate([s.read for s in trials])
+        whole = np.concatenate([s.read[:, 0] for s in trials])
+        often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 1]
         away = []
         for s in trials:
-            for r in np.flatnonzero(s.apart):
-                a, b = s.runs[r]
-                alike = sum(
-                    int(np.ptp(o.runs[k])) - 1 for o in trials for k in np.flatnonzero(o.read[o.runs[:, 0], 0] == s.read[a, 0])
-                )
-                soon = 0 if _by_chance(alike, equal, whole.size) < CHANCE_OF_REPEATS else b - a + SPIKE_WINDOW
-                others = whole[np.isfinite(whole) & (whole != s.read[a])]
-                if not _followed(seen[s.trial], a, b, soon) if seen else 0.0 < float(np.ptp(others)) < s.apart[r]:
-                    away.append((s, int(r)))
+            for r in (1 + np.flatnonzero(np.isin(s.read[s.runs[1:-1, 0], 0], often))).tolist():
+                others = whole[np.isfinite(whole) & (whole != s.read[s.runs[r, 0], 0])] if not seen else whole
+                if _unfollowed(seen[s.trial], *s.runs[r]) if seen else 0.0 < float(np.ptp(others)) < s.apart[r]:
+                    away.append((s, r))
         yield from _filled(case, name, trials, away)
 
 
@@ -71,6 +68,12 @@ def _left_by(s: Series, run: int) -> float:
     (a, b), before, after = s.runs[run], s.left[s.runs[run - 1, 1] - 1], s.left[s.runs[run + 1, 0]]
     least = min(float(np.linalg.norm(s.left[a:b] - v, axis=1).min()) for v in (before, after))
     return least if least > float(np.linalg.norm(after - before)) else 0.0
+
+
+def _scatters(trials: Sequence[Series]) -> bool:
+    """Return whether a drive is read with noise, by more than its last digit; a command is not, and repeats wherever it is held."""
+    steps = np.abs(np.concatenate([np.diff(s.read[:, 0]) for s in trials]))
+    return white([s.read[:, 0] for s in trials]) > np.min(steps[steps > 0.0], initial=np.inf)
 
 
 def _filled(case: Case, name: str, trials: Sequence[Series], away: Sequence[tuple[Series, int]]) -> Iterator[Suspicion]:
@@ -104,20 +107,17 @@ def _typical(trials: Sequence[Series]) -> float:
     return max(trials[0].noise, float(np.median(off)) if off.size else 0.0)
 
 
-def _followed(seen: Seen, a: int, b: int, soon: int) -> bool:
-    """Return whether the outputs went, in part and in as many rows, where the robot as described goes with rows a to b of a drive.
-
-    True where it hardly goes anywhere.
-    """
+def _unfollowed(seen: Seen, a: int, b: int) -> bool:
+    """Return whether the robot as described goes a way in rows a to b of a drive that the outputs do not go, then or later."""
     read, shown, noise = seen
-    way = shown[a:b].mean(axis=0) - 0.5 * (shown[a - 1] + shown[b])
-    if np.linalg.norm(way / noise) <= UNMISSABLE_MOTION * np.sqrt(len(way)):
-        return True
-    then = (read[a : b + soon] - read[a - 1]) / noise
-    known = np.isfinite(then)
-    along = (np.where(known, then, 0.0) * (way / noise)).sum(axis=1)
-    size = (known * (way / noise) ** 2).sum(axis=1)
-    return not size.any() or bool(np.any(along > SHARED_MOTION_SHARE * size))
+    left, known = (read - shown) / noise, np.isfinite(read[[a - 1, b]]).all(axis=0) & np.isfinite(read[a:b]).all(axis=0)
+    before, inside, after = left[a - 1, known], left[a:b, known], left[b, known]
+    way = 0.5 * (before + after) - inside.mean(axis=0)
+    if np.linalg.norm(way) <= max(UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())), float(np.linalg.norm(after - before))):
+        return False
+    went = (shown[a:b].mean(axis=0) - 0.5 * (shown[a - 1] + shown[b]))[known] / noise[known]
+    late = np.nan_to_num(left[b : 2 * b - a + SPIKE_WINDOW, known] - before) @ way
+    return bool(went @ way > LEFT_BY_PATTERN * way @ way and np.all(late < SHARED_MOTION_SHARE * way @ way))
 
 
 def stuck(case: Case) -> Iterator[Suspicion]:
@@ -125,7 +125,8 @@ def stuck(case: Case) -> Iterator[Suspicion]:
     if case.predicted is None:
         return
     seen = headline(case)
-    for name, trials in (of_outputs(case) | (of_drives(case) if seen else {})).items():
+    drives = {n: trials for n, trials in of_drives(case).items() if seen and _scatters(trials)}
+    for name, trials in (of_outputs(case) | drives).items():
         rows: Rows = defaultdict(list)
         equal, readings = _equal(trials), sum(len(s.time) for s in trials)
         for s in trials:
@@ -171,7 +172,7 @@ def _scatter(seen: Sequence[Seen]) -> float:
 def _skips(seen: Seen, a: int, b: int, noisy: bool) -> bool:
     """Return whether the outputs jump after rows a to b.
 
-    Where readings do not scatter a robot that stands repeats its rows too: further than, and the way that, it went before and after.
+    Where readings do not scatter, a standing robot repeats its rows too: there further than, and the way, that it went beside them.
     """
     read, _, noise = seen
     before, jump, after = ((read[i] - read[i - 1]) / noise for i in (a, b, b + 1))
