@@ -115,7 +115,9 @@ def _unfollowed(seen: Seen, a: int, b: int) -> bool:
     way = 0.5 * (before + after) - inside.mean(axis=0)
     if np.linalg.norm(way) <= max(UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())), float(np.linalg.norm(after - before))):
         return False
-    went = (shown[a:b].mean(axis=0) - 0.5 * (shown[a - 1] + shown[b]))[known] / noise[known]
+    went, gone = ((v[a:b].mean(axis=0) - 0.5 * (v[a - 1] + v[b]))[known] / noise[known] for v in (shown, read))
+    if gone @ went > SHARED_MOTION_SHARE * went @ went:
+        return False
     late = np.nan_to_num(left[b : 2 * b - a + SPIKE_WINDOW, known] - before) @ way
     return bool(went @ way > LEFT_BY_PATTERN * way @ way and np.all(late < SHARED_MOTION_SHARE * way @ way))
 
@@ -125,15 +127,14 @@ def stuck(case: Case) -> Iterator[Suspicion]:
     if case.predicted is None:
         return
     seen = headline(case)
-    drives = {n: trials for n, trials in of_drives(case).items() if seen and _scatters(trials)}
-    for name, trials in (of_outputs(case) | drives).items():
+    for name, trials in (of_outputs(case) | (of_drives(case) if seen else {})).items():
         rows: Rows = defaultdict(list)
         equal, readings = _equal(trials), sum(len(s.time) for s in trials)
+        command = trials[0].drives and not _scatters(trials)
         for s in trials:
             for a, b in s.runs[np.ptp(s.runs, axis=1) > 2]:
-                if _by_chance(b - a - 1, equal, readings) < CHANCE_OF_REPEATS and (
-                    _driven(seen[s.trial], a, b) if s.drives else _held(s, a, b)
-                ):
+                usual = not _goes_on(s, a, b) if command else _by_chance(b - a - 1, equal, readings) >= CHANCE_OF_REPEATS
+                if not usual and (_driven(seen[s.trial], a, b) if s.drives else _held(s, a, b)):
                     rows[s.trial] += range(a, b)
         if rows:
             words = f"{name}: one value, to the last digit, over {where(case, rows)}, while the robot moves"
@@ -191,6 +192,14 @@ def _equal(trials: Sequence[Series]) -> float:
 def _by_chance(repeats: int, equal: float, readings: int) -> float:
     """Return how many times so many readings that equal the one before are expected somewhere in so many readings."""
     return readings * min(equal, 1.0) ** repeats
+
+
+def _goes_on(s: Series, a: int, b: int) -> bool:
+    """Return whether a command goes on, after it stood in rows a to b, where it would be had it not: the way it went beside them."""
+    if a < 1 or b + 1 >= len(s.time):
+        return False
+    before, jump, after = (float(s.read[i, 0] - s.read[i - 1, 0]) for i in (a, b, b + 1))
+    return min(before * jump, after * jump) > 0.0 and abs(jump) > LEFT_BY_PATTERN * (b - a) * min(abs(before), abs(after))
 
 
 def _held(s: Series, a: int, b: int) -> bool:
