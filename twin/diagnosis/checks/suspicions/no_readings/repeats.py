@@ -116,7 +116,7 @@ def _unfollowed(seen: Seen, a: int, b: int) -> bool:
     if np.linalg.norm(way) <= max(UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())), float(np.linalg.norm(after - before))):
         return False
     went, gone = ((v[a:b].mean(axis=0) - 0.5 * (v[a - 1] + v[b]))[known] / noise[known] for v in (shown, read))
-    if gone @ went > SHARED_MOTION_SHARE * went @ went:
+    if gone @ went > LEFT_BY_PATTERN * went @ went:
         return False
     late = np.nan_to_num(left[b : 2 * b - a + SPIKE_WINDOW, known] - before) @ way
     return bool(went @ way > LEFT_BY_PATTERN * way @ way and np.all(late < SHARED_MOTION_SHARE * way @ way))
@@ -195,7 +195,7 @@ def _by_chance(repeats: int, equal: float, readings: int) -> float:
 
 
 def _goes_on(s: Series, a: int, b: int) -> bool:
-    """Return whether a command goes on, after it stood in rows a to b, where it would be had it not: the way it went beside them."""
+    """Return whether a command goes on, after it stood in rows a to b, as if it had not: the way that it went beside them."""
     if a < 1 or b + 1 >= len(s.time):
         return False
     before, jump, after = (float(s.read[i, 0] - s.read[i - 1, 0]) for i in (a, b, b + 1))
