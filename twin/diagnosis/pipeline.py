@@ -39,6 +39,7 @@ from twin.foundation.errors import DataError
 from twin.foundation.threads import single_thread
 from twin.measurements import Recording
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms
+from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.twin import Twin
 
@@ -63,7 +64,7 @@ def diagnose(
     loops; no number depends on it. Raise TwinError for data that cannot be used.
     """
     settings, twin = settings or Settings(), twin or Twin.of_recording(recording)
-    prepared = prepare(recording, twin.robot)
+    prepared = prepare(on_rows_of_outputs(recording), twin.robot)
     if len(prepared.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one to hold out")
     with single_thread():
@@ -268,7 +269,7 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     Return the fit, the RMS error on held-out trials in words, and notices.
     """
     settings = settings or Settings()
-    prepared = prepare(recording, twin.robot)
+    prepared = prepare(on_rows_of_outputs(recording), twin.robot)
     every = list(range(len(prepared.inputs)))
     nominal = predicted(twin, prepared, every)
     fitted, held_out = split(prepared, settings.seed)

@@ -110,6 +110,13 @@ SUSPECT_NOISE_RATIO = _row("SUSPECT_NOISE_RATIO", 30.0, "ratio",
     "of declared noise to scatter: a slow error may be ten times the scatter", "judgement")
 HIDING_NOISE_RATIO = _row("HIDING_NOISE_RATIO", 10.0, "ratio", "of declared noise to all that the description leaves",
     "judgement: a factor of 1000")
+CHANCE_OF_REPEATS = _row("CHANCE_OF_REPEATS", 1e-3, "a channel",
+    "that a run of equal readings is no accident: a set of thirty channels has one in thirty times as many sets",
+    "python -m pytest tests/diagnosis/checks/test_no_readings.py")
+COUNTER_BITS = (
+    _row("FEWEST_COUNTER_BITS", 8, "bits", "no counter of an encoder or converter rolls over sooner", "judgement"),
+    _row("MOST_COUNTER_BITS", 33, "bits", "one more than the widest counter that rolls over in a session", "judgement"),
+)
 ROOM_TEMPERATURE_RANGE = (
     _row("COLDEST_ROOM", 258.15, "K", "a room, or a yard in winter: -15 degC", "judgement"),
     _row("HOTTEST_ROOM", 323.15, "K", "a room in the sun: 50 degC", "judgement"),

@@ -31,18 +31,23 @@ def collect_notices(channels: Sequence[Channel], trials: Sequence[Trial], tables
         (trial.name, trial.other.keys() - {EXTERNAL_CONTACT, START_POSE}) for trial in trials
     ).items():
         notices.append(f"condition {name!r} is not understood: the twin does not act on it ({_list_files(files)})")
+    holed: dict[tuple[int, tuple[str, ...]], list[str]] = {}
     for channel in channels:
         gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}
         empty = [trial.name for trial in trials if gaps[trial.name] == len(trial.time)]
-        holed = [name for name, count in gaps.items() if count and name not in empty]
+        some = tuple(name for name, count in gaps.items() if count and name not in empty)
         lowest = min((float(np.nanmin(t.values[channel.name])) for t in trials if t.name not in empty), default=0.0)
         if channel.role == "input" and channel.kind == "tendon_tension" and lowest < -MAX_SLACK_SIGMAS * (channel.noise or 0.01):
             notices.append(f"input {channel.name} falls to {lowest:.3g} N, below what its noise explains: a zero offset?")
         if empty:
             notices.append(f"{channel.role} {channel.name} has no value in {_list_files(empty)}")
-        if holed and channel.role == "input":
-            count = sum(gaps[name] for name in holed)
-            notices.append(f"input {channel.name} misses {count} values, which are not filled in ({_list_files(holed)})")
+        if some and channel.role == "input":
+            holed.setdefault((sum(gaps[name] for name in some), some), []).append(channel.name)
+    for (count, files), names in holed.items():
+        inputs = (
+            f"input {names[0]} misses {count} values" if len(names) == 1 else f"inputs {', '.join(names)} miss {count} values each"
+        )
+        notices.append(f"{inputs} ({_list_files(files)})")
     return notices
 
 

@@ -27,6 +27,8 @@ from twin.measurements.channels import DERIVED_KINDS, Channel, Role
 from twin.measurements.clouds import read_clouds
 from twin.measurements.conditions import MAX_CONDITION, read_conditions
 from twin.measurements.notices import collect_notices
+from twin.measurements.parsing import declared as rules_of
+from twin.measurements.parsing.declared import Done, Rules
 from twin.measurements.parsing.plausible import check_roles, check_table, check_trials, unusable_reason
 from twin.measurements.parsing.quantity_strings import parse_number, parse_vector
 from twin.measurements.parsing.tables import Table, read_table
@@ -47,6 +49,10 @@ class SetFile(TableSchema):
     title: Text = Field("", description="one line for people")
     source: Text = Field("not stated", description='"hardware" or "simulation"; free text may follow after a colon')
     gravity: Any = Field(None, description="[x, y, z] m/s^2 in the base frame; left out: the robot's own")
+    time: Any = Field(
+        None, description='"epoch", "s", "ms", "us" or "ns" of any start: each first stamp is subtracted; left out: s'
+    )
+    missing: Any = Field(None, description="[x, y, z] of a lost marker, or one number of any channel: no reading, in file units")
     channel: list[Any] = Field([], description="[[channel]] tables: the columns")
     trial: list[Any] = Field([], description="[[trial]] tables: the files, one a run")
 
@@ -61,6 +67,8 @@ class ChannelTable(TableSchema):
     quantity: Text = Field("", description="what the column is, a name of the grammar below; left out: its name says so")
     scale: Any = Field(1.0, description="a reading counts as reading * scale + offset, in the unit")
     offset: Any = Field(0.0, description="see scale")
+    missing: Any = Field(None, description="a number that is no reading, as the column has it")
+    wraps: Any = Field(None, description="the span at which a reading rolls over, as the column has it: 360; it is unwrapped")
 
 
 def read(path: str | Path, *, least_trials: int = 2) -> Recording:
@@ -72,7 +80,7 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
     trials: two are needed to hold one out of every fit. All problems of measurements.toml are reported together.
     """
     file = Path(path) if Path(path).name == SET_FILE else Path(path) / SET_FILE
-    declared, gravity, channels, declared_trials = _read_declarations(file)
+    declared, gravity, channels, declared_trials, rules = _read_declarations(file)
     notices = []
     if declared.source.partition(":")[0].strip() not in _SOURCE_KINDS:
         notices.append(
@@ -81,9 +89,10 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
     trials: list[Trial] = []
     tables: list[Table] = []
     left_out: list[str] = []
+    done: dict[str, Done] = {}
     numbers_left = MAX_SET_NUMBERS
     for declared_trial in declared_trials:
-        trial, table = _read_trial(file.parent, declared_trial, channels)
+        trial, table, done_here = _read_trial(file.parent, declared_trial, channels, rules)
         numbers_left -= table.columns["time"].size * len(table.columns)
         if numbers_left < 0:
             raise DataError(f"{file}: more than {MAX_SET_NUMBERS} numbers in all; split the set, or thin its trials out")
@@ -92,11 +101,17 @@ def read(path: str | Path, *, least_trials: int = 2) -> Recording:
             left_out.append(f"{trial.name} is left out: {reason}")
         else:
             trials.append(trial)
+            done[trial.name] = done_here
     with prefix_errors(file):
         check_trials(channels, trials, left_out, least_trials)
-    notices += left_out + collect_notices(channels, trials, tables)
+    timed = rules_of.started(rules, trials, {name: d.first for name, d in done.items()})
+    notices += rules_of.notices(rules, list(done.values()), timed != trials)
+    notices += left_out + collect_notices(channels, timed, tables)
     head = (declared.robot, declared.title, declared.source, gravity, channels)
-    return Recording(*head, tuple(trials), file.parent, tuple(notices))
+    return Recording(*head, tuple(timed), file.parent, tuple(notices))
+
+
+ParsedChannel = tuple[Channel, dict[str, float], dict[str, float]]  # with `missing` and `wraps`, by its name
 
 
 @dataclass(frozen=True)
@@ -110,7 +125,7 @@ class DeclaredTrial:
     other: dict[str, object]
 
 
-def _read_declarations(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Channel, ...], list[DeclaredTrial]]:
+def _read_declarations(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Channel, ...], list[DeclaredTrial], Rules]:
     """Read measurements.toml. Raises DataError with all its problems."""
     if not is_file(file):
         raise DataError(f"{short_repr(str(file), 300)}: no such file; a measurement set is a folder with a {SET_FILE}")
@@ -129,7 +144,8 @@ def _read_declarations(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Ch
             _collect_fault(problems, f"channel {n}", lambda each=each: _parse_channel(each))
             for n, each in enumerate(declared.channel, 1)
         ]
-        channels = tuple(c for c in parsed if c is not None)
+        channels = tuple(c for c, _, _ in filter(None, parsed))
+        rules = _parse_rules(declared, [each for each in parsed if each is not None], problems)
         names = [c.name for c in channels]
         problems += [
             f"channel {name} is declared twice; declare it once" for name in sorted({n for n in names if names.count(n) > 1})
@@ -147,7 +163,15 @@ def _read_declarations(file: Path) -> tuple[SetFile, np.ndarray | None, tuple[Ch
                 problems.append(f"trial {n + 1}: file {short_repr(t.table.name)} is there twice; list every trial once")
         if problems:
             raise DataError(join_problems(problems))
-    return declared, gravity, channels, declared_trials
+    return declared, gravity, channels, declared_trials, rules
+
+
+def _parse_rules(declared: SetFile, channels: Sequence[ParsedChannel], problems: list[str]) -> Rules:
+    time, missing = declared.time, declared.missing
+    clock = None if time is None else _collect_fault(problems, "time", lambda: rules_of.parse_time(time))
+    lost = None if missing is None else _collect_fault(problems, "missing", lambda: rules_of.parse_missing(missing))
+    missing_of = {name: value for _, each, _ in channels for name, value in each.items()}
+    return Rules(clock or "", lost or (), missing_of, {name: value for _, _, each in channels for name, value in each.items()})
 
 
 Result = TypeVar("Result")
@@ -169,7 +193,7 @@ def _parse_gravity(value: object) -> np.ndarray:
     return pull
 
 
-def _parse_channel(table: object) -> Channel:
+def _parse_channel(table: object) -> ParsedChannel:
     problems: list[str] = []
     found = validate_table(ChannelTable, table, "", problems)
     if found is None:
@@ -179,11 +203,10 @@ def _parse_channel(table: object) -> Channel:
     channel = Channel(found.name, found.role, found.unit, None, found.quantity, factor, offset)
     if channel.kind in DERIVED_KINDS:
         raise DataError(f"{found.name} is made from point clouds, not read; give the trial's clouds as `cloud`")
-    if found.noise is None:
-        return channel
-    with prefix_errors(f"noise of {found.name}"):
-        noise = channel.unit_scale.without_offset().to_si(parse_number(found.noise))
-    return replace(channel, noise=noise)
+    if found.noise is not None:
+        with prefix_errors(f"noise of {found.name}"):
+            channel = replace(channel, noise=channel.unit_scale.without_offset().to_si(parse_number(found.noise)))
+    return channel, *rules_of.of_channel(found.name, found.missing, found.wraps)
 
 
 def _parse_trial(folder: Path, entry: object) -> DeclaredTrial:
@@ -205,15 +228,16 @@ def _trial_label(path: Path) -> Path:
     return path.with_suffix("")
 
 
-def _read_trial(folder: Path, declared: DeclaredTrial, channels: Sequence[Channel]) -> tuple[Trial, Table]:
-    table = read_table(declared.table, ["time", *(channel.name for channel in channels)])
+def _read_trial(folder: Path, declared: DeclaredTrial, channels: Sequence[Channel], rules: Rules) -> tuple[Trial, Table, Done]:
+    table, done = rules_of.apply(rules, read_table(declared.table, ["time", *(channel.name for channel in channels)]), channels)
     check_table(table, channels)
     values = {channel.name: channel.scale.to_si(table.columns[channel.name]) for channel in channels}
     for column in values.values():
         column.setflags(write=False)  # so that the trial need not copy it
-    clouds = read_clouds(declared.cloud) if declared.cloud else None
+    clouds = rules_of.on_clock(rules, done, read_clouds(declared.cloud) if declared.cloud else None)
     name = declared.table.relative_to(folder).as_posix()
-    return Trial(name, table.columns["time"], values, declared.conditions, declared.other, declared.start, clouds), table
+    trial = Trial(name, table.columns["time"], values, declared.conditions, declared.other, declared.start, clouds)
+    return trial, table, done
 
 
 def _trial_file(folder: Path, entry: Mapping[str, object]) -> Path:

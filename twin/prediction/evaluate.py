@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from twin.measurements import Recording
+from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.simulate import is_dynamic, simulate
 from twin.prediction.twin import Twin
@@ -97,7 +98,7 @@ def evaluate(twin: Twin, recording: Recording) -> dict[str, Any]:
     Unit, trials, rmse (of positions where there are any), by_kind, by_channel (root-mean-square of the channel alone). Raises
     TwinError for data that the twin cannot be compared with.
     """
-    prepared = prepare(recording, twin.robot)
+    prepared = prepare(on_rows_of_outputs(recording), twin.robot)
     traces = simulate(twin, prepared, dynamic=is_dynamic(prepared))
     raw = [y - t.outputs(twin, prepared) for y, t in zip(prepared.measured, traces, strict=True)]
     groups = list(dict.fromkeys(o.group for o in prepared.outputs))

@@ -157,11 +157,11 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
     notices += [f"output {name} is not predicted by robot {robot.name!r} and is not compared" for name in unknown]
     clocks, note = _clocks(recording)
     notices += note
-    inputs, measured = [], []
+    inputs, measured, gaps = [], [], {}
     for k in np.argsort([c[0] for c in clocks], kind="stable"):
         trial = recording.trials[k]
-        readings, note = _columns(trial, names)
-        notices += note
+        readings, bridged = _columns(trial, names)
+        gaps |= {trial.name: bridged} if bridged else {}
         start, unknown_conditions = _start(trial, body)
         notices += [
             f"{trial.name}: condition {name!r} is not one the twin understands; it is not used" for name in unknown_conditions
@@ -181,6 +181,7 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         reach = np.max([np.abs(i.command - home).max(axis=0) for i in inputs], axis=0)
         reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
         inputs = [replace(i, home=home, reach=reach) for i in inputs]
+    notices += _bridged(gaps)
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each, turned)
 
@@ -279,20 +280,27 @@ def _clocks(recording: Recording) -> tuple[list[np.ndarray], list[str]]:
 
 
 def _columns(trial: Trial, names: list[str]) -> tuple[np.ndarray, list[str]]:
-    """Return the drive columns of a trial. Gaps are bridged linearly, with a notice."""
-    columns, notes = [], []
+    """Return the drive columns of a trial, with gaps bridged linearly, and the names of those with gaps."""
+    columns, bridged = [], []
     for name in names:
         values = trial.values[name]
         known = np.isfinite(values)
         if not known.any():
             raise DataError(f"{trial.name}: input {name} is empty in this trial; remove the trial or log the channel")
         if not known.all():
-            notes.append(
-                f"{trial.name}: {int((~known).sum())} missing values of input {name}; the twin is driven by a straight line there"
-            )
+            bridged.append(name)
             values = np.interp(trial.time, trial.time[known], values[known])
         columns.append(values)
-    return np.stack(columns, axis=1), notes
+    return np.stack(columns, axis=1), bridged
+
+
+def _bridged(gaps: dict[str, list[str]]) -> list[str]:
+    """Return the notice of all bridged gaps; `gaps` is by trial."""
+    if not gaps:
+        return []
+    names = ", ".join(dict.fromkeys(n for each in gaps.values() for n in each))
+    where = next(iter(gaps)) if len(gaps) == 1 else f"{len(gaps)} trials"
+    return [f"the twin is driven by straight lines where {names} has no value ({where})"]
 
 
 def _temperature(recording: Recording, trial: Trial) -> np.ndarray:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LEAST_EXCITATION = 30.0  # resolutions of a drive (`Drive.reading`); a smaller range of commands does not excite a robot
 
+UNEVEN_STEPS = 0.5  # of the mean step, by which the median step is off it where rows come in bursts
+
 
 @dataclass(frozen=True)
 class Trace:
@@ -191,17 +193,29 @@ def is_dynamic(prepared: PreparedRecording) -> bool:
     if not can_step(prepared) or Drive.CURRENT in prepared.drives:
         return False
     period = 1.0 / prepared.robot.build().first_mode_frequency()
-    for trial in prepared.inputs:
-        dt = np.diff(trial.time)
+    for trial, measured in zip(prepared.inputs, prepared.measured, strict=True):
+        dt, command = _even(trial, measured)
         width = int(np.ceil(0.3 * period / np.median(dt)))
         if width < 2:
             continue
-        smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(width) / width, "valid"), 0, trial.command)  # noqa: B023
+        smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(width) / width, "valid"), 0, command)  # noqa: B023
         span = np.ptp(smooth, axis=0)
         slope = np.abs(np.gradient(smooth, np.median(dt), axis=0)).max(axis=0)
         if np.any((span > LEAST_EXCITATION * prepared.reading) & (slope > 0.8 * span / period)):
             return True
     return False
+
+
+def _even(trial: Inputs, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the steps of time (n - 1,) and the commands (n, n_tendon) of a trial; even steps where devices take turns in its rows.
+
+    A few milliseconds between the row of one device and that of the next are no fast motion.
+    """
+    dt = np.diff(trial.time)
+    if not np.isnan(measured).any() or abs(np.median(dt) / np.mean(dt) - 1.0) < UNEVEN_STEPS:
+        return dt, trial.command
+    time = np.linspace(trial.time[0], trial.time[-1], len(trial.time))
+    return np.diff(time), np.stack([np.interp(time, trial.time, c) for c in trial.command.T], axis=1)
 
 
 def can_step(prepared: PreparedRecording) -> bool:

@@ -1,10 +1,9 @@
-"""Mistakes of meaning, each planted in a good measurement set:  python -m tools.benchmarks.diagnosis.mistakes SET [mistake ...]
+"""Mistakes of meaning and faults of devices, planted in a good set:  python -m tools.benchmarks.diagnosis.mistakes SET [name ...]
 
 Every mistake leaves a file that reads well and means something else. The table says of each whether the reader or the prediction
-refused it, whether the diagnosis said it before any fit, or whether it was missed.
+refused it, whether the diagnosis said it before any fit, or whether it was missed. The faults are in `faults.py`.
 """
 
-import csv
 import re
 import shutil
 import tempfile
@@ -17,14 +16,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from tools.benchmarks.diagnosis.faults import FAULTS
+from tools.benchmarks.diagnosis.tables import Columns, read_columns, write_columns
 from twin.diagnosis import Settings, preview_data
 from twin.foundation.errors import TwinError
 from twin.measurements import read
+from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import prepare
 from twin.prediction.twin import Twin
 from twin.robots import load
 
-Columns = dict[str, np.ndarray]
 Edit = Callable[[Columns], Columns]
 
 
@@ -32,26 +33,14 @@ def _tables(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.csv"))
 
 
-def _write(path: Path, columns: Columns) -> None:
-    rows = [",".join(columns)]
-    rows += [",".join("" if np.isnan(v) else f"{v:.6g}" for v in row) for row in zip(*columns.values(), strict=True)]
-    path.write_text("\n".join(rows) + "\n")
-
-
-def _read(path: Path) -> Columns:
-    with path.open() as file:
-        header, *rows = csv.reader(file)
-    return {name: np.array([float(r[i] or "nan") for r in rows]) for i, name in enumerate(header)}
-
-
 def _edited(folder: Path, change: Edit, only: str = "") -> None:
     for path in _tables(folder):
         if path.stem == only or not only:
-            before = _read(path)
+            before = read_columns(path)
             after = change(before)
             if all(np.array_equal(v, before[n], equal_nan=True) for n, v in after.items()):
                 raise ValueError(f"{path} has no column of the kind")
-            _write(path, after)
+            write_columns(path, after)
 
 
 def _scaled(pattern: str, factor: float, offset: float = 0.0) -> Callable[[Path], None]:
@@ -232,7 +221,7 @@ MISTAKES: dict[str, Callable[[Path], None]] = {
 def planted(good: Path, folder: Path, mistake: str) -> Path:
     """A copy of a good set with one mistake in it."""
     shutil.copytree(good, folder)
-    MISTAKES[mistake](folder)
+    (MISTAKES | FAULTS)[mistake](folder)
     return folder
 
 
@@ -241,7 +230,7 @@ def answer(folder: Path, seed: int = 0) -> tuple[str, list[str]]:
     try:
         recording = read(folder)
         twin = Twin.of(load(recording.robot, recording.folder))
-        found = preview_data(prepare(recording, twin.robot), twin, Settings(seed=seed)).suspicions
+        found = preview_data(prepare(on_rows_of_outputs(recording), twin.robot), twin, Settings(seed=seed)).suspicions
     except TwinError as error:
         return "refused", [str(error)]
     return ("said" if found else "missed"), [f"{s.kind}: {s.words}; change: {s.change}" for s in found]
@@ -252,7 +241,7 @@ def main(good: tyro.conf.Positional[Path], mistakes: tyro.conf.Positional[tuple[
     table = Table("mistake", "answer", "in words")
     table.add_row("(none)", *_cells(*answer(good)))
     with tempfile.TemporaryDirectory() as work:
-        for n, mistake in enumerate(mistakes or MISTAKES):
+        for n, mistake in enumerate(mistakes or MISTAKES | FAULTS):
             try:
                 folder = planted(good, Path(work) / str(n), mistake)
             except ValueError:

@@ -39,10 +39,14 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         raise DataError(f"{table.cell(int(short[0]) + 1, 'time')}: {step}")
     if len(time) and not abs(time[0]) + (time[-1] - time[0]) <= MAX_TRIAL_TIME:
         last = float(time[-1])
-        divided = next((f"divide by {10.0**n:g} and " for n in (9, 6, 3) if last / 10.0**n > EPOCH_SECONDS), "")
+        unit, divided = next(
+            ((u, f"divide by {10.0**n:g} and ") for n, u in ((9, "ns"), (6, "us"), (3, "ms")) if last / 10.0**n > EPOCH_SECONDS),
+            ("epoch", ""),
+        )
         raise DataError(
-            f"{table.cell(len(time) - 1, 'time')}: {last!r} s; time is in seconds since a start of your choice, and at most "
-            f"{MAX_TRIAL_TIME:g} s: {divided}subtract the first trial's first stamp, with `start` in [[trial]] for when each began"
+            f"{table.cell(len(time) - 1, 'time')}: {last!r} s; time is in seconds since a start of your choice, and at "
+            f"most {MAX_TRIAL_TIME:g} s: {divided}subtract the first trial's first stamp, with `start` in [[trial]] for when each "
+            f'began, or write time = "{unit}" at the top of measurements.toml'
         )
     for channel in channels:
         column = channel.scale.to_si(table.columns[channel.name])
@@ -53,7 +57,10 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
             slack = max(
                 MAX_SLACK_SIGMAS * (channel.noise or 0.0), _ZERO_OFFSET, _ZERO_OFFSET_SHARE * np.nanmax(column, initial=0.0)
             )
-            advice = f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign"
+            advice = (
+                f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign, or declare it "
+                "`missing`"
+            )
             _check_floor(table, channel, column, -slack, advice)
 
 

@@ -111,7 +111,8 @@ def _cell_number(path: Path, row: int, name: str, cell: str) -> float:
     if not _NUMBER_PATTERN.fullmatch(text):
         if name == "time" and _DATE_PATTERN.match(text):
             raise DataError(
-                f"{path}, row {row}, column time: {short_repr(cell)} is a date; write the seconds since a start of your choice"
+                f"{path}, row {row}, column time: {short_repr(cell)} is a date; write the seconds since a start of your choice, "
+                "or use `twin import`"
             )
         raise DataError(
             f"{path}, row {row}, column {name}: {short_repr(cell)} is not a number; write one, or nothing if it is missing"
@@ -139,4 +140,4 @@ def _read_parquet(path: Path, names: Sequence[str]) -> Table:
 
 
 def _numbers(column: pa.ChunkedArray) -> np.ndarray:
-    return column.cast(pa.float64()).to_numpy(zero_copy_only=False)
+    return column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)  # nanoseconds since 1970, to 256 of them

@@ -6,10 +6,11 @@ signs.py        displacements, readings and gravity of the opposite sign or dire
 frames.py       markers mirrored, turned, shifted
 order.py        tendons and markers exchanged
 trials.py       duplicates, another robot, clocks, milliseconds
-channels.py     dead channels, lost markers, declared noise, room temperature
+channels.py     dead channels, declared noise, room temperature
 stops.py        joints that end earlier than described
 clouds.py       point clouds in another unit, or away from their markers
 description.py  robot.toml off by a thousand
+no_readings/    zeros, fills, stuck values, labels swapped for a while, roll-overs
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -18,6 +19,7 @@ import numpy as np
 
 from twin.diagnosis.checks.suspicions import channels, clouds, description, frames, order, signs, stops, trials, units
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
+from twin.diagnosis.checks.suspicions.no_readings import jumps, repeats
 from twin.diagnosis.split import blind
 from twin.diagnosis.thresholds import UNDECIDED_CHANGES_RATIO
 from twin.prediction.prepared import PreparedRecording
@@ -26,7 +28,8 @@ from twin.prediction.twin import Twin
 Kind = Callable[[Case], Iterable[Suspicion]]
 SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs,
-    channels.lost_markers, channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds, stops.ends,
+    repeats.lost_markers, repeats.fills, repeats.stuck, repeats.frozen, jumps.exchanged, jumps.rolled,
+    channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds, stops.ends,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, signs.zeros, order.tendons, channels.inputs,

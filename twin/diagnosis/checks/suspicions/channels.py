@@ -30,23 +30,6 @@ def outputs(case: Case) -> Iterator[Suspicion]:
         yield Suspicion("dead channel", words, f"remove the [[channel]] {', '.join(found)}, or log again")
 
 
-def lost_markers(case: Case) -> Iterator[Suspicion]:
-    """Yield markers at exactly 0, 0, 0 in some rows and elsewhere in most.
-
-    Trackers write zeros for a marker that they have lost.
-    """
-    y, found = np.concatenate(case.prepared.measured), []
-    for marker in dict.fromkeys(o.index for o in case.prepared.outputs if o.group == "marker"):
-        columns = [j for j, o in enumerate(case.prepared.outputs) if o.group == "marker" and o.index == marker]
-        at_zero = (y[:, columns] == 0.0).all(axis=1)
-        known = np.isfinite(y[:, columns]).all(axis=1)
-        if len(columns) == 3 and 0 < at_zero.sum() < 0.5 * known.sum():
-            found.append(f"{case.prepared.outputs[columns[0]].channel.name.rpartition('_')[0]} in {at_zero.sum()} rows")
-    if found:
-        words = f"{', '.join(found)}: exactly 0, 0, 0, and elsewhere in all others: trackers write this for a lost marker"
-        yield Suspicion("lost markers", words, "leave these cells empty in the trials' files")
-
-
 def inputs(case: Case) -> Iterator[Suspicion]:
     """Yield a drive that never changes although the robot moves as if it did."""
     if case.predicted is None or not case.few() or any(ends(case)):
@@ -89,13 +72,13 @@ def noise(case: Case) -> Iterator[Suspicion]:
         if case.predicted is not None:
             read, shown = ([v[k][:, j] for k in case.trials] for v in (case.prepared.measured, case.predicted))
             left = [y - p for y, p in zip(read, shown, strict=True)]
-            least = min(_white(read), _white(left)) - NOMINAL_MOTION_ERROR * _white(
+            least = min(white(read), white(left)) - NOMINAL_MOTION_ERROR * white(
                 shown
             )  # less the robot's errors, where it moves from row to row
             odd += _odd(o.channel, least, _scatter(left, 0.5), HIDING_NOISE_RATIO * rms(np.concatenate(left)))
     for i, c in enumerate(case.prepared.drivers):
         read = [x.command[:, i] / case.prepared.pull[i] for x in case.prepared.inputs]
-        odd += _odd(c, _white(read), _scatter(read, 0.25), float(np.ptp(np.concatenate(read))) or np.inf)
+        odd += _odd(c, white(read), _scatter(read, 0.25), float(np.ptp(np.concatenate(read))) or np.inf)
     for unit in dict.fromkeys(c.unit for c, _ in odd):
         alike = [(c, s) for c, s in odd if c.unit == unit]
         one = alike[0][0].scale.without_offset().to_si(1.0)
@@ -118,7 +101,7 @@ def _odd(channel: Channel, least: float, scatter: float, most: float) -> list[tu
     return [(channel, scatter)] if declared > max(most, SUSPECT_NOISE_RATIO * scatter) else []
 
 
-def _white(columns: list[np.ndarray]) -> float:
+def white(columns: list[np.ndarray]) -> float:
     """Return the standard deviation of white noise on a motion.
 
     The second differences of white noise change sign from row to row, those of a smooth motion keep theirs. Minus the product of

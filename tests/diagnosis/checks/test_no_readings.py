@@ -1,0 +1,121 @@
+"""Faults of trackers, encoders and loggers planted in good days of a rod, a finger and a joint robot are told before any fit."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tools.benchmarks.diagnosis.faults import FAULTS
+from tools.simulators.two_link import write_day
+from twin.diagnosis.checks.suspicions import Case, Suspicion
+from twin.diagnosis.checks.suspicions.no_readings import jumps, repeats
+from twin.foundation.errors import DataError
+from twin.measurements import Recording, read, write
+from twin.prediction.prepared import prepare
+from twin.prediction.simulate import simulate
+from twin.prediction.twin import Twin
+from twin.robots import load
+from twin.robots.robot import models_folder
+
+KINDS = (repeats.lost_markers, repeats.fills, repeats.stuck, repeats.frozen, jumps.exchanged, jumps.rolled)
+SAMPLES = {"rod": "continuum/samples/friday", "finger": "finger/samples/drift"}
+NOT_TOLD = {  # what no rule sees: which robot, and why
+    ("finger", "a drive that is stuck"): "a command without noise that stands through a turn and goes back may be meant",
+    ("joint robot", "a reading drops out as 0"): "a joint's angle of 0 is one that it passes through",
+}
+KIND = {
+    "zeros": "lost markers", "as -1": "filled cells", "as 9999": "filled cells", "stays": "stuck value", "is stuck": "stuck value",
+    "names": "swapped labels", "rolls over": "roll-over", "rows that repeat": "frozen rows",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def days(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Six trials of each robot, the ones that move most."""
+    folder = tmp_path_factory.mktemp("days")
+    write_day(folder / "whole joint robot", None, 41002)
+    found = {"joint robot": folder / "whole joint robot"} | {n: models_folder() / s for n, s in SAMPLES.items()}
+    for name, path in found.items():
+        day = read(path)
+        travel = [sum(float(np.nanstd(t.values[c.name])) for c in day.outputs()) for t in day.trials]
+        write(day.select(sorted(np.argsort(travel)[-6:].tolist())), folder / name)
+    return {name: folder / name for name in found}
+
+
+@cache
+def predicted(robot: str, commands: bytes) -> tuple[np.ndarray, ...]:
+    day = TO_PREDICT[robot, commands]
+    twin = Twin.of(load(day.robot, day.folder))
+    prepared = prepare(day, twin.robot)
+    return tuple(t.outputs(twin, prepared) for t in simulate(twin, prepared))
+
+
+TO_PREDICT: dict[tuple[str, bytes], Recording] = {}
+
+
+def told(day: Recording) -> list[Suspicion]:
+    """What the files and the prediction of the robot as described show; a prediction of the same inputs is made once."""
+    twin = Twin.of(load(day.robot, day.folder))
+    commands = np.concatenate([t.values[c.name] for t in day.trials for c in day.inputs()]).tobytes()
+    TO_PREDICT[day.robot, commands] = day
+    return [s for kind in KINDS for s in kind(Case(prepare(day, twin.robot), twin, predicted(day.robot, commands)))]
+
+
+@pytest.mark.parametrize("robot", ["rod", "finger", "joint robot"])
+def test_a_good_day_raises_nothing(robot: str, days: dict[str, Path]) -> None:
+    assert told(read(days[robot])) == []
+
+
+@pytest.mark.parametrize("fault", [f for f in FAULTS if not f.startswith("a drive drops out as 9999")])
+@pytest.mark.parametrize("robot", ["rod", "finger", "joint robot"])
+def test_a_fault_is_refused_or_told(robot: str, fault: str, days: dict[str, Path], tmp_path: Path) -> None:
+    if (robot, fault) in NOT_TOLD:
+        pytest.skip(NOT_TOLD[robot, fault])
+    shutil.copytree(days[robot], tmp_path / "set")
+    try:
+        FAULTS[fault](tmp_path / "set")
+    except ValueError as nothing:
+        pytest.skip(f"{nothing} in this set")
+    try:
+        read(tmp_path / "set")
+    except DataError as error:
+        refused = str(error)
+    else:
+        refused = ""
+    if refused:
+        assert "time" in refused or "missing" in refused
+        return
+    found = told(read(tmp_path / "set"))
+    assert found
+    wanted = next((kind for words, kind in KIND.items() if words in fault), "")
+    assert not wanted or wanted in {s.kind for s in found}
+
+
+def test_what_the_file_then_declares_is_no_suspicion(days: dict[str, Path], tmp_path: Path) -> None:
+    shutil.copytree(days["rod"], tmp_path / "set")
+    FAULTS["a lost marker as zeros, four rows at a time"](tmp_path / "set")
+    file = tmp_path / "set/measurements.toml"
+    (found,) = told(read(tmp_path / "set"))
+    assert "write missing = [0, 0, 0] at the top of measurements.toml" in found.change
+    file.write_text(f"missing = [0, 0, 0]\n{file.read_text()}")
+    assert told(read(tmp_path / "set")) == []
+
+
+def test_a_command_that_is_held_is_not_stuck(days: dict[str, Path]) -> None:
+    """Held to the last digit for 20 rows and let go: the robot follows."""
+    day = read(days["rod"])
+    name = day.inputs()[0].name
+    quiet = {c.name: np.round(np.linspace(0.0, 0.3, len(day.trials[0].time)), 3) for c in day.inputs()}
+    quiet[name] = np.where(np.arange(len(day.trials[0].time)) % 40 < 20, 0.1, 1.0)
+    commanded = replace(day, trials=(replace(day.trials[0], values={**day.trials[0].values, **quiet}),))
+    twin = Twin.of(load(day.robot))
+    prepared = prepare(commanded, twin.robot)
+    shown = tuple(t.outputs(twin, prepared) for t in simulate(twin, prepared))
+    seen = {o.channel.name: y for o, y in zip(prepared.outputs, shown[0].T, strict=True)}
+    followed = prepare(commanded.with_values([seen], "simulation"), twin.robot)
+    assert [s for kind in KINDS for s in kind(Case(followed, twin, shown))] == []

@@ -1,0 +1,224 @@
+"""What is no reading: zeros of a lost marker, a fill far from its neighbours, a value that repeats while the robot moves."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnosis.checks.suspicions.case import Case, Suspicion
+from twin.diagnosis.checks.suspicions.channels import white
+from twin.diagnosis.checks.suspicions.no_readings.series import Series, headline, of_drives, of_outputs, where
+from twin.diagnosis.thresholds import (
+    CHANCE_OF_REPEATS,
+    LEFT_BY_PATTERN,
+    SHARED_MOTION_SHARE,
+    SPIKE_SIZE,
+    SPIKE_WINDOW,
+    UNMISSABLE_MOTION,
+)
+
+Rows = dict[int, list[int]]  # trial -> its rows
+Seen = tuple[np.ndarray, np.ndarray, np.ndarray]  # as `headline` has a trial
+
+
+def lost_markers(case: Case) -> Iterator[Suspicion]:
+    """Yield markers at exactly 0, 0, 0 in some rows and elsewhere in most.
+
+    Trackers write zeros for a marker that they have lost.
+    """
+    found = []
+    for name, trials in of_outputs(case).items():
+        known = sum(int(np.isfinite(s.read).all(axis=1).sum()) for s in trials)
+        rows = {s.trial: np.flatnonzero(s.at_zero).tolist() for s in trials if s.at_zero.any()}
+        if 0 < sum(map(len, rows.values())) < 0.5 * known:
+            found.append(f"{name} in {where(case, rows)}")
+    if found:
+        words = f"{'; '.join(found)}: exactly 0, 0, 0, and elsewhere in all others: trackers write this for a lost marker"
+        change = "leave these cells empty in the trials' files, or write missing = [0, 0, 0] at the top of measurements.toml"
+        yield Suspicion("lost markers", words, change)
+
+
+def fills(case: Case) -> Iterator[Suspicion]:
+    """Yield a value that stands, in several rows, far from the readings before and after, where the robot does not go."""
+    for name, trials in of_outputs(case).items():
+        far = SPIKE_SIZE * _typical(trials)
+        away = [
+            (s, r)
+            for s in trials
+            for r in np.flatnonzero(s.apart > far).tolist()
+            if not s.at_zero[s.runs[r, 0]] and _left_by(s, r) > far
+        ]
+        yield from _filled(case, name, trials, away)
+    seen = headline(case)
+    for name, trials in of_drives(case).items():
+        whole = np.concatenate([s.read[:, 0] for s in trials])
+        often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 1]
+        away = []
+        for s in trials:
+            for r in (1 + np.flatnonzero(np.isin(s.read[s.runs[1:-1, 0], 0], often))).tolist():
+                others = whole[np.isfinite(whole) & (whole != s.read[s.runs[r, 0], 0])] if not seen else whole
+                if _unfollowed(seen[s.trial], *s.runs[r]) if seen else 0.0 < float(np.ptp(others)) < s.apart[r]:
+                    away.append((s, r))
+        yield from _filled(case, name, trials, away)
+
+
+def _left_by(s: Series, run: int) -> float:
+    """Return how far the error of a run is from that of the runs beside it, at least; 0 where these are as far apart."""
+    (a, b), before, after = s.runs[run], s.left[s.runs[run - 1, 1] - 1], s.left[s.runs[run + 1, 0]]
+    least = min(float(np.linalg.norm(s.left[a:b] - v, axis=1).min()) for v in (before, after))
+    return least if least > float(np.linalg.norm(after - before)) else 0.0
+
+
+def _scatters(trials: Sequence[Series]) -> bool:
+    """Return whether a drive is read with noise, by more than its last digit; a command is not, and repeats wherever it is held."""
+    steps = np.abs(np.concatenate([np.diff(s.read[:, 0]) for s in trials]))
+    return white([s.read[:, 0] for s in trials]) > np.min(steps[steps > 0.0], initial=np.inf)
+
+
+def _filled(case: Case, name: str, trials: Sequence[Series], away: Sequence[tuple[Series, int]]) -> Iterator[Suspicion]:
+    """Yield the values that stand in several rows of those runs of a channel."""
+    at: dict[tuple[float, ...], Rows] = defaultdict(lambda: defaultdict(list))
+    for s, run in away:
+        a, b = s.runs[run]
+        at[tuple(s.read[a])][s.trial] += range(a, b)
+    for value, rows in at.items():
+        n = sum(map(len, rows.values()))
+        if n < 2:
+            continue
+        s = next(s for s in trials if s.trial in rows)
+        written = [float(f"{v:.12g}") for v in s.written[min(rows[s.trial])]]
+        words = f"exactly {', '.join(f'{v:g}' for v in written)} in {where(case, rows)}, far from the readings around"
+        key = (
+            f"missing = {written[0]:g} in its [[channel]]"
+            if len(written) == 1
+            else f"missing = {written} at the top of measurements.toml"
+        )
+        elsewhere = sum(int((s.read == value).all(axis=1).sum()) for s in trials) - n
+        yield Suspicion(
+            "filled cells", f"{name}: {words}", "leave these cells empty" + (f", or write {key}" if elsewhere < n else "")
+        )
+
+
+def _typical(trials: Sequence[Series]) -> float:
+    """Return how far the error of a reading usually is from the line between its neighbours."""
+    off = np.concatenate([np.linalg.norm(np.diff(s.left, n=2, axis=0), axis=1) / np.sqrt(6.0) for s in trials])
+    off = off[np.isfinite(off)]
+    return max(trials[0].noise, float(np.median(off)) if off.size else 0.0)
+
+
+def _unfollowed(seen: Seen, a: int, b: int) -> bool:
+    """Return whether the robot as described goes a way in rows a to b of a drive that the outputs do not go, then or later."""
+    read, shown, noise = seen
+    left, known = (read - shown) / noise, np.isfinite(read[[a - 1, b]]).all(axis=0) & np.isfinite(read[a:b]).all(axis=0)
+    before, inside, after = left[a - 1, known], left[a:b, known], left[b, known]
+    way = 0.5 * (before + after) - inside.mean(axis=0)
+    if np.linalg.norm(way) <= max(UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())), float(np.linalg.norm(after - before))):
+        return False
+    went, gone = ((v[a:b].mean(axis=0) - 0.5 * (v[a - 1] + v[b]))[known] / noise[known] for v in (shown, read))
+    if gone @ went > LEFT_BY_PATTERN * went @ went:
+        return False
+    late = np.nan_to_num(left[b : 2 * b - a + SPIKE_WINDOW, known] - before) @ way
+    return bool(went @ way > LEFT_BY_PATTERN * way @ way and np.all(late < SHARED_MOTION_SHARE * way @ way))
+
+
+def stuck(case: Case) -> Iterator[Suspicion]:
+    """Yield channels that repeat a value to the last digit, where chance does not, while the robot moves, and then catch up."""
+    if case.predicted is None:
+        return
+    seen = headline(case)
+    for name, trials in (of_outputs(case) | (of_drives(case) if seen else {})).items():
+        rows: Rows = defaultdict(list)
+        equal, readings = _equal(trials), sum(len(s.time) for s in trials)
+        command = trials[0].drives and not _scatters(trials)
+        for s in trials:
+            for a, b in s.runs[np.ptp(s.runs, axis=1) > 2]:
+                usual = not _goes_on(s, a, b) if command else _by_chance(b - a - 1, equal, readings) >= CHANCE_OF_REPEATS
+                if not usual and (_driven(seen[s.trial], a, b) if s.drives else _held(s, a, b)):
+                    rows[s.trial] += range(a, b)
+        if rows:
+            words = f"{name}: one value, to the last digit, over {where(case, rows)}, while the robot moves"
+            yield Suspicion("stuck value", words, f"leave the cells of {name} empty where it repeats")
+
+
+def frozen(case: Case) -> Iterator[Suspicion]:
+    """Yield rows in which every channel repeats, where chance does not, and after which the robot is further on its way."""
+    seen, every = headline(case), [*of_outputs(case).values(), *of_drives(case).values()]
+    whole = [replace(of[0], read=np.concatenate([s.read for s in of], axis=1)) for of in zip(*every, strict=True)]
+    equal, readings = _equal(whole), sum(len(s.time) for s in whole)
+    noisy = bool(seen) and _scatter(seen) > LEFT_BY_PATTERN
+    rows: Rows = defaultdict(list)
+    for s in whole if seen else []:
+        for a, b in s.runs[np.ptp(s.runs, axis=1) > 2]:
+            if (
+                a > 0
+                and b + 1 < len(s.time)
+                and _by_chance(b - a - 1, equal, readings) < CHANCE_OF_REPEATS
+                and _skips(seen[s.trial], a, b, noisy)
+            ):
+                rows[s.trial] += range(a + 1, b)
+    if rows:
+        words = (
+            f"all channels: {where(case, rows)} repeat the row before to the last digit, and then the robot is further on its way"
+        )
+        yield Suspicion("frozen rows", words, "remove these rows: the logger repeated the last readings that it had")
+
+
+def _scatter(seen: Sequence[Seen]) -> float:
+    """Return by how much readings usually scatter about a smooth error of the prediction, in their noise."""
+    second = np.concatenate([np.diff((read - shown) / noise, n=2, axis=0) for read, shown, noise in seen])
+    return float(np.sqrt(np.nanmedian(second**2) / 6.0))
+
+
+def _skips(seen: Seen, a: int, b: int, noisy: bool) -> bool:
+    """Return whether the outputs jump after rows a to b.
+
+    Where readings do not scatter, a standing robot repeats its rows too: there further than, and the way, that it went beside them.
+    """
+    read, _, noise = seen
+    before, jump, after = ((read[i] - read[i - 1]) / noise for i in (a, b, b + 1))
+    known = np.isfinite(before + jump + after)
+    size = float(jump[known] @ jump[known])
+    beside = [float(way[known] @ jump[known]) for way in (before, after)]
+    return size > UNMISSABLE_MOTION**2 * max(1, known.sum()) and (noisy or all(0.0 < along < size for along in beside))
+
+
+def _equal(trials: Sequence[Series]) -> float:
+    """Return how often a reading equals the one before."""
+    readings, runs = (sum(f(s) for s in trials) for f in (lambda s: int(np.ptp(s.runs, axis=1).sum()), lambda s: len(s.runs)))
+    return (1 + readings - runs) / max(readings, 2)
+
+
+def _by_chance(repeats: int, equal: float, readings: int) -> float:
+    """Return how many times so many readings that equal the one before are expected somewhere in so many readings."""
+    return readings * min(equal, 1.0) ** repeats
+
+
+def _goes_on(s: Series, a: int, b: int) -> bool:
+    """Return whether a command goes on, after it stood in rows a to b, as if it had not: the way that it went beside them."""
+    if a < 1 or b + 1 >= len(s.time):
+        return False
+    before, jump, after = (float(s.read[i, 0] - s.read[i - 1, 0]) for i in (a, b, b + 1))
+    return min(before * jump, after * jump) > 0.0 and abs(jump) > LEFT_BY_PATTERN * (b - a) * min(abs(before), abs(after))
+
+
+def _held(s: Series, a: int, b: int) -> bool:
+    """Return whether an output stays behind the robot as described over rows a to b and catches up after them."""
+    left = s.left
+    behind = left[b - 1] - left[a]
+    if not np.linalg.norm(behind) > UNMISSABLE_MOTION * s.noise:
+        return False
+    after = b + np.flatnonzero(np.isfinite(left[b:]).all(axis=1))
+    return not after.size or bool(np.linalg.norm(left[after[0]] - left[a]) < LEFT_BY_PATTERN * np.linalg.norm(behind))
+
+
+def _driven(seen: Seen, a: int, b: int) -> bool:
+    """Return whether the robot moved over rows a to b of a drive by what the robot as described makes up after them."""
+    read, shown, noise = seen
+    if b >= len(read):
+        return False
+    jump, moved = (shown[b] - shown[b - 1]) / noise, (read[b - 1] - read[a]) / noise
+    known = np.isfinite(moved)
+    if not np.linalg.norm(jump[known]) > UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())):
+        return False
+    return bool(moved[known] @ jump[known] > LEFT_BY_PATTERN * jump[known] @ jump[known])
