@@ -4,6 +4,7 @@ python -m tools.figures
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from twin.prediction.twin import Twin
 from twin.robots.robot import models_folder
 
 OUT = Path(__file__).parent / "figures/friday.svg"
-STYLE = {"font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"}
+STYLE: dict[str, Any] = {"font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"}
 STAGES = {"calibrated": ("#b0413e", "calibrated"), "after": ("#1f6f8b", "with tendon friction")}
 
 
