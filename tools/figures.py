@@ -14,7 +14,12 @@ from twin.prediction.twin import Twin
 from twin.robots.robot import models_folder
 
 OUT = Path(__file__).parent / "figures/friday.svg"
-STYLE: dict[str, Any] = {"font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "twin"}
+STYLE: Any = {  # matplotlib names every key in its types
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.hashsalt": "twin",
+}
 STAGES = {"calibrated": ("#b0413e", "calibrated"), "after": ("#1f6f8b", "with tendon friction")}
 
 

@@ -370,6 +370,7 @@ class Piped:
         self.told: list[str] = []
         self.heard: list[Any] = []
         looked = SimpleNamespace(prepared=bench, nominal="nominal", suspicions=("odd",), held_out=(1, 3))
+        monkeypatch.setattr(pipeline, "on_rows_of_outputs", lambda recording: recording)
         monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: bench)
         monkeypatch.setattr(pipeline, "preview_data", lambda bench, twin, settings, progress: looked)
         monkeypatch.setattr(pipeline, "conclude", self.conclude)
@@ -471,6 +472,7 @@ def test_a_calibration_is_judged_on_trials_it_has_not_seen(plan: PreparedRecordi
         asked.setdefault("seen", []).append([k for k, y in enumerate(bench.measured) if np.isfinite(y).any()])
         return bench, ["a spike"]
 
+    monkeypatch.setattr(pipeline, "on_rows_of_outputs", lambda recording: recording)
     monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: day)
     monkeypatch.setattr(pipeline, "predicted", lambda twin, bench, trials: [bench.measured[k] - off for k in trials])
     monkeypatch.setattr(pipeline, "without_spikes", clean)

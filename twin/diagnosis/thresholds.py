@@ -68,6 +68,8 @@ GRAVITY_RANGE = (
     _row("LEAST_GRAVITY", 9.7, "m/s^2", "9.78 at the equator", "derivation: less 0.8 %, for rounding to 9.8 and 9.7"),
     _row("MOST_GRAVITY", 9.9, "m/s^2", "9.83 at the poles", "derivation: and 0.7 % more"),
 )
+GONE_ON = _row("GONE_ON", 0.5, "of a drive's range",
+    "after a joint has come to its end; a joint that sticks or stiffens goes on, if little", "judgement")
 HALVINGS_FOR_ZERO = _row("HALVINGS_FOR_ZERO", 8, "halvings of the largest length",
     "the least other zero is then known to 0.4 % of the travel", "derivation: 2^-8")
 COPIED_TRIAL_DIFFERENCE = _row("COPIED_TRIAL_DIFFERENCE", 0.3, "of the noise",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
+import mujoco
 import numpy as np
 
 from twin.body import Body, Signals
@@ -46,6 +47,13 @@ class ActuatorGain(Effect):
         gain = self.per_tendon_values("gain")
         if (gain != 1.0).any() and "servos" in body.features:
             body.scale_actuators(gain)
+
+    def write(self, spec: mujoco.MjSpec) -> bool:
+        """Return that all is said: strengths are numbers of the model, which `edit` has changed."""
+        return True
+
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda command: command
 
     def command(self, reported: Signals) -> Signals:
         gain = self.per_tendon_values("gain")

@@ -46,6 +46,7 @@ class Inputs:
     home: np.ndarray | None = None  # (n_tendon,) of controls, whose zero means nothing: where they begin
     reach: np.ndarray | None = None  # (n_tendon,) of controls: how far they go from there
     turned: bool = False  # whether orientations are compared
+    damped: bool = False  # whether tensions are so fast that the body's damping shows
 
     @property
     def pull(self) -> np.ndarray:
@@ -182,8 +183,19 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
         inputs = [replace(i, home=home, reach=reach) for i in inputs]
     notices += _bridged(gaps)
+    if any(_outrun_damping(i, body) for i in inputs):
+        inputs = [replace(i, damped=True) for i in inputs]
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each, turned)
+
+
+def _outrun_damping(inputs: Inputs, body: Body) -> bool:
+    """Return whether a tension changes within the body's damping time by more than a reading resolves: the shape is late then."""
+    of = drive_mask(inputs.drives, Drive.TENSION)
+    if not of.any() or len(inputs.time) < 2:
+        return False
+    rates = np.abs(np.diff(inputs.command[:, of], axis=0)) / np.diff(inputs.time)[:, None]
+    return bool(body.damping_time * rates.max() > Drive.TENSION.typical_noise)
 
 
 def _check_fingers(recording: Recording, robot: Robot, body: Body) -> None:

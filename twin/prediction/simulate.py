@@ -78,7 +78,7 @@ class TrialSimulator:
         """
         chain, options = self.twin.effect_chain, self.options
         driven = chain.drive(chain.command(inputs.signals.with_changes(antagonists=self.body.antagonists)))
-        felt = driven if self.steps else damped(driven, self.body.damping_time)
+        felt = damped(driven, self.body.damping_time) if inputs.damped and not self.steps else driven
         heating = Heating(inputs.temperature, self.springs) if Drive.CURRENT in inputs.drives else None
         problem = Problem(
             inputs.time, felt.command, chain.surround(inputs.loads), chain.route, inputs.drives, chain.creep, delayed,

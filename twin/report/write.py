@@ -50,7 +50,7 @@ def write(diagnosis: Diagnosis, folder: Path | str, provenance: Mapping[str, Any
 
 def _model_files(diagnosis: Diagnosis, effects: Mapping[str, Mapping[str, FittedValue]]) -> dict[str, bytes]:
     """Return the twin as an MJCF with its files, by name; none of a robot of another family."""
-    if diagnosis.prepared.robot.family != "mjcf":
+    if "controls" not in diagnosis.prepared.robot.build().features:
         return {}
     fitted = {**diagnosis.parameters, **{f"{e}.{n}": v for e, found in effects.items() for n, v in found.items()}}
     std = {name: v.std for name, v in fitted.items() if v.std is not None}

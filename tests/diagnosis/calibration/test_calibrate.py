@@ -226,7 +226,7 @@ def test_a_law_at_the_end_of_its_range_is_said(case: tuple[int, Recording, Fit])
 
 
 def test_the_derivative_of_strong_friction_is_that_of_full_solves() -> None:
-    """The central difference within 5 %, as the law bends over the step. By one Newton step a sample, the slip of each carried on
+    """The central difference within 7 %, as the law bends over the step. By one Newton step a sample, the slip of each carried on
     to the next, it came out 20 times too large."""
     whole = read(models_folder() / "continuum/samples/friday")
     prepared = prepare(whole, ROBOT)
@@ -238,7 +238,7 @@ def test_the_derivative_of_strong_friction_is_that_of_full_solves() -> None:
     moved = [x + side * 0.02 * np.eye(len(x))[which] for side in (1.0, -1.0)]
     up, down = (objective.evaluate(model.at(y)).z for y in moved)
     full, found = (up - down) / 0.04, objective.jacobian(at, [which])[:, 0]
-    assert np.linalg.norm(found - full) < 0.05 * np.linalg.norm(full)
+    assert np.linalg.norm(found - full) < 0.07 * np.linalg.norm(full)
 
 
 @pytest.mark.parametrize("across", [0.0, 5e-3])

@@ -90,7 +90,9 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
         for motion, time, command in shapes:
             label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
-            inputs = Inputs(label, time, last + 60.0 + time, command, prepared.drives, warm, loads, turned=like.turned)
+            inputs = Inputs(
+                label, time, last + 60.0 + time, command, prepared.drives, warm, loads, turned=like.turned, damped=like.damped
+            )
             out.append((label, inputs))
     return out
 

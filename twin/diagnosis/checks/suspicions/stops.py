@@ -8,11 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
-from twin.diagnosis.thresholds import UNMISSABLE_MOTION
+from twin.diagnosis.thresholds import GONE_ON, UNMISSABLE_MOTION
 from twin.prediction.evaluate import OUTPUT_GROUPS
 
 ANGLES = ("angle", "joint angle")  # groups of outputs
-GONE_ON = 0.5  # of a drive's range, after a joint has come to its end: a joint that sticks or stiffens goes on, if little
 
 
 def ends(case: Case) -> Iterator[Suspicion]:

@@ -53,7 +53,7 @@ def fills(case: Case) -> Iterator[Suspicion]:
     seen = headline(case)
     for name, trials in of_drives(case).items():
         whole = np.concatenate([s.read[:, 0] for s in trials])
-        often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 1]
+        often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 2]
         away = []
         for s in trials:
             for r in (1 + np.flatnonzero(np.isin(s.read[s.runs[1:-1, 0], 0], often))).tolist():
