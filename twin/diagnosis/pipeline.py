@@ -15,7 +15,6 @@ from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.checks.loops import loops
 from twin.diagnosis.checks.preview import DataPreview, preview_data
 from twin.diagnosis.checks.spikes import without_spikes
-from twin.diagnosis.checks.suspicions import Suspicion
 from twin.diagnosis.checks.zero_jumps import jumps_of, without_zero_jumps
 from twin.diagnosis.checks.zero_jumps import words as jumped
 from twin.diagnosis.conclusion import Conclusion
@@ -185,21 +184,13 @@ def _diagnosis(
         held_out_trials=tuple(held_out.trials),
         folds=folds if len(parts) > 1 else (),
         loops=loops(context.prepared),
-        suspicions=tuple(s for s in preview.suspicions if not _settled_by_calibration(s, errors)),
+        suspicions=preview.suspicions,
         predictions=_predictions(prepared, found, held_out, nominal),
         notices=(*prepared.notices, *found.notices, *jumped(prepared, final.fit), *_rezeroed(found, held_out), *left.notices),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.found.all),
         untried=tuple(context.budget.untried),
     )
-
-
-def _settled_by_calibration(suspicion: Suspicion, errors: Errors) -> bool:
-    """Return whether the calibrated robot fits the file as it is, on held-out trials, as well as the changed file would."""
-    group = suspicion.group
-    if not suspicion.left or group not in errors.nominal:
-        return False
-    return errors.calibrated[group] <= suspicion.left * errors.nominal[group]
 
 
 def _withdrawn(found: Conclusion) -> Conclusion:

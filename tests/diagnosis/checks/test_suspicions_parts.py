@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.recorded_days import recorded_day
 from tools.simulators.two_link import write_day
 from twin.diagnosis import Settings
 from twin.diagnosis.checks.preview import preview_data
@@ -20,8 +21,10 @@ from twin.diagnosis.checks.suspicions.clouds import _nearest
 from twin.diagnosis.checks.suspicions.frames import _axes
 from twin.diagnosis.checks.suspicions.no_readings.repeats import lost_markers
 from twin.diagnosis.checks.suspicions.trials import times
+from twin.foundation.errors import SolveError
 from twin.measurements import Channel, Clouds, Recording, Trial, read
 from twin.prediction.prepared import prepare
+from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
 from twin.robots import load
 from twin.robots.robot import models_folder
@@ -166,3 +169,25 @@ def test_a_joint_that_stays_at_its_end_while_its_drive_goes_on_has_a_stop(share:
     # deg: of some twenty readings with a noise of 0.1 the median is known to some hundredths, and is given in three digits
     assert named == ([("joint_2_angle", pytest.approx(np.rad2deg(share * most), abs=0.15))] if told else [])
     assert not any("never changes" in w for w in found)
+
+
+def lengths(change: dict[str, tuple[float, float]]) -> list[str]:
+    """What is suspected of three trials of the independent simulator by length, drive I read as factor * u + offset (m)."""
+    day = recorded_day("tendon_elasticity", design="by_length")[0].select(["slow_1", "slow_2", "circle_1"])
+    values = [{**t.values, **{n: factor * t.values[n] + offset for n, (factor, offset) in change.items()}} for t in day.trials]
+    twin = Twin.of("continuum")
+    ready = prepare(day.with_values(values, day.source), twin.robot)
+    try:
+        predicted = [trace.outputs(twin, ready) for trace in simulate(twin, ready)]
+    except SolveError:
+        predicted = None
+    return [s.words for s in suspicions(ready, twin, (), predicted)]
+
+
+def test_a_drive_that_turns_the_other_way_and_a_zero_that_is_off_are_named() -> None:
+    assert not any("turns the other way" in w or "beyond what the body allows" in w for w in lengths({}))
+    assert "one drive turns the other way than the others" in lengths({"tendon_2_displacement": (-1.0, 0.0)})
+    off = [w for w in lengths({"tendon_1_displacement": (1.0, 3e-3)}) if "beyond what the body allows" in w]
+    assert len(off) == 1
+    assert off[0].startswith("tendon_1_displacement is beyond what the body allows, by ")
+    assert 0.0 < float(off[0].split("by ")[1].split(" mm")[0]) <= 3.1  # at least, and to 0.4 % of its travel
