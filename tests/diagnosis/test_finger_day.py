@@ -10,8 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from twin import Recording, read
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import Fit, fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.diagnosis import Settings
 from twin.effects import FitStart
 from twin.prediction.evaluate import rms

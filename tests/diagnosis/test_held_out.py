@@ -12,7 +12,7 @@ import pytest
 from tests.diagnosis.checks.test_design import bench
 from tools.simulators.rod.design import bench_day
 from twin.diagnosis import held_out as seal
-from twin.diagnosis.calibration.objective import noise_under
+from twin.diagnosis.calibration.first_calibration import noise_under
 from twin.diagnosis.conclusion import Conclusion
 from twin.diagnosis.held_out import HeldOut, interval
 from twin.diagnosis.noise.estimate import repeats

@@ -14,8 +14,8 @@ from tools.simulators.rod.design import bench_day
 from twin.body import Drive
 from twin.diagnosis import Settings, pipeline
 from twin.diagnosis.budget import Budget
-from twin.diagnosis.calibration import objective
-from twin.diagnosis.calibration.objective import sensitivity
+from twin.diagnosis.calibration import first_calibration
+from twin.diagnosis.calibration.first_calibration import sensitivity
 from twin.diagnosis.checks import preview as look
 from twin.diagnosis.checks.fit_warnings import strained, unlikely
 from twin.diagnosis.checks.loops import loops
@@ -246,7 +246,7 @@ def test_the_sensitivity_of_a_linear_robot_is_its_matrix(
     inputs = tuple(replace(i, drives=(drive,) * 3) for i in plan.inputs[:3])
     robot: Any = SimpleNamespace(springs=lambda n: "springs", n_tendon=3)
     bench = replace(plan, robot=robot, inputs=inputs, measured=plan.measured[:3])
-    monkeypatch.setattr(objective, "thermal_time_constant", lambda springs: memory)
+    monkeypatch.setattr(first_calibration, "thermal_time_constant", lambda springs: memory)
 
     def simulate(twin: Any, moved: PreparedRecording, trials: Any, options: Any) -> list[Any]:
         near.append(options.neighbours)
@@ -256,7 +256,7 @@ def test_the_sensitivity_of_a_linear_robot_is_its_matrix(
             assert 1.0 < step.max() < 4.0, "as far as readings are uncertain: larger than rounding, smaller than a bend"
         return [SimpleNamespace(outputs=lambda twin, bench, k=k: moved.inputs[k].command @ A.T) for k in trials]
 
-    monkeypatch.setattr(objective, "simulate", simulate)
+    monkeypatch.setattr(first_calibration, "simulate", simulate)
     trials, twin = [2, 0], SimpleNamespace(effects=())
     flat = [bench.inputs[k].command @ A.T for k in trials]
     G = sensitivity(bench, trials, twin, flat, {0: "near"})  # type: ignore[arg-type]
@@ -281,24 +281,24 @@ def test_the_noise_is_read_from_a_first_rough_fit(plan: PreparedRecording, monke
         return SimpleNamespace(predict=lambda twin, traces: ("traces", f"predicted by {twin} near {traces}"))
 
     start = SimpleNamespace(model=SimpleNamespace(twin="rough"), evaluation=SimpleNamespace(traces="those", raw="left"))
-    monkeypatch.setattr(objective, "Objective", objective_by_hand)
-    monkeypatch.setattr(objective, "Model", SimpleNamespace(base=lambda robot, twin: "base"))
+    monkeypatch.setattr(first_calibration, "Objective", objective_by_hand)
+    monkeypatch.setattr(first_calibration, "Model", SimpleNamespace(base=lambda robot, twin: "base"))
     monkeypatch.setattr(
-        objective, "Whitener", lambda noise, measured, G, command, taut=None: (noise, G, len(measured), len(command), taut)
+        first_calibration, "Whitener", lambda noise, measured, G, command, taut=None: (noise, G, len(measured), len(command), taut)
     )
-    monkeypatch.setattr(objective, "fit", lambda of, model, stop: start)
+    monkeypatch.setattr(first_calibration, "fit", lambda of, model, stop: start)
     asked: list[Any] = []
 
     def sensitivity_by_hand(bench: PreparedRecording, trials: Any, twin: Any, predicted: Any, near: Any) -> list[np.ndarray]:
         asked.append((list(trials), twin, predicted, near, min(float(i.command.min()) for i in bench.inputs)))
         return [np.ones((len(bench.inputs[k].time), 24, 3)) for k in trials]
 
-    monkeypatch.setattr(objective, "sensitivity", sensitivity_by_hand)
-    monkeypatch.setattr(objective, "estimate_noise", lambda bench, trials, raw, G: ((raw, G), ["a note"]))
+    monkeypatch.setattr(first_calibration, "sensitivity", sensitivity_by_hand)
+    monkeypatch.setattr(first_calibration, "estimate_noise", lambda bench, trials, raw, G: ((raw, G), ["a note"]))
     below = np.zeros_like(bench.inputs[2].command)
     below[:3, 1] = bench.reading[1] * np.array([-0.5, -2.0, -9.0])
     bench = replace(bench, inputs=(*bench.inputs[:2], replace(bench.inputs[2], command=below)))
-    model, _, notes = objective.objective_of(bench, SimpleNamespace(robot=None), [0, 2], Settings(jobs=1))  # type: ignore[arg-type]
+    model, _, notes = first_calibration.objective_of(bench, SimpleNamespace(robot=None), [0, 2], Settings(jobs=1))  # type: ignore[arg-type]
     assert (model, notes) == (start.model, ["a note"])
     (trials, (rough, none, n, _, unasked), jobs), (_, (noise, G, _, _, taut), _) = made
     assert unasked is None
@@ -316,8 +316,8 @@ def test_the_noise_is_read_from_a_first_rough_fit(plan: PreparedRecording, monke
 def test_a_length_below_zero_is_paid_out_and_felt_as_any(plan: PreparedRecording) -> None:
     paid_out = tuple(replace(i, drives=(Drive.DISPLACEMENT,) * 3, command=i.command - 5.0) for i in plan.inputs[:2])
     bench = replace(plan, inputs=paid_out, measured=plan.measured[:2])
-    assert np.all(objective._taut_share(bench, 0) == 1.0)
-    np.testing.assert_array_equal(objective._unslackened(bench).inputs[1].command, paid_out[1].command)
+    assert np.all(first_calibration._taut_share(bench, 0) == 1.0)
+    np.testing.assert_array_equal(first_calibration._unslackened(bench).inputs[1].command, paid_out[1].command)
 
 
 # ---- look -------------------------------------------------------------------------------------------------------------------

@@ -18,8 +18,8 @@ from tools.benchmarks.diagnosis.attribution_table import held
 from tools.benchmarks.diagnosis.compared import COMPARABLE, COMPARED, OTHER_LAW, distance
 from tools.simulators.rod.effects.tendon import TendonBacklash as Play
 from twin.diagnosis import Settings
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import Fit, fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.evidence.first_order import dictionary
 from twin.diagnosis.evidence.ranking import rank

@@ -14,8 +14,9 @@ import tomli_w
 from tools.benchmarks.diagnosis.similitude import factor, resized
 from twin.body import Signals
 from twin.diagnosis import Settings
-from twin.diagnosis.calibration.fit import Model, fit
-from twin.diagnosis.calibration.objective import objective_of
+from twin.diagnosis.calibration.first_calibration import objective_of
+from twin.diagnosis.calibration.fit import fit
+from twin.diagnosis.calibration.model import Model
 from twin.effects import catalogue, effect_class
 from twin.effects.base.scaling import at_reference_size, scaled_parameters, scaled_starts
 from twin.foundation.errors import DataError, TwinError

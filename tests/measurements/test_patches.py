@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from twin import read
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.diagnosis import Settings
 from twin.diagnosis.explain.next_experiment import _foreseen
 from twin.diagnosis.noise.model import Noise

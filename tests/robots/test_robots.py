@@ -11,7 +11,7 @@ import pytest
 
 from twin.body import Loads, Problem, Route
 from twin.body.hinge_chain import HingeChain, hinge_pairs
-from twin.diagnosis.calibration.fit import Model
+from twin.diagnosis.calibration.model import Model
 from twin.effects import catalogue
 from twin.foundation.errors import DataError, UnknownNameError
 from twin.mechanics.rod import Equilibrium

@@ -11,8 +11,8 @@ from scipy.optimize import minimize_scalar
 from tests.recorded_days import half, recorded_day
 from twin.body import Loads
 from twin.diagnosis import Settings
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.effects import effect_class
 from twin.foundation.errors import TwinError
 from twin.prediction.kinematics import LoadedRobot

@@ -51,7 +51,8 @@ GROUPS = {
         ("effects", "effects/[!_]*.py", "effects/test_laws.py effects/test_conformance.py effects/test_effects.py "
          f"diagnosis/test_transmission_error.py mechanics/springs/test_sma.py -k '{LAWS}'"),
         ("kept", "foundation/compiled.py", "foundation/test_compiled.py"),
-        ("calibrate", "diagnosis/calibration/fit.py", f"diagnosis/calibration/test_calibrate.py -k '{FIT}'"),
+        ("calibrate", "diagnosis/calibration/fit.py diagnosis/calibration/model.py diagnosis/calibration/objective.py",
+         f"diagnosis/calibration/test_calibrate.py -k '{FIT}'"),
         ("residual", "diagnosis/noise/model.py diagnosis/noise/estimate.py diagnosis/noise/whitening.py",
          "diagnosis/noise/test_noise.py diagnosis/test_diagnose.py diagnosis/noise/test_cut_off.py"),
         ("prepared", "prediction/prepared.py",
@@ -74,7 +75,7 @@ GROUPS = {
         ("thresholds", "diagnosis/thresholds.py", "diagnosis/test_thresholds.py diagnosis/explain/test_describe.py "
          f"diagnosis/explain/test_next_experiment.py {CHECK_TESTS}/test_design.py -k '{BY_NUMBERS}'"),
         ("between", "diagnosis/checks/preview.py diagnosis/checks/fit_warnings.py diagnosis/conclusion.py "
-         "diagnosis/fit_context.py diagnosis/calibration/objective.py", STAGE_TESTS),
+         "diagnosis/fit_context.py diagnosis/calibration/first_calibration.py", STAGE_TESTS),
         ("jumps", "diagnosis/checks/jump_detection.py diagnosis/checks/zero_jumps.py",
          f"{CHECK_TESTS}/test_zero_jumps.py {CHECK_TESTS}/test_zeros.py -k 'test_jumps or moved_within or joints_zero'"),
         ("base", "diagnosis/calibration/calibrate.py", f"{CHECK_TESTS}/test_zeros.py"),

@@ -48,8 +48,8 @@ class Problem:
     """A trial to simulate: commands over time, under loads.
 
     `neighbour` is the solution of a similar problem on the same samples, which speeds this solve up. With `once` the result is one
-    Newton step a sample from it (a backbone with tendon friction is solved in full). `keep` stores in the solution what a
-    later neighbour needs.
+    Newton step a sample from it (a backbone with tendon friction is solved in full), or motion in longer steps. `keep` stores in
+    the solution what a later neighbour needs.
     """
 
     time: np.ndarray  # (n,) s

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from twin.diagnosis.calibration.objective import noise_under
+from twin.diagnosis.calibration.first_calibration import noise_under
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.search.screen import Screening

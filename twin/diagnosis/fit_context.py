@@ -7,7 +7,8 @@ import numpy as np
 
 from twin.body import Drive
 from twin.diagnosis.budget import Budget
-from twin.diagnosis.calibration.fit import Fit, Objective
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.noise.transmission import transmitted_noise
 from twin.diagnosis.noise.whitening import SLACK_READING

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnosis.calibration.objective import sensitivity
+from twin.diagnosis.calibration.first_calibration import sensitivity
 from twin.diagnosis.checks.spikes import without_spikes
 from twin.diagnosis.checks.zero_jumps import rezeroed
 from twin.diagnosis.conclusion import Conclusion

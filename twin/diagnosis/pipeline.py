@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnosis.calibration.calibrate import calibrate
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import Fit, fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.checks.loops import loops
 from twin.diagnosis.checks.preview import DataPreview, preview_data
 from twin.diagnosis.checks.spikes import without_spikes

@@ -16,7 +16,9 @@ from tests.recorded_days import half, recorded_day
 from tools.simulators.rod.nuisance import built
 from twin.diagnosis import Settings, calibrated_fit
 from twin.diagnosis.calibration.fisher_information import solve, unidentifiable
-from twin.diagnosis.calibration.fit import Evaluation, Fit, Free, Model, Objective, StopRule, fit, prior_weight
+from twin.diagnosis.calibration.fit import Fit, StopRule, fit
+from twin.diagnosis.calibration.model import Free, Model, prior_weight
+from twin.diagnosis.calibration.objective import Evaluation, Objective
 from twin.diagnosis.checks.fit_warnings import strained, unlikely
 from twin.diagnosis.evidence.ranking import projected
 from twin.diagnosis.noise.model import Noise

@@ -13,7 +13,9 @@ import pytest
 from tests.diagnosis.checks.test_design import DISPLACEMENTS, TEMPERATURE, bench
 from tools.simulators.rod.design import Day, bench_day
 from tools.simulators.rod.effects import all_effects
-from twin.diagnosis.calibration.fit import Fit, Model, Objective
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.model import Model
+from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.checks import identifiability as stage
 from twin.diagnosis.checks.identifiability import Visibility, identifiability
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern, dictionary

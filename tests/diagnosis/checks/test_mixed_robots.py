@@ -12,8 +12,10 @@ import pytest
 
 from tests.recorded_days import half, recorded_day
 from twin.diagnosis import Settings, diagnose
-from twin.diagnosis.calibration.fit import Evaluation, Fit, Free, Model, fit
-from twin.diagnosis.calibration.objective import objective_of
+from twin.diagnosis.calibration.first_calibration import objective_of
+from twin.diagnosis.calibration.fit import Fit, fit
+from twin.diagnosis.calibration.model import Free, Model
+from twin.diagnosis.calibration.objective import Evaluation
 from twin.diagnosis.checks.mixed_robots import MixedRobots, mixed_robots
 from twin.foundation.parameters import Parameter
 from twin.measurements import Recording

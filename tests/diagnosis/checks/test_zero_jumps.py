@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from tests.diagnosis.checks.test_design import bench
 from tools.simulators.rod.design import bench_day
 from twin.body import Signals
-from twin.diagnosis.calibration.fit import Model
+from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.checks import jump_detection as jumps
 from twin.diagnosis.checks.zero_jumps import (
     SHIFT,

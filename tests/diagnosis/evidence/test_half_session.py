@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.recorded_days import recorded_day
-from twin.diagnosis.calibration.objective import objective_of
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.diagnosis import Settings
 from twin.diagnosis.evidence import half_session as stage
 from twin.diagnosis.evidence.half_session import PredictiveErrors, halves, predictive_errors

@@ -11,8 +11,8 @@ from scipy import stats
 
 from tests.recorded_days import recorded_day
 from twin.diagnosis import Settings
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import StopRule, fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.evidence.first_order import dictionary
 from twin.diagnosis.evidence.null_distribution import NullDraws, acceptance_limits, draws, quantile

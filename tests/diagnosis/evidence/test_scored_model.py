@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from twin.diagnosis.budget import Budget
-from twin.diagnosis.calibration.fit import Model, StopRule
+from twin.diagnosis.calibration.fit import StopRule
+from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.evidence import scored_model as stage
 from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, score_model, with_effect_added, with_extended_law
 from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE

@@ -8,8 +8,8 @@ import pytest
 from tests.recorded_days import half, recorded_day
 from tools.simulators.rod.effects.unknown import Magnet
 from twin.diagnosis import Settings
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.evidence.scored_model import score_model
 from twin.diagnosis.explain.pose_dependent_force import PoseDependentForce, pose_dependent_force

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.recorded_days import half, recorded_day
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import Fit, fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.diagnosis import Settings
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.explain.within_trial import Moving, WithinTrial, _judged, _unseen

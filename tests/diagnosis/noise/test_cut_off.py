@@ -12,7 +12,9 @@ import pytest
 from scipy.stats import norm
 
 from twin.body import Drive, Loads
-from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Evaluation, Model, Objective, fit
+from twin.diagnosis.calibration.fit import fit
+from twin.diagnosis.calibration.model import Model
+from twin.diagnosis.calibration.objective import PARAMETER_DIFFERENCE, Evaluation, Objective
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import SLACK_BLUR, SLACK_READING, Whitener
 from twin.effects import catalogue

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from twin.diagnosis.calibration.objective import sensitivity
+from twin.diagnosis.calibration.first_calibration import sensitivity
 from twin.diagnosis.noise import friction as stilled
 from twin.diagnosis.noise.friction import noise_credit, resimulated_noise
 from twin.diagnosis.noise.model import Noise

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from twin.diagnosis.budget import Budget
-from twin.diagnosis.calibration.fit import Free
+from twin.diagnosis.calibration.model import Free
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.search import search as stage
 from twin.diagnosis.search.search import _material, search

@@ -13,8 +13,9 @@ import pytest
 
 from tests.effects.test_conformance import by_length, is_of_antagonists, is_of_models, is_of_sensors
 from twin.diagnosis import Settings
-from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Evaluation, Model, Objective
-from twin.diagnosis.calibration.objective import objective_of
+from twin.diagnosis.calibration.first_calibration import objective_of
+from twin.diagnosis.calibration.model import Model
+from twin.diagnosis.calibration.objective import PARAMETER_DIFFERENCE, Evaluation, Objective
 from twin.effects import catalogue
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import prepare

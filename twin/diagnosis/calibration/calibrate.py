@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.diagnosis.budget import Budget
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import Fit, fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.diagnosis.checks.jump_detection import may_be_clamp, next_jump, stands
 from twin.diagnosis.checks.spikes import without_spikes
 from twin.diagnosis.checks.zero_jumps import Jump, with_zero_jumps

@@ -1,238 +1,33 @@
 """The fit of the robot's own uncertain parameters, and those of effects in force, to the fitted trials.
 
 Minimise sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2 over x, the parameters in units of their `step`, within bounds, by
-Gauss-Newton steps on finite-difference derivatives. A difference costs a fraction of a prediction, because a changed twin is solved
-from the equilibria and tangents of the unchanged one.
+Gauss-Newton steps on finite-difference derivatives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
 
 import numpy as np
-from joblib import Parallel, delayed
 from scipy.optimize import lsq_linear
 
-from twin.body import SOLVE_TOLERANCE, Drive
 from twin.diagnosis.calibration.fisher_information import scatter, solve, unidentifiable
-from twin.diagnosis.noise.whitening import Whitener
-from twin.effects import Effect, effect_class
-from twin.effects.base.scaling import scaled_effect, scaled_parameters
+from twin.diagnosis.calibration.model import Free, Model, prior_weight
+from twin.diagnosis.calibration.objective import LARGEST_LAST_FALL, PARAMETER_DIFFERENCE, Evaluation, Objective
 from twin.foundation.errors import SolveError
-from twin.foundation.parameters import FittedValue, Parameter
-from twin.prediction.prepared import PreparedRecording
-from twin.prediction.simulate import SolveOptions, Trace, iterate_traces
-from twin.prediction.twin import Twin
-from twin.robots import Robot
+from twin.foundation.parameters import FittedValue
 
-DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
-PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
-# The same of motion. Where a joint comes to rest by friction jumps by hundredths of a sigma with any change of any number; half a
-# step moves predictions by about a sigma, and bends little.
-MOTION_DIFFERENCE = 0.5
 SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came of motion, they are renewed
 MOST_MOTION_STEPS = 24  # at most, of a fit of motion
 MOST_RENEWALS = 3  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
-LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 MOST_FIT_STEPS = 12  # at most, of a fit
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
 # `tools.benchmarks.diagnosis.attribution` it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
 LAW_ACCURACY = 0.02
 UNFIXED_SPREAD_SHARE = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
-
-Unsolved = Literal["raise", "zeros"]
-
-
-@dataclass(frozen=True)
-class Free:
-    """One free parameter of a fit: of the robot (`effect` None) or of an effect."""
-
-    effect: str | None
-    parameter: Parameter
-
-    @property
-    def label(self) -> str:
-        return self.parameter.name if self.effect is None else f"{self.effect}.{self.parameter.name}"
-
-
-@dataclass(frozen=True)
-class Model:
-    """A twin and its free parameters."""
-
-    twin: Twin
-    free: tuple[Free, ...]
-
-    @staticmethod
-    def base(robot: Robot, twin: Twin | None = None) -> Model:
-        """Return the robot as described, with its nuisance parameters and the uncertain ones of its known effects free."""
-        twin = twin or Twin.of(robot)
-        known = {e.id for e in twin.effects}
-        free = (*(Free(None, p) for p in robot.nuisance), *(Free(e, p) for e, p in robot.uncertain if e in known))
-        return Model(twin, free)
-
-    def value(self, free: Free) -> float:
-        if free.effect is None:
-            return float(self.twin.values.get(free.parameter.name, free.parameter.value))
-        return next(e for e in self.twin.effects if e.id == free.effect)[free.parameter.name]
-
-    def vector(self) -> np.ndarray:
-        """Return the free parameters (n_free,) in units of their steps."""
-        return np.array([self.value(f) / f.parameter.step for f in self.free])
-
-    def at(self, x: np.ndarray) -> Model:
-        """Return the same model with its free parameters at x (in steps)."""
-        values = dict(self.twin.values)
-        effects: dict[str, dict[str, float]] = {e.id: dict(e.values) for e in self.twin.effects}
-        for f, v in zip(self.free, x, strict=True):
-            target = values if f.effect is None else effects[f.effect]
-            target[f.parameter.name] = float(np.clip(v * f.parameter.step, f.parameter.low, f.parameter.high))
-        built = tuple(type(e)(effects[e.id], e.n_tendon) for e in self.twin.effects)
-        return Model(replace(self.twin, values=values, effects=built), self.free)
-
-    def with_effect(self, identifier: str, values: Mapping[str, float], names: Sequence[str], n_tendon: int) -> Model:
-        """Return this model with one effect more, its named parameters free."""
-        law = effect_class(identifier)
-        table = {p.name: p for p in scaled_parameters(law, n_tendon, self.twin.robot.size)}
-        effects = (*self.twin.effects, scaled_effect(law, values, n_tendon, self.twin.robot.size))
-        return Model(replace(self.twin, effects=effects), (*self.free, *(Free(identifier, table[n]) for n in names)))
-
-    def without_effect(self, identifier: str) -> Model:
-        effects = tuple(e for e in self.twin.effects if e.id != identifier)
-        return Model(replace(self.twin, effects=effects), tuple(f for f in self.free if f.effect != identifier))
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """A model's prediction of the fitted trials: traces by trial, raw residuals (n_k, n_output) SI, whitened residual flat (n,)."""
-
-    model: Model
-    traces: Mapping[int, Trace]
-    raw: list[np.ndarray]
-    z: np.ndarray
-
-
-class Objective:
-    """The residuals, whitened by `whitener`, and derivatives of models on the listed trials of a prepared recording."""
-
-    def __init__(self, prepared: PreparedRecording, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
-        self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
-        self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
-
-    @property
-    def bends(self) -> bool:
-        """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
-        return Drive.CONTROL in getattr(self.prepared, "drives", ())
-
-    def smallest_fall(self, fall: float) -> float:
-        """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
-        return min(fall, LARGEST_LAST_FALL) if self.bends else fall
-
-    def of(self, which: Sequence[int]) -> Objective:
-        """Return the objective of some of its trials, given by their positions."""
-        return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
-
-    def predict(
-        self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
-    ) -> tuple[dict[int, Trace], list[np.ndarray]]:
-        way = SolveOptions(near or {}, keep, once, SOLVE_TOLERANCE if keep else DERIVATIVE_TOLERANCE)
-        traces = dict(iterate_traces(twin, self.prepared, self.trials, way))
-        return traces, [traces[k].outputs(twin, self.prepared) for k in self.trials]
-
-    def evaluate(self, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation:
-        found = self.within(np.inf, model, near)
-        assert found is not None
-        return found
-
-    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
-        """Return the evaluation of a model whose |z|^2 is `most` at most, else None.
-
-        The prediction ends with the trial that exceeds `most`.
-        """
-        at, traces = {k: i for i, k in enumerate(self.trials)}, {}
-        raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
-        # A body that creeps has a memory of the trials before.
-        n = 1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))
-        shares = [self.trials[i::n] for i in range(n)]
-        total = np.zeros(n)
-
-        def solve(share: int) -> None:
-            for k, trace in iterate_traces(model.twin, self.prepared, shares[share], SolveOptions(near or {}, keep=True)):
-                traces[k] = trace
-                if (i := at.get(k)) is not None:
-                    raw[i] = self.prepared.measured[k] - trace.outputs(model.twin, self.prepared)
-                    z[i] = self.whitener.trial(i, raw[i]).ravel()
-                    total[share] += float(z[i] @ z[i])
-                    if total.sum() > most:
-                        return
-
-        Parallel(n_jobs=n, prefer="threads", require="sharedmem")(delayed(solve)(s) for s in range(n))
-        return None if total.sum() > most else Evaluation(model, dict(sorted(traces.items())), raw, np.concatenate(z))
-
-    def cut_off(self, twin: Twin) -> np.ndarray:
-        """Return the root of the input noise that effects clip near zero tension, flat (n_row n_tendon,).
-
-        Its square is `Whitener.clipped_input_noise`.
-        """
-        pulled, cut = self.prepared.driven_by(Drive.TENSION), []
-        for i, k in enumerate(self.trials):
-            tension = np.where(pulled, twin.effect_chain.command(self.prepared.inputs[k].signals).tension, np.inf)
-            cut.append(np.sqrt(self.whitener.clipped_input_noise(i, tension)).ravel())
-        return np.concatenate(cut)
-
-    def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
-        return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
-
-    def columns(
-        self, at: Evaluation, models: Sequence[tuple[Model, float]], *, once: bool = False, unsolved: Unsolved = "raise"
-    ) -> np.ndarray:
-        """Return the whitened change of the residual per unit (n, n_model), for neighbouring models and the difference of each.
-
-        `once` solves to first order in the difference. A model without an equilibrium raises SolveError, or has a column of zeros
-        with `unsolved` "zeros".
-        """
-
-        def column(model: Model, size: float) -> np.ndarray:
-            if _same_simulation(at.model.twin, model.twin):
-                predicted = [at.traces[k].outputs(model.twin, self.prepared) for k in self.trials]
-            else:
-                try:
-                    predicted = self.predict(model.twin, at.traces, once=once)[1]
-                except SolveError:
-                    if unsolved == "raise":
-                        raise
-                    return np.zeros(at.z.size)
-            raw = [self.prepared.measured[k] - y - r for k, y, r in zip(self.trials, predicted, at.raw, strict=True)]
-            return self.white(raw) / size
-
-        with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
-            done: Any = parallel(delayed(column)(m, s) for m, s in models)
-        return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
-
-    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
-        """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
-        x, difference = at.model.vector(), MOTION_DIFFERENCE if self.bends else PARAMETER_DIFFERENCE
-        neighbours = []
-        for i in which:
-            p = at.model.free[i].parameter
-            size = difference if (x[i] + difference) * p.step <= p.high else -difference
-            moved = x.copy()
-            moved[i] += size
-            neighbours.append((at.model.at(moved), size))
-        return self.columns(at, neighbours, once=True)
-
-
-def _same_simulation(a: Twin, b: Twin) -> bool:
-    """Return whether two twins differ only in what sensors report, so that one simulation serves both."""
-
-    def acting(t: Twin) -> list[Effect]:
-        return [e for e in t.effects if e.acts_on_robot]
-
-    return a.values == b.values and acting(a) == acting(b)
 
 
 @dataclass(frozen=True)
@@ -337,17 +132,6 @@ class Fit:
         return out
 
 
-def prior_weight(model: Model) -> np.ndarray:
-    """Return 1 / std (n_free,) in steps, zero where there is no prior."""
-    return np.array([0.0 if f.parameter.std is None else f.parameter.step / f.parameter.std for f in model.free])
-
-
-def prior_pull(model: Model) -> np.ndarray:
-    """Return half the gradient (n_free,) of the prior terms, per step."""
-    prior = np.array([f.parameter.value / f.parameter.step for f in model.free])
-    return prior_weight(model) ** 2 * (model.vector() - prior)
-
-
 @dataclass(frozen=True)
 class StopRule:
     """The rule that ends a fit before its last step.
@@ -376,7 +160,8 @@ def fit(
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
-    renewals = MOST_RENEWALS if objective.bends else 0
+    # Derivatives of the same model, of more trials than these, are near enough.
+    renewals = MOST_RENEWALS if objective.bends and (J is None or near is None or near.model is not model) else 0
     fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
@@ -384,6 +169,7 @@ def fit(
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping, own, moved = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
+    since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
     for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         x = at.model.vector()
@@ -410,8 +196,11 @@ def fit(
                     continue
                 break
             columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
+            since = now
     if refresh:
-        columns = objective.jacobian(at, range(len(model.free)))
+        stale = not objective.bends or since - now > LARGEST_LAST_FALL
+        which = range(len(model.free)) if stale else moving
+        columns[:, which] = objective.jacobian(at, which)
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))
 
 

@@ -1,94 +1,188 @@
-"""The objective of every fit: the residual of the fitted trials, whitened by a noise model that is estimated from the data."""
+"""The objective of every fit: the whitened residuals of models on the fitted trials, and their derivatives.
+
+Derivatives are finite differences. A difference costs a fraction of a prediction: a changed twin is solved from the equilibria and
+tangents of the unchanged one, and one in motion is simulated in longer steps.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
+from joblib import Parallel, delayed
 
-from twin.body import Drive
-from twin.diagnosis.calibration.fit import Evaluation, Model, Objective, StopRule, fit
-from twin.diagnosis.diagnosis import Settings
-from twin.diagnosis.noise.estimate import estimate_noise
-from twin.diagnosis.noise.model import Noise
+from twin.body import SOLVE_TOLERANCE, Drive
+from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.noise.whitening import Whitener
-from twin.diagnosis.thresholds import READING_STEP
-from twin.mechanics.springs.heat import thermal_time_constant
-from twin.prediction.evaluate import OUTPUT_GROUPS
+from twin.effects import Effect
+from twin.foundation.errors import SolveError
 from twin.prediction.prepared import PreparedRecording
-from twin.prediction.simulate import SolveOptions, Trace, simulate
+from twin.prediction.simulate import SolveOptions, Trace, iterate_traces
 from twin.prediction.twin import Twin
 
+DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
+PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
+# The same of motion. Where a joint comes to rest by friction jumps by hundredths of a sigma with any change of any number; half a
+# step moves predictions by about a sigma, and bends little.
+MOTION_DIFFERENCE = 0.5
+# Of derivatives along a move of all parameters: with such an error each step still leaves a tenth of the last.
+COARSE_ERROR = 0.1
+LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
 
-def objective_of(
-    prepared: PreparedRecording, twin: Twin, fitted: list[int], settings: Settings
-) -> tuple[Model, Objective, list[str]]:
-    """Return a first calibration under a rough noise model, the objective of every later fit, and notices."""
-    measured = [prepared.measured[k] for k in fitted]
-    command = [prepared.inputs[k].command for k in fitted]
-    rough = np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
-    first = Noise(rough, np.zeros(prepared.n_tendon), np.zeros(len(rough)), "start")
-    none = [np.zeros((*y.shape, prepared.n_tendon)) for y in measured]
-    rough_fit = Objective(prepared, fitted, Whitener(first, measured, none, command), settings.jobs)
-    start = fit(rough_fit, Model.base(twin.robot, twin), stop=StopRule(tolerance=1e-3))
-    unmeasured = rough_fit.predict(start.model.twin, start.evaluation.traces)[1]
-    taut = sensitivity(_unslackened(prepared), fitted, start.model.twin, unmeasured, start.evaluation.traces)
-    G = [g * _taut_share(prepared, k)[:, None, :] for g, k in zip(taut, fitted, strict=True)]
-    noise, notes = estimate_noise(prepared, fitted, start.evaluation.raw, G)
-    return start.model, Objective(prepared, fitted, Whitener(noise, measured, G, command, taut), settings.jobs), notes
+Unsolved = Literal["raise", "zeros"]
 
 
-def _unslackened(prepared: PreparedRecording) -> PreparedRecording:
-    """Return the recording with no tension reading below zero, so that every tendon responds to more tension."""
-    pulled = prepared.driven_by(Drive.TENSION)
-    return replace(
-        prepared, inputs=tuple(replace(i, command=np.where(pulled, np.maximum(i.command, 0.0), i.command)) for i in prepared.inputs)
-    )
+@dataclass(frozen=True)
+class Evaluation:
+    """A model's prediction of the fitted trials: traces by trial, raw residuals (n_k, n_output) SI, whitened residual flat (n,)."""
+
+    model: Model
+    traces: Mapping[int, Trace]
+    raw: list[np.ndarray]
+    z: np.ndarray
 
 
-def _taut_share(prepared: PreparedRecording, k: int) -> np.ndarray:
-    """Return the share (n_k, n_tendon) of `sensitivity`'s step that makes a tendon pull; zero far below zero tension."""
-    below = np.clip(1.0 + prepared.inputs[k].command / (READING_STEP * prepared.reading), 0.0, 1.0)
-    return np.where(prepared.driven_by(Drive.TENSION), below, 1.0)
+class Objective:
+    """The residuals, whitened by `whitener`, and derivatives of models on the listed trials of a prepared recording."""
+
+    def __init__(self, prepared: PreparedRecording, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
+        self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
+        self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
+        self._coarse: bool | None = None  # whether derivatives of motion are computed with long steps; None: not yet tried
+
+    @property
+    def bends(self) -> bool:
+        """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
+        return Drive.CONTROL in getattr(self.prepared, "drives", ())
+
+    def smallest_fall(self, fall: float) -> float:
+        """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
+        return min(fall, LARGEST_LAST_FALL) if self.bends else fall
+
+    def of(self, which: Sequence[int]) -> Objective:
+        """Return the objective of some of its trials, given by their positions."""
+        return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
+
+    def predict(
+        self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
+    ) -> tuple[dict[int, Trace], list[np.ndarray]]:
+        way = SolveOptions(near or {}, keep, once, SOLVE_TOLERANCE if keep else DERIVATIVE_TOLERANCE)
+        traces = dict(iterate_traces(twin, self.prepared, self.trials, way))
+        return traces, [traces[k].outputs(twin, self.prepared) for k in self.trials]
+
+    def evaluate(self, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation:
+        found = self.within(np.inf, model, near)
+        assert found is not None
+        return found
+
+    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+        """Return the evaluation of a model whose |z|^2 is `most` at most, else None.
+
+        The prediction ends with the trial that exceeds `most`.
+        """
+        at, traces = {k: i for i, k in enumerate(self.trials)}, {}
+        raw, z = [np.empty(0)] * len(at), [np.empty(0)] * len(at)
+        # A body that creeps has a memory of the trials before.
+        n = 1 if model.twin.effect_chain.creep.amplitude else min(self.jobs, len(at))
+        shares = [self.trials[i::n] for i in range(n)]
+        total = np.zeros(n)
+
+        def solve(share: int) -> None:
+            for k, trace in iterate_traces(model.twin, self.prepared, shares[share], SolveOptions(near or {}, keep=True)):
+                traces[k] = trace
+                if (i := at.get(k)) is not None:
+                    raw[i] = self.prepared.measured[k] - trace.outputs(model.twin, self.prepared)
+                    z[i] = self.whitener.trial(i, raw[i]).ravel()
+                    total[share] += float(z[i] @ z[i])
+                    if total.sum() > most:
+                        return
+
+        Parallel(n_jobs=n, prefer="threads", require="sharedmem")(delayed(solve)(s) for s in range(n))
+        return None if total.sum() > most else Evaluation(model, dict(sorted(traces.items())), raw, np.concatenate(z))
+
+    def cut_off(self, twin: Twin) -> np.ndarray:
+        """Return the root of the input noise that effects clip near zero tension, flat (n_row n_tendon,).
+
+        Its square is `Whitener.clipped_input_noise`.
+        """
+        pulled, cut = self.prepared.driven_by(Drive.TENSION), []
+        for i, k in enumerate(self.trials):
+            tension = np.where(pulled, twin.effect_chain.command(self.prepared.inputs[k].signals).tension, np.inf)
+            cut.append(np.sqrt(self.whitener.clipped_input_noise(i, tension)).ravel())
+        return np.concatenate(cut)
+
+    def white(self, raw: Sequence[np.ndarray]) -> np.ndarray:
+        return np.concatenate([self.whitener.trial(k, r).ravel() for k, r in enumerate(raw)])
+
+    def columns(
+        self, at: Evaluation, models: Sequence[tuple[Model, float]], *, once: bool = False, unsolved: Unsolved = "raise"
+    ) -> np.ndarray:
+        """Return the whitened change of the residual per unit (n, n_model), for neighbouring models and the difference of each.
+
+        `once` solves to first order in the difference. A model without an equilibrium raises SolveError, or has a column of zeros
+        with `unsolved` "zeros".
+        """
+        before = self._coarsely(at) if self.bends else None
+
+        def column(model: Model, size: float) -> np.ndarray:
+            if _same_simulation(at.model.twin, model.twin):
+                return self._change(at.raw, [at.traces[k].outputs(model.twin, self.prepared) for k in self.trials], size)
+            try:
+                predicted = self.predict(model.twin, at.traces, once=once or before is not None)[1]
+            except SolveError:
+                if unsolved == "raise":
+                    raise
+                return np.zeros(at.z.size)
+            return self._change(before or at.raw, predicted, size)
+
+        with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
+            done: Any = parallel(delayed(column)(m, s) for m, s in models)
+        return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
+
+    def _change(self, before: Sequence[np.ndarray], predicted: Sequence[np.ndarray], size: float) -> np.ndarray:
+        """Return the whitened change (n,) per unit from the residuals `before` to those of `predicted`, `size` units away."""
+        each = zip(self.trials, predicted, before, strict=True)
+        return self.white([self.prepared.measured[k] - y - r for k, y, r in each]) / size
+
+    def _coarsely(self, at: Evaluation) -> list[np.ndarray] | None:
+        """Return the residuals by the long steps that derivatives of motion are computed with, `at.raw` being by short ones.
+
+        None where long steps do not give the derivatives, which is tried once, along a move of all free parameters.
+        """
+        if self._coarse is None:
+            x, towards = at.model.vector(), MOTION_DIFFERENCE
+            try:
+                moved = at.model.at(x + towards).twin
+                fine = self._change(at.raw, self.predict(moved)[1], towards)
+                still, gone = (self.predict(t, once=True)[1] for t in (at.model.twin, moved))
+                coarse = self._change(self._raw(still), gone, towards)
+                self._coarse = bool(np.linalg.norm(coarse - fine) <= COARSE_ERROR * np.linalg.norm(fine))
+            except SolveError:
+                self._coarse = False
+        return self._raw(self.predict(at.model.twin, once=True)[1]) if self._coarse else None
+
+    def _raw(self, predicted: Sequence[np.ndarray]) -> list[np.ndarray]:
+        return [self.prepared.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]
+
+    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
+        """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
+        x, difference = at.model.vector(), MOTION_DIFFERENCE if self.bends else PARAMETER_DIFFERENCE
+        neighbours = []
+        for i in which:
+            p = at.model.free[i].parameter
+            size = difference if (x[i] + difference) * p.step <= p.high else -difference
+            moved = x.copy()
+            moved[i] += size
+            neighbours.append((at.model.at(moved), size))
+        return self.columns(at, neighbours, once=True)
 
 
-def noise_under(objective: Objective, found: Evaluation) -> Noise:
-    """Estimate the noise of the fitted trials again, under a model with its effects. Raise SolveError as `sensitivity`.
+def _same_simulation(a: Twin, b: Twin) -> bool:
+    """Return whether two twins differ only in what sensors report, so that one simulation serves both."""
 
-    The first calibration has no effects, and takes ageing or memory between two repeats of a trial for noise.
-    """
-    return estimate_noise(objective.prepared, objective.trials, found.raw, sensitivity_at(objective, found))[0]
+    def acting(t: Twin) -> list[Effect]:
+        return [e for e in t.effects if e.acts_on_robot]
 
-
-def sensitivity_at(objective: Objective, found: Evaluation) -> list[np.ndarray]:
-    """Return the `sensitivity` of an evaluated model."""
-    prepared, trials, twin = objective.prepared, objective.trials, found.model.twin
-    predicted = [found.traces[k].outputs(twin, prepared) for k in trials]
-    return sensitivity(prepared, trials, twin, predicted, found.traces)
-
-
-def sensitivity(
-    prepared: PreparedRecording,
-    trials: Sequence[int],
-    twin: Twin,
-    predicted: Sequence[np.ndarray],
-    near: Mapping[int, Trace] | None = None,
-) -> list[np.ndarray]:
-    """Return dy/du (n_k, n_output, n_tendon) SI: the prediction's response to a constant change of each driving reading.
-
-    A spring averages the errors of its current over its time constant tau. White errors from row to row, dt apart, have sqrt(dt /
-    (2 tau)) of the influence of a constant one.
-    """
-    out = [np.zeros((*y.shape, prepared.n_tendon)) for y in predicted]
-    share_of_constant = np.ones((len(out), prepared.n_tendon))
-    if Drive.CURRENT in prepared.drives:
-        rows = np.array([[np.median(np.diff(prepared.inputs[k].time))] for k in trials])
-        averaged = np.sqrt(np.minimum(1.0, rows / (2.0 * thermal_time_constant(prepared.robot.springs(prepared.n_tendon)))))
-        share_of_constant = np.where(prepared.driven_by(Drive.CURRENT), averaged, share_of_constant)
-    for t in np.flatnonzero(~prepared.driven_by(Drive.CONTROL)):  # controls are known exactly
-        step = READING_STEP * prepared.reading[t]
-        push = step * np.eye(prepared.n_tendon)[t]
-        moved = replace(prepared, inputs=tuple(replace(i, command=i.command + push) for i in prepared.inputs))
-        traces = simulate(twin, moved, trials=trials, options=SolveOptions(near or {}))
-        for G, y, trace, share in zip(out, predicted, traces, share_of_constant[:, t], strict=True):
-            G[:, :, t] = share * (trace.outputs(twin, prepared) - y) / step
-    return out
+    return a.values == b.values and acting(a) == acting(b)

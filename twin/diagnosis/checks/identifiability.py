@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnosis.calibration.fit import Fit, Objective
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.checks.design import shortcomings
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern
 from twin.diagnosis.evidence.ranking import projected

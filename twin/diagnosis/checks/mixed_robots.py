@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Fit, prior_weight
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.model import prior_weight
 from twin.diagnosis.thresholds import FEWEST_TRIALS_IN_GROUP, GROUPING_ROUNDS, SECOND_ROBOT_GAIN
 from twin.prediction.prepared import PreparedRecording
 

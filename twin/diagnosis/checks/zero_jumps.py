@@ -12,7 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.body import Signals
-from twin.diagnosis.calibration.fit import Fit, Free, Model
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.model import Free, Model
 from twin.diagnosis.thresholds import ROWS_FOR_ZERO, SIGNIFICANT_STANDARD_ERRORS
 from twin.effects import Effect
 from twin.foundation.parameters import Parameter

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnosis.calibration.fit import Fit, Model, Objective
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.model import Model
+from twin.diagnosis.calibration.objective import Objective
 from twin.effects import FitStart, catalogue
 from twin.effects.base.scaling import scaled_parameters, scaled_starts
 from twin.foundation.errors import TwinError

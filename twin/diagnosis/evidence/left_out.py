@@ -10,7 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Fit, StopRule, fit, prior_pull, prior_weight
+from twin.diagnosis.calibration.fit import Fit, StopRule, fit
+from twin.diagnosis.calibration.model import prior_pull, prior_weight
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.thresholds import (
     FIRST_ORDER_LIMIT,

@@ -15,7 +15,8 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Fit, prior_weight
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.model import prior_weight
 from twin.diagnosis.evidence.discrepancy import Spectrum
 from twin.diagnosis.evidence.first_order import Dictionary
 from twin.diagnosis.evidence.ranking import projected

@@ -6,7 +6,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Fit, Objective, prior_weight
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.model import prior_weight
+from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.evidence.discrepancy import Discrepancy, Evidence
 from twin.diagnosis.evidence.first_order import Dictionary
 from twin.diagnosis.thresholds import CANDIDATES_REFITTED, STARTS_PER_EFFECT

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnosis.calibration.fit import Fit, Model, StopRule, fit
+from twin.diagnosis.calibration.fit import Fit, StopRule, fit
+from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.evidence.discrepancy import Discrepancy
 from twin.diagnosis.fit_context import FitContext

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
-from twin.body import Drive
+from twin.body import Drive, Loads
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Evaluation, Fit, Objective
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.objective import Evaluation, Objective
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
@@ -21,6 +22,7 @@ from twin.foundation.errors import SolveError
 from twin.measurements import Channel
 from twin.prediction.prepared import Inputs, Output, PreparedRecording
 
+SLOW_TRIAL = 120.0  # s: in as long a pull and release, bodies that are not in motion follow in equilibria
 _Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, the difference
 
 
@@ -43,23 +45,17 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
 
     The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
     are commanded, the tendons that do not pull are let out, so that they are slack. Springs heated by currents cool within a minute
-    and would not respond to a fast pull of a motor.
+    and would not respond to a fast pull of a motor. A robot in motion is asked for trials as long as its longest.
     """
     n = prepared.n_tendon
+    slow = SLOW_TRIAL
+    if Drive.CONTROL in prepared.drives:
+        slow = min(slow, max(float(np.ptp(i.time)) for i in prepared.inputs))
     top = np.max([i.command.max(axis=0) for i in prepared.inputs], axis=0)
     held = prepared.driven_by(Drive.DISPLACEMENT)
     top = np.where(held, np.max(top[held], initial=0.0), np.max(top[~held], initial=0.0))
     words = [f"{_shown(d.display_unit[1] * x)} {d.display_unit[0]}" for x, d in zip(top, prepared.drives, strict=True)]
     like = prepared.inputs[0]
-    bare = replace(like.loads, force=np.zeros(3))
-    if "torque" in prepared.robot.build().load_channels.values():
-        torques = [float(np.mean(i.loads.torque)) for i in prepared.inputs]
-        least, most = min(torques), max(torques)
-        loaded = [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]
-    else:
-        heaviest = max(i.loads.payload for i in prepared.inputs)
-        payloads = sorted({0.0, min(HEAVIEST_PAYLOAD, max(LEAST_PAYLOAD, 3.0 * heaviest))})
-        loaded = [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
     def add(label: str, duration: float, *shares: np.ndarray) -> None:
@@ -72,21 +68,21 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     hold = np.concatenate([[0.0], np.full(60, HELD_COMMAND_SHARE)])
     for i in np.flatnonzero(top > 0.0):  # a tendon that was never commanded has no range
         alone = np.eye(n)[i]
-        what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", 4.0)
+        what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", min(4.0, 0.1 * slow))
         pull = f"heat {what} with up" if prepared.drives[i] is Drive.CURRENT else f"pull {what}"
-        add(f"{pull} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
-        add(f"{pull} to {words[i]} and release it, fast ({fast:.0f} s)", fast, *np.outer(alone, up_down))
-        again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly (240 s)"
-        add(again, 240.0, *np.outer(alone, up_half_up_down))
-        add(f"step {what} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
+        add(f"{pull} to {words[i]} and release it, slowly ({slow:.0f} s)", slow, *np.outer(alone, up_down))
+        add(f"{pull} to {words[i]} and release it, fast ({fast:.2g} s)", fast, *np.outer(alone, up_down))
+        again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly ({2.0 * slow:.0f} s)"
+        add(again, 2.0 * slow, *np.outer(alone, up_half_up_down))
+        add(f"step {what} to three quarters of {words[i]} and hold for {slow:.0f} s", slow, *np.outer(alone, hold))
     turns = np.linspace(0, 4 * np.pi, 80)
     circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
     if not held.any() and top.all():
-        add(f"two circles with all tendons up to 0.6 of {words[0]} (160 s)", 160.0, *circle)
-    add("rest unloaded for 60 s", 60.0, *np.zeros((n, 30)))
+        add(f"two circles with all tendons up to 0.6 of {words[0]} ({4.0 / 3.0 * slow:.0f} s)", 4.0 / 3.0 * slow, *circle)
+    add(f"rest unloaded for {0.5 * slow:.0f} s", 0.5 * slow, *np.zeros((n, 30)))
     last = max(float(i.clock[-1]) for i in prepared.inputs)
     out = []
-    for load, loads in loaded:
+    for load, loads in _loads(prepared):
         for motion, time, command in shapes:
             label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
@@ -95,6 +91,18 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
             )
             out.append((label, inputs))
     return out
+
+
+def _loads(prepared: PreparedRecording) -> list[tuple[str, Loads]]:
+    """Return the loads of the menu in words and numbers."""
+    bare = replace(prepared.inputs[0].loads, force=np.zeros(3))
+    if "torque" in prepared.robot.build().load_channels.values():
+        torques = [float(np.mean(i.loads.torque)) for i in prepared.inputs]
+        least, most = min(torques), max(torques)
+        return [(f"load torque {x:.3g} N m", replace(bare, torque=np.full(1, x))) for x in (0.0, 0.5 * least, least, most)]
+    heaviest = max(i.loads.payload for i in prepared.inputs)
+    payloads = sorted({0.0, min(HEAVIEST_PAYLOAD, max(LEAST_PAYLOAD, 3.0 * heaviest))})
+    return [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
 
 
 def _shown(x: float) -> str:

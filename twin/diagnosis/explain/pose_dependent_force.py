@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.body import Loads
-from twin.diagnosis.calibration.fit import Model, prior_weight
+from twin.diagnosis.calibration.model import Model, prior_weight
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.thresholds import LEAST_EVIDENCE, PROBE_FORCE, TIP_FORCE_SHARE

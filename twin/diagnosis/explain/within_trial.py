@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnosis.calibration.fisher_information import solve
-from twin.diagnosis.calibration.fit import Fit, Objective
+from twin.diagnosis.calibration.fit import Fit
+from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.evidence.first_order import Dictionary, dictionary
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.model import Noise

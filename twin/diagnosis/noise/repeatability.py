@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from twin.diagnosis.calibration.first_calibration import sensitivity_at
 from twin.diagnosis.calibration.fit import Fit
-from twin.diagnosis.calibration.objective import sensitivity_at
 from twin.diagnosis.explain.within_trial import within_trial
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.estimate import repeats, row_noise

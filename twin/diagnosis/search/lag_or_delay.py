@@ -23,8 +23,8 @@ from scipy.optimize import minimize, minimize_scalar
 
 from twin.body import Drive, Signals
 from twin.body.lag import lag_response
+from twin.diagnosis.calibration.first_calibration import sensitivity
 from twin.diagnosis.calibration.fit import fit
-from twin.diagnosis.calibration.objective import sensitivity
 from twin.diagnosis.evidence.scored_model import ScoredModel, score_model
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.command_spline import SmoothedCommand, smooth_command

@@ -15,6 +15,7 @@ from twin.mechanics.mjcf.poses import add_masses, set_start
 from twin.mechanics.mjcf.stepping import LARGEST_RATE, Laws, Memory, Views, run
 
 LONGEST_STEP = 2e-3  # s: for a finger of 30 g on winches of 2 N/mm a hundredth of a degree from the limit of short steps
+COARSE_STEPS = 2.5  # times `longest_step`, for differences (`Problem.once`): see `twin.diagnosis.calibration.objective`
 MOST_LOADED_MODELS = 8
 MOST_SETTLED = 4
 _WHOLE_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -64,8 +65,9 @@ class Motion:
 class ModelSolver:
     """Simulates trials of an MJCF. Its statics are its dynamics: what is slow is stepped like what is fast.
 
-    Steps are the rows' interval in equal parts, `ModelBody.longest_step` at most; commands run straight from row to row. A trial
-    starts settled under its first command (`twin.body.Start`).
+    Steps are the rows' interval in equal parts, `ModelBody.longest_step` at most, `COARSE_STEPS` times as much for differences
+    between two problems (`Problem.once`); commands run straight from row to row. A trial starts settled under its first command
+    (`twin.body.Start`).
     """
 
     n_delayed = 0
@@ -77,7 +79,7 @@ class ModelSolver:
 
     def solve(self, problem: Problem) -> Solution:
         """Simulate a trial. Raises DataError for a payload or a start that the model does not have."""
-        time, h, rows = _grid(problem.time, self.body.longest_step)
+        time, h, rows = _grid(problem.time, self.body.longest_step * (COARSE_STEPS if problem.once else 1.0))
         commands = np.stack([np.interp(time, problem.time, u) for u in np.asarray(problem.command, float).T], axis=1)
         motion = self.begin(problem, h, commands[0])
         now = motion.under

@@ -14,7 +14,9 @@ import numpy as np
 from tools.benchmarks.hardware.comparisons.cable_tool import loops
 from tools.benchmarks.hardware.comparisons.row import Row
 from tools.benchmarks.hardware.importers import cable_tool
-from twin.diagnosis.calibration.fit import PARAMETER_DIFFERENCE, Fit, Free, Model, Objective, fit
+from twin.diagnosis.calibration.fit import Fit, fit
+from twin.diagnosis.calibration.model import Free, Model
+from twin.diagnosis.calibration.objective import PARAMETER_DIFFERENCE, Objective
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
 from twin.effects import effect_class

@@ -14,7 +14,9 @@ import numpy as np
 from tools.benchmarks.hardware.comparisons.row import Row
 from tools.benchmarks.hardware.importers import cable_tool
 from twin.diagnosis import Diagnosis, Settings, diagnose
-from twin.diagnosis.calibration.fit import Model, Objective, fit
+from twin.diagnosis.calibration.fit import fit
+from twin.diagnosis.calibration.model import Model
+from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
 from twin.measurements import Recording, Trial

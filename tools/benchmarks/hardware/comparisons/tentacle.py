@@ -11,8 +11,8 @@ from tools.benchmarks.hardware.comparisons.row import SETTINGS, Row
 from tools.benchmarks.hardware.importers import tentacle
 from tools.benchmarks.hardware.residual_gp import Remainder
 from twin.diagnosis import Claim, Diagnosis, diagnose
+from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import fit
-from twin.diagnosis.calibration.objective import objective_of
 from twin.foundation.parameters import Values
 from twin.measurements import Recording
 from twin.prediction.prepared import PreparedRecording, prepare

@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 from tools.benchmarks.hardware.comparisons.row import SETTINGS, Row
 from tools.benchmarks.hardware.importers import three_cable
 from twin.diagnosis import Diagnosis, diagnose
-from twin.diagnosis.calibration.fit import Fit, Objective, fit
-from twin.diagnosis.calibration.objective import objective_of
+from twin.diagnosis.calibration.first_calibration import objective_of
+from twin.diagnosis.calibration.fit import Fit, fit
+from twin.diagnosis.calibration.objective import Objective
 from twin.effects import effect_class
 from twin.effects.base.scaling import scaled_starts
 from twin.foundation.errors import SolveError

@@ -7,6 +7,7 @@ frames.py       markers mirrored, turned, shifted
 order.py        tendons and markers exchanged
 trials.py       duplicates, another robot, clocks, milliseconds
 channels.py     dead channels, declared noise, room temperature
+headings.py     headings of IMUs that walk
 stops.py        joints that end earlier than described
 clouds.py       point clouds in another unit, or away from their markers
 description.py  robot.toml off by a thousand
@@ -17,7 +18,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from twin.diagnosis.checks.suspicions import channels, clouds, description, frames, order, signs, stops, trials, units
+from twin.diagnosis.checks.suspicions import channels, clouds, description, frames, headings, order, signs, stops, trials, units
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
 from twin.diagnosis.checks.suspicions.no_readings import jumps, repeats
 from twin.diagnosis.split import blind
@@ -30,6 +31,7 @@ SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal predicti
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs,
     repeats.lost_markers, repeats.fills, repeats.stuck, repeats.frozen, jumps.exchanged, jumps.rolled,
     channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds, stops.ends,
+    headings.walking,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again
     units.payloads, units.torques, signs.gravity, signs.displacements, signs.zeros, order.tendons, channels.inputs,
