@@ -62,6 +62,25 @@ def test_angles_and_quaternions_say_the_same() -> None:
         np.testing.assert_allclose(by[ANGLES[:2]][channel.name], by[ANGLES][channel.name], atol=1e-9)
 
 
+def test_a_sensor_that_sits_turned_on_its_disk_reads_in_its_own_axes() -> None:
+    """Q of the disk becomes Q M, M the mount; an IMU reads gravity in its own axes: R^T g becomes M^T R^T g."""
+    T = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.0], [0.2, 1.5, 0.1]])
+    mount = Rotation.from_rotvec([0.4, -0.3, 1.1])
+    accel = tuple(Channel(f"imu_1_accel_{a}", "output", "m/s^2", 0.01) for a in "xyz")
+    seen = []
+    for vector in (np.zeros(3), mount.as_rotvec()):
+        turns = {f"{place}.turn_{a}": x for place in ("markers", "imus") for a, x in zip("xyz", vector, strict=True)}
+        twin = Twin(replace(ROBOT, structure={**ROBOT.structure, "imus": [8]}), values=turns)
+        day = replace(pulled(T, (*QUATERNION, *accel)), gravity=np.array([0.0, 0.0, -9.81]))
+        values = twin.predict(day).trials[0].values
+        seen.append([np.column_stack([values[c.name] for c in of]) for of in (QUATERNION, accel)])
+    (q, force), (turned, felt) = seen
+    as_mounted = Rotation.from_quat(q, scalar_first=True) * mount
+    np.testing.assert_allclose((as_mounted.inv() * Rotation.from_quat(turned, scalar_first=True)).magnitude(), 0.0, atol=1e-9)
+    np.testing.assert_allclose(felt, mount.inv().apply(force), atol=1e-9)
+    assert np.linalg.norm(felt - force) > 1.0
+
+
 def test_the_sign_of_a_quaternion_is_free_and_errors_are_angles() -> None:
     """A reading turned by 2 degrees about an axis of its own is 2 degrees off, whatever its sign; a missing cell is left out."""
     T = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.0], [0.2, 1.5, 0.1]])

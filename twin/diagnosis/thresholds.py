@@ -359,6 +359,8 @@ HINT_SHARE = _row("HINT_SHARE", 0.1, "of the error left out", "that a known effe
 MOST_REPEATS = _row("MOST_REPEATS", 50, "runs", "a trial that needs more is not recommended", "judgement")
 HEAVIEST_PAYLOAD = _row("HEAVIEST_PAYLOAD", 0.03, "kg", "the heaviest payload that is recommended", "judgement")
 LEAST_PAYLOAD = _row("LEAST_PAYLOAD", 0.01, "kg", "a payload that bends a small robot", "judgement")
+SLOW_TRIAL = _row("SLOW_TRIAL", 120.0, "s", "in as long a pull and release, bodies that are not in motion follow in equilibria",
+                  "judgement")
 HELD_COMMAND_SHARE = _row("HELD_COMMAND_SHARE", 0.75, "of the largest command",
     "a step that is held, within what was already commanded", "judgement")
 

@@ -6,6 +6,7 @@ FOLDER holds const_theta20_0.csv.gz and on, and robot_guess.toml. Nine runs arou
 
 import gzip
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,11 @@ from twin.prediction.twin import Twin
 from twin.robots import load
 
 RATE, STEP = 10.0, 5  # rows a second, a guess; rows of the log for one that is kept
-HOLES = 12.54  # mm, of the tendons
 NOISE = np.radians(1.0)  # the log is in whole degrees
-PULLS = tuple(Channel(f"tendon_{k}_displacement", "input", "mm", 1e-5) for k in (1, 2, 3))
+# Neither is published how the IMU sits on its disk nor what a motor winds: its angle here is that which the tendons should bend by.
+UNKNOWN = """"motors.radius" = { value = [12.54, 12.54, 12.54], unit = "mm", std = 6, low = 2, high = 60, source = "unknown gain" }
+""" + "\n".join(f'"markers.turn_{a}" = {{ value = 0.0, unit = "deg", std = 30, source = "unknown mount" }}' for a in "xyz")
+PULLS = tuple(Channel(f"motor_{k}_angle", "input", "deg", np.radians(0.05)) for k in (1, 2, 3))
 
 
 def main(folder: tyro.conf.Positional[Path], out: tyro.conf.Positional[Path]) -> None:
@@ -31,7 +34,10 @@ def main(folder: tyro.conf.Positional[Path], out: tyro.conf.Positional[Path]) ->
     """
     place = out / "robot"
     place.mkdir(parents=True, exist_ok=True)
-    (place / "robot.toml").write_bytes((folder / "robot_guess.toml").read_bytes())
+    described = re.sub(r'"(frame|markers)\.(turn|offset)_.\".*\n', "", (folder / "robot_guess.toml").read_text("utf-8"))
+    structure = "markers = [5]\nmotors  = [[1], [2], [3]]"
+    described = described.replace("markers = [5, 5]", structure).replace("[parameters]", f"[parameters]\n{UNKNOWN}")
+    (place / "robot.toml").write_text(described, "utf-8")
     twin = Twin.of(load(str(place)))
     for name, axes in (("with its heading", ("roll", "pitch", "yaw")), ("without", ("roll", "pitch"))):
         channels = (*PULLS, *(Channel(f"marker_1_{a}", "output", "deg", NOISE) for a in axes))
@@ -42,12 +48,12 @@ def main(folder: tyro.conf.Positional[Path], out: tyro.conf.Positional[Path]) ->
 
 
 def _run(file: Path, start: float, channels: tuple[Channel, ...]) -> Trial:
-    """Return one run: commanded displacements r theta cos(gamma + 2 pi k / 3), orientations as logged."""
+    """Return one run: commanded angles theta cos(gamma + 2 pi k / 3) of three motors, orientations as logged."""
     with gzip.open(file, "rt") as text:
         log = np.genfromtxt(text, delimiter=",", skip_header=1)[::STEP]
     time = np.arange(len(log)) * STEP / RATE
     gamma, theta = np.radians(log[:, 4]), np.radians(log[:, 5])
-    values = {f"tendon_{k + 1}_displacement": 1e-3 * HOLES * theta * np.cos(gamma + 2.0 * np.pi * k / 3.0) for k in range(3)}
+    values = {f"motor_{k + 1}_angle": theta * np.cos(gamma + 2.0 * np.pi * k / 3.0) for k in range(3)}
     values |= {f"marker_1_{a}": np.radians(log[:, 1 + j]) for j, a in enumerate(("roll", "pitch", "yaw"))}
     return Trial(file.name.removesuffix(".csv.gz"), time, {c.name: values[c.name] for c in channels}, start=start)
 

@@ -17,12 +17,18 @@ from twin.diagnosis.calibration.objective import Evaluation, Objective
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
-from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, HEAVIEST_PAYLOAD, HELD_COMMAND_SHARE, LEAST_PAYLOAD, MOST_REPEATS
+from twin.diagnosis.thresholds import (
+    CLEAR_CHI_SQUARE,
+    HEAVIEST_PAYLOAD,
+    HELD_COMMAND_SHARE,
+    LEAST_PAYLOAD,
+    MOST_REPEATS,
+    SLOW_TRIAL,
+)
 from twin.foundation.errors import SolveError
 from twin.measurements import Channel
 from twin.prediction.prepared import Inputs, Output, PreparedRecording
 
-SLOW_TRIAL = 120.0  # s: in as long a pull and release, bodies that are not in motion follow in equilibria
 _Apart = tuple[str, Inputs, Objective, Evaluation, np.ndarray]  # a trial of the menu, the rival's prediction, the difference
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from twin.body import Drive, Frame, Port, marker_senses, tendon_ports, tendon_senses, turn_senses
 from twin.body.hinge_chain import HingeChain, JointSet
@@ -70,8 +71,12 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Hinge
             at = disk.z - z
             _add_holes(body, disk, at, tendons)
             body.add_site(name=f"disk_{disk.number}_centre", pos=[0, 0, at], size=[5e-4, 0, 0])
-            for name, offset in _markers_on_disk(shape, disk.number, values):
-                body.add_site(name=name, pos=[*offset[:2], at + offset[2]], size=[1.2e-3, 0, 0], rgba=[0.9, 0.2, 0.2, 1])
+            for name, offset, turn in _markers_on_disk(shape, disk.number, values):
+                place = [*offset[:2], at + offset[2]]
+                body.add_site(name=name, pos=place, quat=turn, size=[1.2e-3, 0, 0], rgba=[0.9, 0.2, 0.2, 1])
+            for m in (m for m, k in enumerate(shape.imus) if k == disk.number):
+                turn = _turn(values, "imus", m, len(shape.imus))
+                body.add_site(name=f"imu_{m + 1}", pos=[0, 0, at], quat=turn, size=[5e-4, 0, 0])
         parent, before = body, z
     for i, sites in enumerate(tendons, 1):
         _add_tendon(spec, i, sites)
@@ -101,7 +106,7 @@ def _assemble_body(
         joints=joints,
         tendon_sites=tendons,
         marker_sites=(*markers, tip if listed else f"disk_{n_disk}"),
-        imu_sites=tuple(f"disk_{k}_centre" for k in shape.imus),
+        imu_sites=tuple(f"imu_{m + 1}" for m in range(len(shape.imus))),
         disks=tuple(f"disk_{k}_centre" for k in range(1, n_disk + 1)),
         tip=tip,
         length=length,
@@ -145,12 +150,22 @@ def _disks(shape: Continuum, values: Mapping[str, float], disk_z: np.ndarray) ->
     ]  # fmt: skip
 
 
-def _markers_on_disk(shape: Continuum, disk: int, values: Mapping[str, float]) -> list[tuple[str, list[float]]]:
-    """Return the names of the markers on a disk and their offsets (m) from its centre."""
+def _markers_on_disk(shape: Continuum, disk: int, values: Mapping[str, float]) -> list[tuple[str, list[float], list[float]]]:
+    """Return the names of the markers on a disk, their offsets (m) from its centre, and the quaternions of their axes."""
     if shape.markers == "disk":
-        return [(f"disk_{disk}", [0.0, 0.0, float(parameter_array(values, "markers.axial_offset", shape.disks)[disk - 1])])]
-    offsets = np.stack([parameter_array(values, f"markers.offset_{a}", len(shape.markers)) for a in "xyz"], axis=1)
-    return [(f"marker_{m + 1}", offsets[m].tolist()) for m, k in enumerate(shape.markers) if k == disk]
+        offset = [0.0, 0.0, float(parameter_array(values, "markers.axial_offset", shape.disks)[disk - 1])]
+        return [(f"disk_{disk}", offset, _turn(values, "markers", disk - 1, shape.disks))]
+    n = len(shape.markers)
+    offsets = np.stack([parameter_array(values, f"markers.offset_{a}", n) for a in "xyz"], axis=1)
+    return [
+        (f"marker_{m + 1}", offsets[m].tolist(), _turn(values, "markers", m, n)) for m, k in enumerate(shape.markers) if k == disk
+    ]
+
+
+def _turn(values: Mapping[str, float], what: str, m: int, n: int) -> list[float]:
+    """Return the quaternion of the m-th of n axes, from the rotation vector `what`.turn_x, turn_y, turn_z."""
+    vector = [parameter_array(values, f"{what}.turn_{a}", n)[m] for a in "xyz"]
+    return Rotation.from_rotvec(vector).as_quat(scalar_first=True).tolist()
 
 
 def _new_spec() -> mujoco.MjSpec:

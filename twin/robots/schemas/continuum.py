@@ -49,12 +49,16 @@ class Continuum(Motorised):
         description='"disk": a marker disk_K in the centre of every disk; or a list of disks that carry marker_1, marker_2, ...',
     )
 
-    imus: list[Disk] = Field(
-        [], description="a list of disks that carry imu_1, imu_2, ..., whose axes are the base frame's at rest"
-    )
+    imus: list[Disk] = Field([], description="a list of disks that carry imu_1, imu_2, ..., turned by `imus.turn`")
 
     def counts(self) -> dict[str, int]:
-        return {"disk": self.disks, "tendon": self.tendons, "marker": len(self.markers), "motor": len(self.motors or ())}
+        return {
+            "disk": self.disks,
+            "tendon": self.tendons,
+            "marker": len(self.markers),
+            "motor": len(self.motors or ()),
+            "imu": len(self.imus),
+        }
 
     def kinds(self) -> frozenset[str]:
         body = CAST if self.body == "cast" else WIRE | (ROUND_SECTION if self.section == "round" else OTHER_SECTION)
@@ -303,6 +307,22 @@ CONTINUUM_ROWS = (
             -1.0,
             1.0,
             default=0.0,
+        )
+        for a in "xyz"
+    ),
+    *(
+        rows.row(
+            f"{what}.turn_{a}",
+            "rad deg",
+            f"{a} component of the rotation vector of {whose} axes against the base frame's on the straight robot",
+            -2 * FULL_TURN,
+            2 * FULL_TURN,
+            default=0.0,
+        )
+        for rows, what, whose in (
+            (_Rows(ON_DISKS, ("disk",)), "markers", "each marker's"),
+            (_glued, "markers", "each marker's"),
+            (_Rows(shape=("imu",)), "imus", "each IMU's"),
         )
         for a in "xyz"
     ),
