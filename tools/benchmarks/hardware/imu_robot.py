@@ -17,6 +17,7 @@ from twin.measurements import Channel, Recording, Trial
 from twin.prediction.twin import Twin
 from twin.robots import load
 
+SIGN = (-1.0, 1.0, 1.0)  # of roll, pitch, yaw: with this roll the tip goes round the way the commands do
 RATE, STEP = 10.0, 5  # rows a second, a guess; rows of the log for one that is kept
 NOISE = np.radians(1.0)  # the log is in whole degrees
 # Neither is published how the IMU sits on its disk nor what a motor winds: its angle here is that which the tendons should bend by.
@@ -39,7 +40,7 @@ def main(folder: tyro.conf.Positional[Path], out: tyro.conf.Positional[Path]) ->
     described = described.replace("markers = [5, 5]", structure).replace("[parameters]", f"[parameters]\n{UNKNOWN}")
     (place / "robot.toml").write_text(described, "utf-8")
     twin = Twin.of(load(str(place)))
-    for name, axes in (("with its heading", ("roll", "pitch", "yaw")), ("without", ("roll", "pitch"))):
+    for name, axes in (("without", ("roll", "pitch")),):
         channels = (*PULLS, *(Channel(f"marker_1_{a}", "output", "deg", NOISE) for a in axes))
         runs = tuple(_run(folder / f"const_theta20_{k}.csv.gz", 200.0 * k, channels) for k in range(9))
         found = diagnose(Recording("imu robot", "circles", "hardware: massemassiv", None, channels, runs), twin, Settings())
@@ -54,7 +55,7 @@ def _run(file: Path, start: float, channels: tuple[Channel, ...]) -> Trial:
     time = np.arange(len(log)) * STEP / RATE
     gamma, theta = np.radians(log[:, 4]), np.radians(log[:, 5])
     values = {f"motor_{k + 1}_angle": theta * np.cos(gamma + 2.0 * np.pi * k / 3.0) for k in range(3)}
-    values |= {f"marker_1_{a}": np.radians(log[:, 1 + j]) for j, a in enumerate(("roll", "pitch", "yaw"))}
+    values |= {f"marker_1_{a}": SIGN[j] * np.radians(log[:, 1 + j]) for j, a in enumerate(("roll", "pitch", "yaw"))}
     return Trial(file.name.removesuffix(".csv.gz"), time, {c.name: values[c.name] for c in channels}, start=start)
 
 

@@ -125,12 +125,13 @@ class Objective:
         with `unsolved` "zeros".
         """
         before = self._coarsely(at) if self.bends else None
+        once = before is not None if self.bends else once
 
         def column(model: Model, size: float) -> np.ndarray:
             if _same_simulation(at.model.twin, model.twin):
                 return self._change(at.raw, [at.traces[k].outputs(model.twin, self.prepared) for k in self.trials], size)
             try:
-                predicted = self.predict(model.twin, at.traces, once=once or before is not None)[1]
+                predicted = self.predict(model.twin, at.traces, once=once)[1]
             except SolveError:
                 if unsolved == "raise":
                     raise
