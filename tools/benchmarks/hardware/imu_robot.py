@@ -40,7 +40,7 @@ def main(folder: tyro.conf.Positional[Path], out: tyro.conf.Positional[Path]) ->
     described = described.replace("markers = [5, 5]", structure).replace("[parameters]", f"[parameters]\n{UNKNOWN}")
     (place / "robot.toml").write_text(described, "utf-8")
     twin = Twin.of(load(str(place)))
-    for name, axes in (("without", ("roll", "pitch")),):
+    for name, axes in (("with its heading", ("roll", "pitch", "yaw")), ("without", ("roll", "pitch"))):
         channels = (*PULLS, *(Channel(f"marker_1_{a}", "output", "deg", NOISE) for a in axes))
         runs = tuple(_run(folder / f"const_theta20_{k}.csv.gz", 200.0 * k, channels) for k in range(9))
         found = diagnose(Recording("imu robot", "circles", "hardware: massemassiv", None, channels, runs), twin, Settings())
