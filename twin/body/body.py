@@ -31,6 +31,8 @@ class Port:
     channel: str  # what it means, a name of the grammar of channels
     drive: Drive
     tendon_gains: tuple[float, ...]
+    unit: str = ""  # SI, of a control, which may have one of several
+    span: tuple[float, float, float] | None = None  # of a control: least, where it rests, most; None where nothing bounds it
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ friction.py  joints and tendons that rub        written.py    numbers back into 
 precise_xml.py  an MJCF as text to the last digit
 """
 
-from twin.mechanics.mjcf.body import ModelBody, element_senses, payload_places, tip_site
+from twin.mechanics.mjcf.body import ModelBody, control_span, control_unit, element_senses, model_size, payload_places, tip_site
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
-from twin.mechanics.mjcf.precise_xml import WrittenModel, exact_text, with_comments
+from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
 from twin.mechanics.mjcf.written import check_same, name_element, written_model
 
@@ -27,10 +27,14 @@ __all__ = [
     "WrittenModel",
     "applies",
     "check_same",
+    "control_span",
+    "control_unit",
+    "copied",
     "element_senses",
     "exact_text",
     "half_step",
     "load_model",
+    "model_size",
     "name_element",
     "payload_places",
     "si_unit",

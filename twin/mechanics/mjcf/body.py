@@ -55,6 +55,36 @@ def sensor_unit(model: mujoco.MjModel, k: int) -> str:
     return unit
 
 
+def control_unit(model: mujoco.MjModel, k: int) -> str:
+    """Return the SI unit of an actuator's control: of a position, a rate, or a torque; "1" where its gain is none of a motor."""
+    if model.actuator_gaintype[k] != int(mujoco.mjtGain.mjGAIN_FIXED):
+        return "1"
+    sliding, bias = slides(model, "actuator", k), model.actuator_biasprm[k]
+    kind = "position" if bias[1] != 0.0 else "velocity" if bias[2] != 0.0 else "force"
+    return _PORT_UNITS[kind][sliding]
+
+
+def control_span(model: mujoco.MjModel, k: int) -> tuple[float, float, float] | None:
+    """Return the least, resting and greatest control of an actuator by its ctrlrange, else by its joint's or its force's range.
+
+    It rests where the first keyframe has it, else at the allowed value nearest to zero. None where nothing bounds it.
+    """
+    joint, gear = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0])
+    of_joint = model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT) and model.actuator_biasprm[k, 1] < 0.0
+    gain = float(model.actuator_gainprm[k, 0])
+    if model.actuator_ctrllimited[k]:
+        ends = model.actuator_ctrlrange[k]
+    elif of_joint and model.jnt_limited[joint]:
+        ends = gear * model.jnt_range[joint]
+    elif model.actuator_forcelimited[k] and control_unit(model, k) in ("N", "N*m") and gain:
+        ends = model.actuator_forcerange[k] / gain
+    else:
+        return None
+    low, high = float(min(ends)), float(max(ends))
+    rest = float(model.key_ctrl[0, k]) if model.nkey else 0.0
+    return low, min(max(rest, low), high), high
+
+
 def element_senses(loaded: LoadedModel) -> dict[str, Sense]:
     """Return the channels that a model's elements can show, by the names of the contract."""
     model, senses = loaded.model, dict[str, Sense]()
@@ -121,8 +151,10 @@ class ModelBody(Body):
                 model.jnt_solref[joint], model.jnt_solimp[joint] = HARD_STOP
 
     def scale_actuators(self, share: np.ndarray) -> None:
-        self.model.actuator_gainprm[:, :3] *= share[:, None]
-        self.model.actuator_biasprm[:, :3] *= share[:, None]
+        muscle = self.model.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_MUSCLE)
+        for numbers in (self.model.actuator_gainprm, self.model.actuator_biasprm):
+            numbers[~muscle, :3] *= share[~muscle, None]
+            numbers[muscle, 2:4] *= share[muscle, None]  # its peak force, or the scale of that; the others are lengths
 
 
 def model_size(model: mujoco.MjModel) -> Size:

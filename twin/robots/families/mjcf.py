@@ -15,6 +15,8 @@ from twin.mechanics.mjcf import (
     LoadedModel,
     ModelBody,
     ModelSolver,
+    control_span,
+    control_unit,
     element_senses,
     load_model,
     payload_places,
@@ -69,7 +71,15 @@ class _Known:
         self.tip = tip_site(loaded, tip)
         self.places = frozenset(payload_places(loaded))
         self.ports = tuple(
-            (Port(f"actuator.{name}.ctrl", Drive.CONTROL, tuple(np.eye(model.nu)[k])),)
+            (
+                Port(
+                    f"actuator.{name}.ctrl",
+                    Drive.CONTROL,
+                    tuple(np.eye(model.nu)[k]),
+                    control_unit(model, k),
+                    control_span(model, k),
+                ),
+            )
             for k, name in enumerate(loaded.names("actuator"))
         )
         self.tendon_sites = tendon_sites(loaded)
