@@ -5,16 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from twin.body import Drive, Loads, Problem
 from twin.body.hinge_chain import REFERENCE_SIZE
 from twin.foundation.atomic_write import write_all_atomically
 from twin.measurements.parsing.toml_text import toml_lines, toml_value
-from twin.mechanics.mjcf import LONGEST_STEP, LoadedModel, copied, load_model, model_size, tip_site
-from twin.robots.families.mjcf import tendon_sites
+from twin.mechanics.mjcf import (
+    LONGEST_STEP,
+    LoadedModel,
+    ModelSolver,
+    control_span,
+    copied,
+    load_model,
+    model_size,
+    tip_site,
+)  # fmt: skip
+from twin.robots.families.mjcf import body_of, tendon_sites
 from twin.robots.schema import BOUND_STDS
 from twin.robots.schemas.mjcf import LEAST_SHARE, MJCF_SCHEMA, Address, addresses, joint_names, usual_classes
 
 ACCURACY_SHARE = 1e-3  # of a model's reach: what a drawing and its print are good for
 GUIDE_STD = 0.2  # mm, by which a printed guide of a tendon is usually off its drawing
+REST_SECONDS = 0.5  # that a model is held at rest to see whether steps are short enough, after it settled
 MOST_NAMED = 6  # elements of a kind that a comment names
 
 
@@ -75,12 +88,24 @@ def _structure(loaded: LoadedModel) -> list[str]:
     lines = []
     if sites:
         lines.append(f"# {toml_lines({'tip': sites[tip]})[0]}  # site that a tip payload hangs at; left out: this one")
-    lines.append(f"# timestep = {LONGEST_STEP}  # s, longest step of a simulation")
+    if (own := float(loaded.model.opt.timestep)) < LONGEST_STEP and not _stands(loaded, LONGEST_STEP):
+        lines.append(f"timestep = {own}  # s, the model's own: in steps of {1e3 * LONGEST_STEP:g} ms it diverges at rest")
+    else:
+        lines.append(f"# timestep = {LONGEST_STEP}  # s, longest step of a simulation")
     if keys:
         lines.append(f'# Trials start at keyframe {keys[0]}; another by start_pose = "NAME" in a [[trial]]: {_listed(keys)}')
     else:
         lines.append("# Trials start settled under their first command (settle = 2 s), from where springs and servos rest.")
     return lines
+
+
+def _stands(loaded: LoadedModel, step: float) -> bool:
+    """Return whether a model at rest stays finite in steps of this length (s)."""
+    rest = [span[1] if (span := control_span(loaded.model, k)) else 0.0 for k in range(loaded.model.nu)]
+    body = body_of(loaded, {"timestep": step}, {})
+    time, loads = np.arange(0.0, REST_SECONDS, step), Loads(np.array(loaded.model.opt.gravity, float))
+    held = Problem(time, np.tile(rest, (len(time), 1)), loads, drives=(Drive.CONTROL,) * loaded.model.nu)
+    return not ModelSolver(body).solve(held).end_reason
 
 
 def _channels(loaded: LoadedModel) -> list[str]:

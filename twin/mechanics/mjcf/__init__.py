@@ -10,6 +10,7 @@ precise_xml.py  an MJCF as text to the last digit
 from twin.mechanics.mjcf.body import ModelBody, control_span, control_unit, element_senses, model_size, payload_places, tip_site
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
+from twin.mechanics.mjcf.poses import contacts_at_start
 from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
 from twin.mechanics.mjcf.written import check_same, name_element, written_model
@@ -27,6 +28,7 @@ __all__ = [
     "WrittenModel",
     "applies",
     "check_same",
+    "contacts_at_start",
     "control_span",
     "control_unit",
     "copied",

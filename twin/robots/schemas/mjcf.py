@@ -26,6 +26,7 @@ from twin.mechanics.mjcf import (
     Attribute,
     LoadedModel,
     applies,
+    contacts_at_start,
     control_unit,
     load_model,
     si_unit,
@@ -290,10 +291,14 @@ def model_gravity(structure: Mapping[str, object]) -> np.ndarray:
 
 
 def model_notices(structure: Mapping[str, object], table: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return remarks on what was assumed of a model."""
+    """Return remarks on what was assumed of a model, and on contacts that it begins with."""
+    touching = contacts_at_start(load_model(str(structure["model"])))
+    met = (f"the model begins with {touching} contacts: they are stepped as MuJoCo has them, and nothing is fitted through them",)
+    remarks = met if touching else ()
     if table:
-        return ()
+        return remarks
     return (
+        *remarks,
         "robot.toml declares no [parameters]: masses, inertias, springs, dampers and gains are taken to differ as is usual of "
         "their kind (3 to 30 %)",
     )
