@@ -32,7 +32,7 @@ class Port:
     drive: Drive
     tendon_gains: tuple[float, ...]
     unit: str = ""  # SI, of a control, which may have one of several
-    span: tuple[float, float, float] | None = None  # of a control: least, where it rests, most; None where nothing bounds it
+    span: tuple[float, float, float] = (-np.inf, 0.0, np.inf)  # of a control: least, where it rests, most
 
 
 @dataclass(frozen=True)

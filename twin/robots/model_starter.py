@@ -101,7 +101,7 @@ def _structure(loaded: LoadedModel) -> list[str]:
 
 def _stands(loaded: LoadedModel, step: float) -> bool:
     """Return whether a model at rest stays finite in steps of this length (s)."""
-    rest = [span[1] if (span := control_span(loaded.model, k)) else 0.0 for k in range(loaded.model.nu)]
+    rest = [control_span(loaded.model, k)[1] for k in range(loaded.model.nu)]
     body = body_of(loaded, {"timestep": step}, {})
     time, loads = np.arange(0.0, REST_SECONDS, step), Loads(np.array(loaded.model.opt.gravity, float))
     held = Problem(time, np.tile(rest, (len(time), 1)), loads, drives=(Drive.CONTROL,) * loaded.model.nu)

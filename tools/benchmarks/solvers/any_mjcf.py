@@ -97,7 +97,7 @@ def move(twin: Twin) -> Recording:
     swing, columns = np.sin(2.0 * np.pi * time / PERIOD), {}
     for (port, *_), drive in ((ports, Drive.CONTROL) for ports in twin.robot.build().ports):
         assert port.drive is drive
-        low, rest, high = port.span or (0.0, 0.0, 0.0)
+        low, rest, high = np.where(np.isfinite(port.span), port.span, port.span[1])
         columns[port.channel] = rest + SHARE * np.where(swing > 0.0, (high - rest) * swing, (rest - low) * swing)
     made = rollout(twin, commands(twin, columns, RATE))
     if made.lost:

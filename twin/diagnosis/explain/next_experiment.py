@@ -42,15 +42,19 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     """Return trials that this robot could run, within the commands already used.
 
     The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
-    are commanded, the tendons that do not pull are let out, so that they are slack. Springs heated by currents cool within a minute
-    and would not respond to a fast pull of a motor.
+    are commanded, the tendons that do not pull are let out, so that they are slack. Controls of an MJCF go from where they rest.
+    Springs heated by currents cool within a minute and would not respond to a fast pull of a motor.
     """
     n = prepared.n_tendon
     top = np.max([i.command.max(axis=0) for i in prepared.inputs], axis=0)
     held = prepared.driven_by(Drive.DISPLACEMENT)
     top = np.where(held, np.max(top[held], initial=0.0), np.max(top[~held], initial=0.0))
-    words = [f"{_shown(d.display_unit[1] * x)} {d.display_unit[0]}" for x, d in zip(top, prepared.drives, strict=True)]
     like = prepared.inputs[0]
+    home = np.zeros(n) if like.home is None else like.home
+    if like.home is not None:  # controls go from where they rest to the farthest they were
+        every = np.concatenate([i.command for i in prepared.inputs])
+        top = every[np.abs(every - home).argmax(axis=0), np.arange(n)]
+    words = [_worded(prepared, i, x) for i, x in enumerate(top)]
     bare = replace(like.loads, force=np.zeros(3))
     if "torque" in prepared.robot.build().load_channels.values():
         torques = [float(np.mean(i.loads.torque)) for i in prepared.inputs]
@@ -64,16 +68,15 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
 
     def add(label: str, duration: float, *shares: np.ndarray) -> None:
         pull = np.stack(shares, axis=1)
-        command = top * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
+        command = home + (top - home) * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
         shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
     up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
     hold = np.concatenate([[0.0], np.full(60, HELD_COMMAND_SHARE)])
-    for i in np.flatnonzero(top > 0.0):  # a tendon that was never commanded has no range
+    for i in np.flatnonzero(top - home if like.home is not None else top > 0.0):  # what was never commanded has no range
         alone = np.eye(n)[i]
-        what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", 4.0)
-        pull = f"heat {what} with up" if prepared.drives[i] is Drive.CURRENT else f"pull {what}"
+        what, pull, fast = _deed(prepared, int(i))
         add(f"{pull} to {words[i]} and release it, slowly (120 s)", 120.0, *np.outer(alone, up_down))
         add(f"{pull} to {words[i]} and release it, fast ({fast:.0f} s)", fast, *np.outer(alone, up_down))
         again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly (240 s)"
@@ -81,7 +84,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
         add(f"step {what} to three quarters of {words[i]} and hold for 120 s", 120.0, *np.outer(alone, hold))
     turns = np.linspace(0, 4 * np.pi, 80)
     circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
-    if not held.any() and top.all():
+    if not held.any() and top.all() and like.home is None:
         add(f"two circles with all tendons up to 0.6 of {words[0]} (160 s)", 160.0, *circle)
     add("rest unloaded for 60 s", 60.0, *np.zeros((n, 30)))
     last = max(float(i.clock[-1]) for i in prepared.inputs)
@@ -91,10 +94,40 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
             label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
             inputs = Inputs(
-                label, time, last + 60.0 + time, command, prepared.drives, warm, loads, turned=like.turned, damped=like.damped
+                label,
+                time,
+                last + 60.0 + time,
+                command,
+                prepared.drives,
+                warm,
+                loads,
+                turned=like.turned,
+                damped=like.damped,
+                smooth=like.smooth,
+                start=like.start,
+                home=like.home,
+                reach=like.reach,
             )
             out.append((label, inputs))
     return out
+
+
+def _deed(prepared: PreparedRecording, i: int) -> tuple[str, str, float]:
+    """Return what a trial moves, the words for moving it, and how long a fast move takes, s."""
+    if prepared.drives[i] is Drive.CURRENT:
+        return f"spring {i + 1}", f"heat spring {i + 1} with up", 40.0
+    if prepared.drives[i] is Drive.CONTROL:
+        name = prepared.drivers[i].name
+        return name, f"move {name}", 4.0
+    return f"tendon {i + 1}", f"pull tendon {i + 1}", 4.0
+
+
+def _worded(prepared: PreparedRecording, i: int, command: float) -> str:
+    """Return a command with its unit."""
+    if prepared.drives[i] is Drive.CONTROL:
+        return f"{command:.3g} {prepared.drivers[i].si_unit}"
+    unit, factor = prepared.drives[i].display_unit
+    return f"{_shown(factor * command)} {unit}"
 
 
 def _shown(x: float) -> str:

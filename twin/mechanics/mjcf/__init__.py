@@ -4,10 +4,11 @@ loading.py   an MJCF, or why not         numbers.py   its numbers by address
 body.py      channels and changes        poses.py     starts and payloads
 solver.py    trials                      stepping.py  the compiled loop
 friction.py  joints and tendons that rub        written.py    numbers back into the MJCF
-precise_xml.py  an MJCF as text to the last digit
+precise_xml.py  an MJCF as text to the last digit    drawing.py  its geoms and tendons to draw
 """
 
 from twin.mechanics.mjcf.body import ModelBody, control_span, control_unit, element_senses, model_size, payload_places, tip_site
+from twin.mechanics.mjcf.drawing import ModelFigure
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
 from twin.mechanics.mjcf.poses import contacts_at_start
@@ -23,6 +24,7 @@ __all__ = [
     "Attribute",
     "LoadedModel",
     "ModelBody",
+    "ModelFigure",
     "ModelSolver",
     "Motion",
     "WrittenModel",

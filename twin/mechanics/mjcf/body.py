@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,24 +64,26 @@ def control_unit(model: mujoco.MjModel, k: int) -> str:
     return _PORT_UNITS[kind][sliding]
 
 
-def control_span(model: mujoco.MjModel, k: int) -> tuple[float, float, float] | None:
+def control_span(model: mujoco.MjModel, k: int) -> tuple[float, float, float]:
     """Return the least, resting and greatest control of an actuator by its ctrlrange, else by its joint's or its force's range.
 
-    It rests where the first keyframe has it, else at the allowed value nearest to zero. None where nothing bounds it.
+    It rests where the first keyframe has it, else at the allowed value nearest to where a servo does not pull in the model's
+    reference pose, zero for others. Ends that nothing bounds are infinite.
     """
-    joint, gear = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0])
-    of_joint = model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT) and model.actuator_biasprm[k, 1] < 0.0
-    gain = float(model.actuator_gainprm[k, 0])
+    joint, gear, bias = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0]), model.actuator_biasprm[k]
+    of_joint = model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT) and bias[1] < 0.0
+    gain, unit = float(model.actuator_gainprm[k, 0]), control_unit(model, k)
+    ends: Sequence[float] = (-np.inf, np.inf)
     if model.actuator_ctrllimited[k]:
         ends = model.actuator_ctrlrange[k]
     elif of_joint and model.jnt_limited[joint]:
         ends = gear * model.jnt_range[joint]
-    elif model.actuator_forcelimited[k] and control_unit(model, k) in ("N", "N*m") and gain:
+    elif model.actuator_forcelimited[k] and unit in ("N", "N*m") and gain:
         ends = model.actuator_forcerange[k] / gain
-    else:
-        return None
     low, high = float(min(ends)), float(max(ends))
-    rest = float(model.key_ctrl[0, k]) if model.nkey else 0.0
+    servo = unit in ("rad", "m") and gain != 0.0
+    rest = -(bias[0] + bias[1] * model.actuator_length0[k]) / gain if servo else 0.0
+    rest = float(model.key_ctrl[0, k] if model.nkey else rest)
     return low, min(max(rest, low), high), high
 
 

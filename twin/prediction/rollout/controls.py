@@ -157,8 +157,7 @@ def draw_controls(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = N
 
 def _drawn_in_ranges(twin: Twin, n: int, seed: int, drawing: Drawing, ports: list[Port]) -> Recording:
     """Draw controls of an MJCF's actuators."""
-    spans = [p.span or (-np.inf, 0.0, np.inf) for p in ports]
-    low, rest, high = np.array(spans, float).T
+    low, rest, high = np.array([p.span for p in ports], float).T
     if drawing.pull is not None:
         low, high = np.maximum(low, rest - drawing.pull), np.minimum(high, rest + drawing.pull)
     if not np.isfinite(high - low).all():

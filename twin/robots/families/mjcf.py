@@ -14,6 +14,7 @@ from twin.mechanics.mjcf import (
     LONGEST_STEP,
     LoadedModel,
     ModelBody,
+    ModelFigure,
     ModelSolver,
     control_span,
     control_unit,
@@ -126,5 +127,11 @@ def statics(body: Body) -> ModelSolver:
     return ModelSolver(body)
 
 
+def figure(body: Body) -> ModelFigure:
+    """Return its drawing: the model's geoms and tendons."""
+    assert isinstance(body, ModelBody)
+    return ModelFigure(body)
+
+
 dynamics = None  # `statics` steps
-figure = chain = silicone = hand = None
+chain = silicone = hand = None
