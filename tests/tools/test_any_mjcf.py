@@ -101,7 +101,8 @@ def test_a_muscle_has_no_kp_and_its_gain_scales_its_force(tmp_path: Path) -> Non
 def test_a_model_that_needs_short_steps_gets_its_own(tmp_path: Path) -> None:
     """A spring of 1e6 N m/rad on 0.02 kg m^2 turns 14 rad of its period in a step of 2 ms, which diverges, and 0.14 in 0.02 ms."""
     stiff = PENDULUM.format(joint="", key="").replace(
-        '<option timestep="0.001" integrator="implicitfast"/>', '<option timestep="{step}" integrator="implicitfast"/>'
+        '<option timestep="0.001" integrator="implicitfast"/>',
+        '<option timestep="{step}" integrator="implicitfast" gravity="1 0 -9.81"/>',
     )
     stiff = stiff.replace(
         '<motor name="push" joint="hinge"/>', '<general name="push" joint="hinge" biastype="affine" biasprm="{k}"/>'

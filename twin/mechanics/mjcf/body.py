@@ -80,9 +80,11 @@ def control_span(model: mujoco.MjModel, k: int) -> tuple[float, float, float]:
         ends = gear * model.jnt_range[joint]
     elif model.actuator_forcelimited[k] and unit in ("N", "N*m") and gain:
         ends = model.actuator_forcerange[k] / gain
+    servo, held = unit in ("rad", "m") and gain != 0.0, bias[0] + bias[1] * model.actuator_length0[k]
+    if servo and np.isinf(ends[0]) and model.actuator_forcelimited[k]:
+        ends = (model.actuator_forcerange[k] - held) / gain  # where it pulls most in that pose
     low, high = float(min(ends)), float(max(ends))
-    servo = unit in ("rad", "m") and gain != 0.0
-    rest = -(bias[0] + bias[1] * model.actuator_length0[k]) / gain if servo else 0.0
+    rest = -held / gain if servo else 0.0
     rest = float(model.key_ctrl[0, k] if model.nkey else rest)
     return low, min(max(rest, low), high), high
 
