@@ -6,6 +6,7 @@ import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 
 from tests.command_line import twin
 from twin.measurements import read, write
+from twin.report.robot_page import draw_robot
 from twin.robots import load
 from twin.robots.starter import FIRST_SET, write_model_starter
 
@@ -152,3 +154,20 @@ def test_controls_without_a_range_are_told(tmp_path: Path) -> None:
     commands = read(tmp_path / "rolled").trials[0].values
     assert np.abs(commands["actuator.pull.ctrl"]).max() <= 0.3
     assert np.abs(commands["actuator.servo.ctrl"]).max() <= 0.3
+
+
+def test_its_picture_has_its_geoms_and_names_its_sites(tmp_path: Path) -> None:
+    """A mesh by the box about it, a ball by circles, a rod by its axis; sites that guide a tendon are on it already."""
+    floor = '<geom type="plane" size="0 0 1"/>'  # without end: not drawn
+    text = ARM.replace('<site name="winch"', floor + '<site name="camera" pos="0 0.1 0"/><site name="winch"')
+    folder, _ = write_model_starter("arm", arm(tmp_path / "own", text), tmp_path)
+    drawn: Any = draw_robot(load(str(folder))).data
+    traces = {t.name: np.array([t.x, t.y, t.z], float).T for t in drawn}
+    rod = traces["body"][np.isfinite(traces["body"]).all(axis=1)]
+    assert rod == pytest.approx(np.array([[0.0, 0.0, -200.0], [0.0, 0.0, 0.0]]), abs=1e-9)  # mm
+    shapes = traces["disks, plates, pulleys"]
+    ball = np.linalg.norm(shapes, axis=1) < 10.0 + 1e-9  # of the shell, at the shoulder
+    assert ball.sum() == 3 * 49
+    assert np.nanmin(shapes[:, 2]) == pytest.approx(-350.0, abs=1e-3)  # the tip of the mesh, of single precision
+    (marks,) = (t for t in drawn if t.name == "markers")
+    assert list(marks.text) == ["site.camera"]
