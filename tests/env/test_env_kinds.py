@@ -12,6 +12,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
 from twin.effects import effect_class
@@ -36,10 +37,10 @@ def made(name: str) -> Any:
 
 def episode(env: Any, seed: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Observations and rewards under the same actions."""
-    rows, rewards, rng = [env.reset(seed=seed)[0]], [], np.random.default_rng(0)
+    rows, rewards, rng = [spaces.flatten(env.observation_space, env.reset(seed=seed)[0])], [], np.random.default_rng(0)
     for _ in range(steps):
         seen, reward, *_ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
-        rows.append(seen)
+        rows.append(spaces.flatten(env.observation_space, seen))
         rewards.append(reward)
     return np.array(rows), np.array(rewards)
 
@@ -87,7 +88,7 @@ def test_bad_options_are_refused(name: str, tmp_path: Path) -> None:
         gymnasium.make(f"twin/{name}", twin=newer)
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [name for name in ALL if "Goal" not in name])
 def test_its_tables_name_every_index_of_what_it_says(name: str) -> None:
     """The docstring says how long an observation is, with n = 3 tendons, k = 3 actions, p = 2 servos a finger, s = 4 cords,
     m = 11 markers and f = 3 fingers as large as it is, and its tables stand in twin/env/README.md row by row."""
@@ -97,7 +98,7 @@ def test_its_tables_name_every_index_of_what_it_says(name: str) -> None:
         "FingerShape-v0": ("(s + 2p + 3m,)", 4 + 2 * 2 + 3 * 11, 2),
         "HandReorient-v0": ("(f s + f p + 4,)", 3 * 4 + 3 * 2 + 4, 6),
     }.get(name, ("(2n + k + 6,)", 2 * 3 + 3 + 6, 3))
-    assert f"Observation, Box(-inf, inf, {said})" in text
+    assert f"Observation, Box, {said}" in text
     assert env.observation_space.shape == (size,) == env.reset(seed=0)[0].shape
     assert env.action_space.shape == (actions,)
     assert full.observation_space.shape == full.reset(seed=0)[0].shape
@@ -153,7 +154,7 @@ def test_a_wanted_shape_is_reached_by_its_own_servos() -> None:
     env.wanted = env._rest_markers(servos)
     for _ in range(40):
         *_, info = env.step(np.clip((servos - env.servos) / (env.options.rate * env.plant.interval), -1.0, 1.0))
-    assert info["success"]
+    assert info["is_success"]
     # m: statics has the finger's own Poisson ratio 0.49, motion 0.47 at most, and both end at rest without friction
     assert info["distance"] < 2e-4
 

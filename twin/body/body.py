@@ -31,6 +31,8 @@ class Port:
     channel: str  # what it means, a name of the grammar of channels
     drive: Drive
     tendon_gains: tuple[float, ...]
+    unit: str = ""  # SI, of a control, which may have one of several
+    span: tuple[float, float, float] = (-np.inf, 0.0, np.inf)  # of a control: least, where it rests, most
 
 
 @dataclass(frozen=True)

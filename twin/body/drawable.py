@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -23,6 +24,29 @@ class ColourScale(NamedTuple):
     low: float
     high: float
     zero: float = 0.0
+
+
+class Shape(NamedTuple):
+    """A shape in the frame of its link: "sphere", "capsule", "cylinder", "box", "ellipsoid" or "mesh".
+
+    `size` (3,) m is MuJoCo's: radius, half lengths along z or the axes; a mesh has `vertices` (v, 3) m and `faces` (f, 3).
+    """
+
+    kind: str
+    size: np.ndarray
+    place: np.ndarray  # (3,) m
+    turn: np.ndarray  # (4,) w, x, y, z
+    vertices: np.ndarray = NO_POINTS
+    faces: np.ndarray = NO_POINTS
+
+
+class Solid(NamedTuple):
+    """The shapes of a link that have one colour, bytes, and opacity, 0 to 1; whether they move."""
+
+    shapes: tuple[Shape, ...]
+    colour: tuple[int, int, int]
+    opacity: float
+    moves: bool
 
 
 class FrameShapes(NamedTuple):
@@ -69,8 +93,12 @@ class Drawable(Protocol):
 
     cylinders: np.ndarray  # (g, 2) m, radius and half length of the links
     link_colours: np.ndarray  # (g, 3) bytes
+    solids: tuple[Solid, ...]  # (g), the links' shapes where these are no cylinders
     faces: np.ndarray  # (f, 3), of the skin
-    height: float  # m
+    height: float  # m, drawn as one unit
+    middle: np.ndarray  # (3,) m, that is looked at
+    view: np.ndarray  # (3,), from where; zero where any side will do
+    tip: int  # the marker that is told as the tip, negative from the end
     colour_fields: tuple[str, ...]  # fields of `Frames` that it may be coloured by
     push_points: np.ndarray  # (p, 3), where it may be pushed: height, azimuth and finger of `Push`
 
@@ -87,6 +115,15 @@ class Drawable(Protocol):
 
     def colour_scale(self, shade: str, most: float) -> ColourScale:
         """Return the colour scale of a field whose largest value is `most` (SI)."""
+        ...
+
+
+@runtime_checkable
+class Jointed(Protocol):
+    """The drawing of a body with joints that encoders read."""
+
+    def turned(self, path: Solution, joints: Mapping[int, np.ndarray]) -> Frames:
+        """Return the frames with some joints, by number, at other positions (n,), rad or m; NaN keeps the solution's."""
         ...
 
 

@@ -5,12 +5,11 @@
 continuum.py             twin/ContinuumReach-v0, twin/ContinuumTrack-v0
 finger.py                twin/FingerShape-v0
 hand.py                  twin/HandReorient-v0
-base.py                  what all of them share: copies, pickles, saved states
+mjcf.py                  twin/MJCFTrack-v0
+goals.py                 the same goal-conditioned: twin/ContinuumReachGoal-v0, twin/FingerShapeGoal-v0, twin/HandReorientGoal-v0
+episodes/                what all of them share: options, drawn twins, observations, saved states, frames
 batch.py                 many environments in threads, for `gymnasium.make_vec`
 dm.py                    the continuum tasks as dm_env
-domain_randomisation.py  twins drawn from the uncertainty of a diagnosis
-validation.py            options and actions, checked
-rendering.py             frames by MuJoCo's renderer
 plants/                  robots stepped in time under commands, with their effects
 """
 
@@ -24,6 +23,10 @@ ENVIRONMENTS = {  # class, steps an episode
     "ContinuumTrack-v0": ("twin.env.continuum:ContinuumTrack", 200),
     "FingerShape-v0": ("twin.env.finger:FingerShape", 100),
     "HandReorient-v0": ("twin.env.hand:HandReorient", 60),
+    "MJCFTrack-v0": ("twin.env.mjcf:MJCFTrack", 200),
+    "ContinuumReachGoal-v0": ("twin.env.goals:ContinuumReachGoal", 100),
+    "FingerShapeGoal-v0": ("twin.env.goals:FingerShapeGoal", 100),
+    "HandReorientGoal-v0": ("twin.env.goals:HandReorientGoal", 60),
 }
 
 

@@ -12,12 +12,12 @@ import gymnasium
 import numpy as np
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector.utils import batch_space, concatenate, create_empty_array
 from joblib import cpu_count
 
 from twin.foundation.errors import DataError
 
-StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
+StepResult = tuple[Any, float, bool, bool, dict[str, Any]]
 
 
 class ThreadedVectorEnv(VectorEnv):
@@ -45,7 +45,7 @@ class ThreadedVectorEnv(VectorEnv):
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Reset all environments. Raises DataError for seeds that are not one each."""
         seeds = (
             [None if seed is None else seed + i for i in range(self.num_envs)] if seed is None or isinstance(seed, int) else seed
@@ -56,16 +56,17 @@ class ThreadedVectorEnv(VectorEnv):
             self._threads.map(lambda one: one[0].reset(seed=one[1], options=options), zip(self.envs, seeds, strict=True))
         )
         self._steps_taken[:], self._ended[:] = 0, False
-        return np.stack([seen for seen, _ in results]), self._gather_info([info for _, info in results])
+        return self._gather_observations([seen for seen, _ in results]), self._gather_info([info for _, info in results])
 
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Step all environments. Raises DataError for actions of another shape or that are not finite."""
         if len(actions) != self.num_envs:
             raise DataError(f"{len(actions)} actions came for {self.num_envs} environments; one each is needed")
         results = list(self._threads.map(self._step_one, range(self.num_envs), actions))
         observations, reward, terminated, truncated, infos = zip(*results, strict=True)
         self._ended = np.array(terminated) | np.array(truncated)
-        return np.stack(observations), np.array(reward, float), np.array(terminated), np.array(truncated), self._gather_info(infos)
+        seen = self._gather_observations(observations)
+        return seen, np.array(reward, float), np.array(terminated), np.array(truncated), self._gather_info(infos)
 
     def render(self) -> tuple[Any, ...] | None:
         """Return the frames of all environments, or None without a render mode."""
@@ -86,6 +87,12 @@ class ThreadedVectorEnv(VectorEnv):
         observation, reward, terminated, truncated, info = self.envs[i].step(action)
         self._steps_taken[i] += 1
         return observation, float(reward), terminated, truncated or bool(self._steps_taken[i] >= self._max_steps), info
+
+    def _gather_observations(self, observations: Sequence[Any]) -> Any:
+        """Gather the observations of all environments, an array or a Dict of them."""
+        return concatenate(
+            self.single_observation_space, observations, create_empty_array(self.single_observation_space, self.num_envs)
+        )
 
     def _gather_info(self, infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
         """Gather the infos of all environments."""

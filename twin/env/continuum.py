@@ -7,12 +7,14 @@ from typing import Any, Literal
 
 import numpy as np
 from gymnasium import spaces
+from scipy.optimize import least_squares
 
 from twin.body import Drive, Loads, Problem
-from twin.env.base import TwinEnv, refuse_before_reset
+from twin.env.episodes.base import TwinEnv, refuse_before_reset
+from twin.env.episodes.observation import PLACE_RANGE, PULL_RANGE, SPEED_RANGE, ObservationLayout, PartBounds
+from twin.env.episodes.rendering import FrameRenderer, Mark
+from twin.env.episodes.validation import ActionBounds, parse_goal
 from twin.env.plants.rod_plant import RodPlant
-from twin.env.rendering import FrameRenderer, Mark
-from twin.env.validation import ActionBounds
 from twin.foundation.errors import DataError, SolveError, UnknownNameError
 from twin.prediction.kinematics import HeatedRobot, warmest_current
 from twin.prediction.rollout import full_pull
@@ -70,21 +72,24 @@ class ContinuumReach(TwinEnv):
     |---|---|---|---|---|
     | 0..1 | rate of the commanded bend along x, y | -1 | 1 | `rate` F/s |
 
-    Observation, Box(-inf, inf, (2n + k + 6,)), float32, of k actions, with `observe="sensors"`:
+    Observation, Box, (2n + k + 6,), float32, of k actions, with `observe="sensors"`; readings saturate at their bounds:
 
     | index | meaning | min | max | unit |
     |---|---|---|---|---|
-    | 0..n-1 | load cell of tendon i | -inf | inf | full pull, N |
-    | n..2n-1 | encoder of tendon i, pulled in | -inf | inf | full pull, m |
-    | 2n..2n+k-1 | command, as the actions | -inf | inf | F |
-    | 2n+k..2n+k+2 | tip x, y, z by camera | -inf | inf | L |
-    | 2n+k+3..2n+k+5 | goal x, y, z | -inf | inf | L |
+    | 0..n-1 | load cell of tendon i | -4 `most` | 4 `most` | full pull, N |
+    | n..2n-1 | encoder of tendon i, pulled in | -4 `most` | 4 `most` | full pull, m |
+    | 2n..2n+k-1 | command, as the actions | 0, of bends -`most` | `most`, of currents at most 1 | F |
+    | 2n+k..2n+k+2 | tip x, y, z by camera | -2 | 2 | L |
+    | 2n+k+3..2n+k+5 | goal x, y, z | -2 | 2 | L |
 
-    With `observe="full"` there follow nv joint angles (rad) and nv joint speeds (10 rad/s). For a robot without encoders or without
-    a camera (`sensors=("load_cells", "tip")`, say) those rows are left out. `parts` names the rows: load_cells, encoders, commands,
-    tip, goal, angles, speeds.
+    With `observe="full"` there follow nv joint angles (rad, within pi) and nv joint speeds (10 rad/s, within 100). For a robot
+    without encoders or without a camera (`sensors=("load_cells", "tip")`, say) those rows are left out. `parts` names the rows:
+    load_cells, encoders, commands, tip, goal, angles, speeds.
 
-    Reward: -|tip - goal| / (0.1 L), of the true tip. `info`: distance (m), success (within `success`), tip, goal. An episode is
+    `reset(options={"goal": (x, y, z)})`, in m, chooses the goal; it must lie within `success` of a place where the tip rests under
+    tensions up to `most`.
+
+    Reward: -|tip - goal| / (0.1 L), of the true tip. `info`: distance (m), is_success (within `success`), tip, goal. An episode is
     truncated after 100 steps; it ends early, with a reward of -10 and the reason in `info["lost"]`, where the motion is lost.
     """
 
@@ -118,11 +123,10 @@ class ContinuumReach(TwinEnv):
         k = self._tendons_by_action.shape[1]
         self._actions = ActionBounds(k)
         nv = len(self.plant.q) if self.options.observe == "full" else 0
-        self.parts = {"load_cells": self.n, "encoders": self.n, "commands": k, "tip": 3, "goal": 3}
-        self.parts |= {"angles": nv, "speeds": nv} if nv else {}
-        self.parts = {name: size for name, size in self.parts.items() if self._includes(name)}
+        self.layout = self._bounded_parts(k, nv)
+        self.parts = {name: part.size for name, part in self.layout.parts.items()}
         self.action_space = spaces.Box(-1.0, 1.0, (k,), np.float32)
-        self.observation_space = spaces.Box(-np.inf, np.inf, (sum(self.parts.values()),), np.float32)
+        self.observation_space = self.layout.box(self.parts)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Step one interval on. Raises DataError for an action that is not k finite numbers."""
@@ -133,8 +137,8 @@ class ContinuumReach(TwinEnv):
             self.plant.step(self._tendons_by_action @ self.command)
         except SolveError as fault:
             return self._observation(), -10.0, True, False, {**self._info(), "lost": str(fault)}
-        observation, info = self._observation(), self._info()
-        return observation, -info["distance"] / (0.1 * self.length), False, False, info
+        reward = float(self._goal_reward(self._achieved(), self._desired()))
+        return self._observation(), reward, False, False, self._info()
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Return (480, 640, 3) bytes with `render_mode="rgb_array"`. Raises TwinError where this machine cannot draw."""
@@ -147,6 +151,17 @@ class ContinuumReach(TwinEnv):
     def goal(self) -> np.ndarray:
         """The tip's wanted place (3,) m now."""
         return self._path[min(self._step, len(self._path) - 1)]
+
+    def _bounded_parts(self, k: int, nv: int) -> ObservationLayout:
+        """Return the observation's parts, of k actions and nv joints that are shown."""
+        most, sensed = self._largest_command / self.full, PULL_RANGE * self.options.most
+        parts = {
+            "load_cells": PartBounds.within(self.n, sensed), "encoders": PartBounds.within(self.n, sensed),
+            "commands": PartBounds(k, -most if self.drive is Drive.DISPLACEMENT else 0.0, most),
+            "tip": PartBounds.within(3, PLACE_RANGE), "goal": PartBounds.within(3, PLACE_RANGE),
+            "angles": PartBounds.within(nv, np.pi), "speeds": PartBounds.within(nv, SPEED_RANGE),
+        }  # fmt: skip
+        return ObservationLayout({name: part for name, part in parts.items() if self._includes(name)})
 
     def _limit_command(self, command: np.ndarray) -> np.ndarray:
         """Return the nearest command (k,) within the limits."""
@@ -198,11 +213,50 @@ class ContinuumReach(TwinEnv):
             raise SolveError("the described robot has no equilibrium under a goal's tensions")
         return path.markers[1:, -1]
 
-    def _observation(self) -> np.ndarray:
-        return np.concatenate(list(self._observation_parts().values())).astype(np.float32)
+    def _check_goal(self, given: Any) -> np.ndarray:
+        goal = parse_goal(given, (3,), "a place (x, y, z) of the tip, m")
+        self._refuse_out_of_reach(goal)
+        return goal[None]
+
+    def _place_goal(self, goal: np.ndarray) -> None:
+        self._path = goal
+
+    def _refuse_out_of_reach(self, place: np.ndarray) -> None:
+        """Raise DataError where the described robot's tip rests nowhere within `success` of a place (3,) m."""
+        nearest, allowed = self._nearest_tip(place), self.options.success
+        off = float(np.linalg.norm(nearest - place))
+        if off > allowed:
+            words = ", ".join(f"{x:.4f}" for x in nearest)
+            raise DataError(
+                f"the goal {np.round(place, 5).tolist()} m is out of reach: the nearest place where the tip rests, ({words}), is "
+                f"{1e3 * off:.1f} mm away and {1e3 * allowed:g} mm (`success`) are allowed; give that place, or a larger `most`"
+            )
+
+    def _nearest_tip(self, place: np.ndarray) -> np.ndarray:
+        """Return the tip (3,) m at rest nearest to a place (3,) m, of the described robot within its commands."""
+        most = self._goal_reach if self.drive is Drive.CURRENT else self.options.most
+        towards, bends = float(np.arctan2(place[1], place[0])), np.linspace(0.0, most, 13)
+        tips = self._rest_tips(bends, np.full(len(bends), towards))
+        start = bends[np.argmin(np.linalg.norm(tips - place, axis=1))]
+        found = least_squares(
+            lambda x: self._rest_tips(x[:1], x[1:])[0] - place, (start, towards), diff_step=1e-3,
+            bounds=([0.0, towards - 1.0], [most, towards + 1.0]),
+        )  # fmt: skip
+        return self._rest_tips(found.x[:1], found.x[1:])[0]
+
+    def _achieved(self) -> np.ndarray:
+        """Return the true tip (3,) L."""
+        return self.plant.readings().tip / self.length
+
+    def _desired(self) -> np.ndarray:
+        """Return the goal (3,) L."""
+        return self.goal / self.length
+
+    def _goal_reward(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """Return the reward (...) of tips (..., 3) L with goals (..., 3) L."""
+        return -np.linalg.norm(achieved - desired, axis=-1) / 0.1
 
     def _observation_parts(self) -> dict[str, np.ndarray]:
-        """Return the observation by the names of its parts."""
         o, F, rng, readings = self.options, self.pull, self.np_random, self.plant.readings()
         tension = readings.tension + o.tension_noise * rng.standard_normal(self.n)
         travel = readings.displacement + o.displacement_noise * rng.standard_normal(self.n)
@@ -214,7 +268,7 @@ class ContinuumReach(TwinEnv):
         if o.observe == "full":
             data = self.plant.motion.data
             parts |= {"angles": data.qpos, "speeds": data.qvel / 10.0}
-        return {name: part for name, part in parts.items() if self._includes(name)}
+        return parts
 
     def _includes(self, part: str) -> bool:
         """Return whether the observation has this part."""
@@ -223,17 +277,23 @@ class ContinuumReach(TwinEnv):
     def _info(self) -> dict[str, Any]:
         tip = self.plant.readings().tip
         distance = float(np.linalg.norm(tip - self.goal))
-        return {"distance": distance, "success": distance < self.options.success, "tip": tip.copy(), "goal": self.goal.copy()}
+        return {"distance": distance, "is_success": distance < self.options.success, "tip": tip.copy(), "goal": self.goal.copy()}
 
 
 class ContinuumTrack(ContinuumReach):
     """Follow a goal on a circle with the tip: a bend of drawn size whose direction turns once in 80 steps, from a drawn start.
 
     Options, actions, observations and reward are those of `ContinuumReach`; the goal observed is that of the present step. An
-    episode is truncated after 200 steps.
+    episode is truncated after 200 steps. `reset(options={"goal": path})`, (m, 3) m, chooses the goals of m steps; the last stays.
     """
 
     def _draw_goals(self) -> np.ndarray:
         bend, start = self._goal_reach * self.np_random.uniform(SMALLEST_GOAL_SHARE, 1.0), self.np_random.uniform(0.0, 2.0 * np.pi)
         lap = self._rest_tips(np.full(STEPS_PER_LAP, bend), start + 2.0 * np.pi * np.arange(STEPS_PER_LAP) / STEPS_PER_LAP)
         return np.tile(lap, (3, 1))
+
+    def _check_goal(self, given: Any) -> np.ndarray:
+        path = parse_goal(given, (-1, 3), "a path of places (x, y, z) of the tip, a row a step, m")
+        for place in path:
+            self._refuse_out_of_reach(place)
+        return path

@@ -7,12 +7,21 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from gymnasium import spaces
+from scipy.optimize import least_squares
 
 from twin.body import Drive, Loads, Problem
-from twin.env.base import TwinEnv, refuse_before_reset
+from twin.env.episodes.base import TwinEnv, refuse_before_reset
+from twin.env.episodes.observation import (
+    ENCODER_RANGE,
+    PLACE_RANGE,
+    RESISTANCE_RANGE,
+    TENSION_RANGE,
+    ObservationLayout,
+    PartBounds,
+)
+from twin.env.episodes.rendering import PRESENT_COLOUR, FrameRenderer, Mark
+from twin.env.episodes.validation import ActionBounds, parse_goal
 from twin.env.plants.soft_plant import FingerPlant
-from twin.env.rendering import PRESENT_COLOUR, FrameRenderer, Mark
-from twin.env.validation import ActionBounds
 from twin.foundation.errors import DataError, SolveError
 from twin.mechanics.silicone.statics import rotation_about_z
 from twin.prediction.twin import Twin
@@ -49,18 +58,22 @@ class FingerShape(TwinEnv):
     |---|---|---|---|---|
     | 0..p-1 | speed of servo i | -1 | 1 | `rate` |
 
-    Observation, Box(-inf, inf, (s + 2p + 3m,)), float32, with `observe="sensors"`:
+    Observation, Box, (s + 2p + 3m,), float32, with `observe="sensors"`; readings saturate at their bounds:
 
     | index | meaning | min | max | unit |
     |---|---|---|---|---|
-    | 0..s-1 | resistance of cord i, over that at no strain, minus one | -inf | inf | 0.1 |
-    | s..s+p-1 | encoder of servo i (of its first tendon) | -inf | inf | `most` |
-    | s+p..s+2p-1 | command of servo i | -inf | inf | `most` |
-    | s+2p..s+2p+3m-1 | wanted x, y, z of marker 1, then of 2, ..., the tip last | -inf | inf | L |
+    | 0..s-1 | resistance of cord i, over that at no strain, minus one | -10 | 10 | 0.1 |
+    | s..s+p-1 | encoder of servo i (of its first tendon) | -2 | 2 | `most` |
+    | s+p..s+2p-1 | command of servo i | -1 | 1 | `most` |
+    | s+2p..s+2p+3m-1 | wanted x, y, z of marker 1, then of 2, ..., the tip last | -2 | 2 | L |
 
-    With `observe="full"` there follow x, y, z of the markers (L), which no sensor measures, and the tendons' tensions (N).
+    With `observe="full"` there follow x, y, z of the markers (L, within 2), which no sensor measures, and the tendons' tensions (N,
+    within 100).
 
-    Reward: -(mean distance of the markers from their wanted places) / (0.05 L). `info`: distance (m, that mean), success (within
+    `reset(options={"goal": places})`, (m, 3) m, chooses the wanted shape; its markers must lie, in the mean, within `success` of an
+    equilibrium under servos of at most `most`.
+
+    Reward: -(mean distance of the markers from their wanted places) / (0.05 L). `info`: distance (m, that mean), is_success (within
     `success`). An episode is truncated after 100 steps, or, with a reward of -10 and the cause in `info["lost"]`, where the motion
     is lost.
     """
@@ -78,9 +91,15 @@ class FingerShape(TwinEnv):
         self.n, self.length = body.n_tendon // 2, body.cone.length
         self._actions = ActionBounds(self.n)
         n_marker, s = len(self.plant.markers), len(body.cord_paths)
-        size = s + 2 * self.n + 3 * n_marker + (3 * n_marker + body.n_tendon if self.options.observe == "full" else 0)
+        shown = self.options.observe == "full"
+        self.layout = ObservationLayout({
+            "resistance": PartBounds.within(s, RESISTANCE_RANGE), "encoders": PartBounds.within(self.n, ENCODER_RANGE),
+            "commands": PartBounds.within(self.n, 1.0), "wanted": PartBounds.within(3 * n_marker, PLACE_RANGE),
+            "markers": PartBounds.within(3 * n_marker * shown, PLACE_RANGE),
+            "tension": PartBounds.within(body.n_tendon * shown, TENSION_RANGE),
+        })  # fmt: skip
         self.action_space = spaces.Box(-1.0, 1.0, (self.n,), np.float32)
-        self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        self.observation_space = self.layout.box(self.layout.parts)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Step one interval on. Raises DataError for an action that is not one finite number a servo."""
@@ -90,8 +109,8 @@ class FingerShape(TwinEnv):
             self.plant.step(tendon_displacements(self.servos))
         except SolveError as fault:
             return self._observation(), -10.0, False, True, {**self._info(), "lost": str(fault)}
-        info = self._info()
-        return self._observation(), -info["distance"] / (0.05 * self.length), False, False, info
+        reward = float(self._goal_reward(self._achieved(), self._desired()))
+        return self._observation(), reward, False, False, self._info()
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Return (480, 640, 3) bytes with `render_mode="rgb_array"`: markers red, their wanted places green.
@@ -139,18 +158,56 @@ class FingerShape(TwinEnv):
             raise SolveError("the described finger has no equilibrium at a wanted shape")
         return path.markers[-1]
 
-    def _observation(self) -> np.ndarray:
+    def _check_goal(self, given: Any) -> np.ndarray:
+        words = f"places ({len(self.plant.markers)}, 3) of the markers, the tip last, m"
+        goal, allowed = parse_goal(given, self.plant.markers.shape, words), self.options.success
+        servos = self._nearest_servos(goal)
+        off = float(np.linalg.norm(self._rest_markers(servos) - goal, axis=1).mean())
+        if off > allowed:
+            raise DataError(
+                f"the goal is out of reach: the nearest shape, of servos at {', '.join(f'{1e3 * x:.2f}' for x in servos)} mm, is "
+                f"{1e3 * off:.1f} mm away in the mean and {1e3 * allowed:g} mm (`success`) are allowed; give such a shape, or a "
+                "larger `most`"
+            )
+        return goal
+
+    def _place_goal(self, goal: np.ndarray) -> None:
+        self.wanted = goal
+
+    def _nearest_servos(self, wanted: np.ndarray) -> np.ndarray:
+        """Return the servos (p,) m, within `most`, whose shape at rest comes nearest to wanted markers (m, 3) m."""
+        most = self.options.most
+        found = least_squares(
+            lambda share: (self._rest_markers(most * share) - wanted).ravel() / most, np.zeros(self.n), diff_step=1e-2,
+            bounds=(-1.0, 1.0), xtol=1e-3, ftol=1e-4,
+        )  # fmt: skip
+        return most * found.x
+
+    def _achieved(self) -> np.ndarray:
+        """Return the true markers (3m,) L."""
+        return self.plant.markers.ravel() / self.length
+
+    def _desired(self) -> np.ndarray:
+        """Return the wanted markers (3m,) L."""
+        return self.wanted.ravel() / self.length
+
+    def _goal_reward(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """Return the reward (...) of markers (..., 3m) L with wanted ones (..., 3m) L."""
+        apart = (achieved - desired).reshape(*np.shape(achieved)[:-1], -1, 3)
+        return -np.linalg.norm(apart, axis=-1).mean(axis=-1) / 0.05
+
+    def _observation_parts(self) -> dict[str, np.ndarray]:
         o, rng, readings = self.options, self.np_random, self.plant.readings()
         resistance = readings.resistance - 1.0 + o.resistance_noise * rng.standard_normal(len(readings.resistance))
         encoder = readings.displacement[: self.n] + o.displacement_noise * rng.standard_normal(self.n)
-        parts = [resistance / 0.1, encoder / o.most, self.servos / o.most, self.wanted.ravel() / self.length]
-        if o.observe == "full":
-            parts += [readings.markers.ravel() / self.length, readings.tension]
-        return np.concatenate(parts).astype(np.float32)
+        return {
+            "resistance": resistance / 0.1, "encoders": encoder / o.most, "commands": self.servos / o.most,
+            "wanted": self._desired(), "markers": self._achieved(), "tension": readings.tension,
+        }  # fmt: skip
 
     def _info(self) -> dict[str, Any]:
         distance = float(np.linalg.norm(self.plant.markers - self.wanted, axis=1).mean())
-        return {"distance": distance, "success": distance < self.options.success}
+        return {"distance": distance, "is_success": distance < self.options.success}
 
 
 def tendon_displacements(servos: np.ndarray) -> np.ndarray:

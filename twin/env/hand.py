@@ -8,11 +8,19 @@ from typing import Any, Literal
 import numpy as np
 from gymnasium import spaces
 
-from twin.env.base import TwinEnv, refuse_before_reset
+from twin.env.episodes.base import TwinEnv, refuse_before_reset
+from twin.env.episodes.observation import (
+    PLACE_RANGE,
+    RESISTANCE_RANGE,
+    SPEED_RANGE,
+    TENSION_RANGE,
+    ObservationLayout,
+    PartBounds,
+)
+from twin.env.episodes.rendering import GOAL_COLOUR, PRESENT_COLOUR, FrameRenderer, Mark
+from twin.env.episodes.validation import ActionBounds, parse_goal
 from twin.env.plants.soft_plant import HandPlant
-from twin.env.rendering import GOAL_COLOUR, PRESENT_COLOUR, FrameRenderer, Mark
-from twin.env.validation import ActionBounds
-from twin.foundation.errors import SolveError
+from twin.foundation.errors import DataError, SolveError
 from twin.mechanics.silicone.motion.scene import SceneState, Thing
 from twin.prediction.twin import Twin
 
@@ -54,21 +62,23 @@ class HandReorient(TwinEnv):
     |---|---|---|---|---|
     | 0..fp-1 | speed of servo i of finger k at k p + i; i = 0 bends towards the palm's axis, i = 1 across | -1 | 1 | `rate` |
 
-    Observation, Box(-inf, inf, (f s + f p + 4,)), float32, with `observe="sensors"`:
+    Observation, Box, (f s + f p + 4,), float32, with `observe="sensors"`; readings saturate at their bounds:
 
     | index | meaning | min | max | unit |
     |---|---|---|---|---|
-    | 0..fs-1 | resistance of each cord, finger by finger, over that at no strain, minus one | -inf | inf | 0.1 |
-    | fs..fs+fp-1 | place of each servo | -inf | inf | `most` |
-    | fs+fp..fs+fp+1 | sine and cosine of the block's angle about the vertical, by camera | -inf | inf | 1 |
-    | fs+fp+2..fs+fp+3 | sine and cosine of the wanted angle | -inf | inf | 1 |
+    | 0..fs-1 | resistance of each cord, finger by finger, over that at no strain, minus one | -10 | 10 | 0.1 |
+    | fs..fs+fp-1 | place of each servo | -1 | 1 | `most` |
+    | fs+fp..fs+fp+1 | sine and cosine of the block's angle about the vertical, by camera | -1 | 1 | 1 |
+    | fs+fp+2..fs+fp+3 | sine and cosine of the wanted angle | -1 | 1 | 1 |
 
-    With `observe="full"` there follow the block's place from its start (3, 0.05 m), its turn (4, quaternion), its velocity and
-    angular velocity (6, m/s and rad/s), and the tendons' tensions (N).
+    With `observe="full"` there follow the block's place from its start (3, 0.05 m, within 2), its turn (4, quaternion), its
+    velocity and angular velocity (6, m/s and rad/s, within 100), and the tendons' tensions (N, within 100).
+
+    `reset(options={"goal": angle})`, rad, chooses the wanted angle, at most the option `wanted` either way.
 
     Reward: -|angle - wanted| (rad, the short way round), less the block's distance from its start (0.05 m). `info`: angle, wanted,
-    error (rad), success (within `success`), touching (points of the hand in contact). An episode is truncated after 60 steps, three
-    seconds at some 0.4 times real time; and, with a reward of -10 and the cause in `info["lost"]`, where a state is not finite or
+    error (rad), is_success (within `success`), touching (points of the hand in contact). An episode is truncated after 60 steps,
+    3 s, at some 0.4 times real time; and, with a reward of -10 and the cause in `info["lost"]`, where a state is not finite or
     the block out of the fingers' reach.
     """
 
@@ -82,9 +92,16 @@ class HandReorient(TwinEnv):
         state = self.plant.state
         self.n, n_sensor = state.servos.size, state.resistance.size
         self._actions = ActionBounds(self.n)
-        size = n_sensor + self.n + 4 + (13 + state.tension.size if self.options.observe == "full" else 0)
+        shown = self.options.observe == "full"
+        self.layout = ObservationLayout({
+            "resistance": PartBounds.within(n_sensor, RESISTANCE_RANGE), "servos": PartBounds.within(self.n, 1.0),
+            "angle": PartBounds.within(2, 1.0), "wanted": PartBounds.within(2, 1.0),
+            "place": PartBounds.within(3 * shown, PLACE_RANGE), "turn": PartBounds.within(4 * shown, 1.0),
+            "velocity": PartBounds.within(6 * shown, SPEED_RANGE),
+            "tension": PartBounds.within(state.tension.size * shown, TENSION_RANGE),
+        })  # fmt: skip
         self.action_space = spaces.Box(-1.0, 1.0, (self.n,), np.float32)
-        self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        self.observation_space = self.layout.box(self.layout.parts)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Step one interval on. Raises DataError for an action that is not one finite number a servo."""
@@ -94,10 +111,10 @@ class HandReorient(TwinEnv):
             self.plant.step(self.servos.reshape(self.plant.state.servos.shape))
         except SolveError as fault:
             return self._observation(), -10.0, False, True, {**self._info(), "lost": str(fault)}
-        info, offset = self._info(), self._block_offset()
-        if np.linalg.norm(offset) > 1.0:
+        info = self._info()
+        if np.linalg.norm(self._block_offset()) > 1.0:
             return self._observation(), -10.0, False, True, {**info, "lost": "the block is out of the fingers' reach"}
-        return self._observation(), -info["error"] - float(np.linalg.norm(offset)), False, False, info
+        return self._observation(), float(self._goal_reward(self._achieved(), self._desired())), False, False, info
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Return (480, 640, 3) bytes with `render_mode="rgb_array"`: a red arrow along the block, a green one where it should.
@@ -142,22 +159,48 @@ class HandReorient(TwinEnv):
         """Return the block's place (3,) from its start, in 0.05 m."""
         return (self.plant.state.place[0] - [0.0, 0.0, BLOCK_TABLE_TOP - 0.5 * BLOCK_HEIGHT]) / 0.05
 
-    def _observation(self) -> np.ndarray:
+    def _check_goal(self, given: Any) -> np.ndarray:
+        goal, most = parse_goal(given, (), "an angle, rad"), self.options.wanted
+        if abs(goal) > most:
+            raise DataError(
+                f"the goal {goal:g} rad is out of reach: at most {most:g} either way; make the environment with wanted="
+            )
+        return goal
+
+    def _place_goal(self, goal: np.ndarray) -> None:
+        self.wanted = float(goal)
+
+    def _achieved(self) -> np.ndarray:
+        """Return sine and cosine of the block's true angle, and its place from its start, (5,) 1 and 0.05 m."""
+        angle = block_yaw(self.plant.state)
+        return np.array([np.sin(angle), np.cos(angle), *self._block_offset()])
+
+    def _desired(self) -> np.ndarray:
+        """Return what `_achieved` is in the end: the wanted angle, at the start, (5,)."""
+        return np.array([np.sin(self.wanted), np.cos(self.wanted), 0.0, 0.0, 0.0])
+
+    def _goal_reward(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """Return the reward (...) of angles and places (..., 5) with wanted ones (..., 5)."""
+        angle, wanted = (np.arctan2(x[..., 0], x[..., 1]) for x in (achieved, desired))
+        error = np.abs((angle - wanted + np.pi) % (2.0 * np.pi) - np.pi)
+        return -error - np.linalg.norm(achieved[..., 2:] - desired[..., 2:], axis=-1)
+
+    def _observation_parts(self) -> dict[str, np.ndarray]:
         o, rng, sight = self.options, self.np_random, self.plant.state
         resistance = (sight.resistance / self.plant.rest - 1.0).ravel()
         resistance = resistance + o.resistance_noise * rng.standard_normal(resistance.size)
         angle = block_yaw(sight) + o.angle_noise * rng.standard_normal()
-        turned = [np.sin(angle), np.cos(angle), np.sin(self.wanted), np.cos(self.wanted)]
-        parts = [resistance / 0.1, self.servos / o.most, turned]
-        if o.observe == "full":
-            parts += [self._block_offset(), sight.turn[0], sight.velocity[0], sight.tension.ravel()]
-        return np.concatenate(parts).astype(np.float32)
+        return {
+            "resistance": resistance / 0.1, "servos": self.servos / o.most, "angle": np.array([np.sin(angle), np.cos(angle)]),
+            "wanted": self._desired()[:2], "place": self._block_offset(), "turn": sight.turn[0], "velocity": sight.velocity[0],
+            "tension": sight.tension,
+        }  # fmt: skip
 
     def _info(self) -> dict[str, Any]:
         angle = block_yaw(self.plant.state)
         error = abs((angle - self.wanted + np.pi) % (2.0 * np.pi) - np.pi)
         return {
-            "angle": angle, "wanted": self.wanted, "error": error, "success": error < self.options.success,
+            "angle": angle, "wanted": self.wanted, "error": error, "is_success": error < self.options.success,
             "touching": self.plant.state.touching,
         }  # fmt: skip
 

@@ -57,23 +57,40 @@ def draw_robot(robot: Robot) -> go.Figure:
 
 
 def _solid_traces(model: mujoco.MjModel, data: mujoco.MjData) -> list[go.Scatter3d]:
-    """Draw cylinders by both their rims, capsules by their axes."""
+    """Draw cylinders by both their rims, capsules by their axes, balls by circles, other shapes by the edges of a box."""
     rims, rods = [], []
-    turn = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS + 1)
     for g in range(model.ngeom):
         place, R, size = data.geom_xpos[g], data.geom_xmat[g].reshape(3, 3), model.geom_size[g]
-        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            circle = np.stack([size[0] * np.cos(turn), size[0] * np.sin(turn), np.zeros_like(turn)], axis=1)
-            rims += [place + (circle + side * np.array([0.0, 0.0, size[1]])) @ R.T for side in (-1.0, 1.0)]
-        else:
+        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_CAPSULE:
             rods.append(place + np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]) @ R.T)
+        else:
+            rims += [place + line @ R.T for line in _outline(model, g)]
     disks = _line_trace(rims, "disks, plates, pulleys", line={"color": BEFORE_COLOUR, "width": 2})
     return [_line_trace(rods, "body", line={"color": MEASURED_COLOUR, "width": 7}), disks]
 
 
+def _outline(model: mujoco.MjModel, g: int) -> list[np.ndarray]:
+    """Return lines (n, 3) m of a geom in its own frame; none of a floor."""
+    kind, size, G = mujoco.mjtGeom(int(model.geom_type[g])), model.geom_size[g], mujoco.mjtGeom
+    turn = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS + 1)
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    if kind == G.mjGEOM_CYLINDER:
+        return [size[0] * circle + side * np.array([0.0, 0.0, size[1]]) for side in (-1.0, 1.0)]
+    if kind in (G.mjGEOM_SPHERE, G.mjGEOM_ELLIPSOID):
+        return [np.roll(circle, k, axis=1) * (size if kind == G.mjGEOM_ELLIPSOID else size[0]) for k in range(3)]
+    if kind in (G.mjGEOM_PLANE, G.mjGEOM_HFIELD):
+        return []
+    middle, half = model.geom_aabb[g, :3], model.geom_aabb[g, 3:]
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]], float)
+    ends = [np.column_stack([square, np.full(5, side)]) for side in (-1.0, 1.0)]
+    sides = [np.array([[x, y, -1.0], [x, y, 1.0]]) for x, y in square[:4]]
+    return [middle + half * line for line in (*ends, *sides)]
+
+
 def _marker_traces(body: Body, data: mujoco.MjData) -> list[go.Scatter3d]:
-    seen = {c.rpartition("_")[0]: s.index for c, s in body.senses.items() if s.group == "marker"}
-    names = [name for name in seen if name != "tip"] or list(seen)  # the tip is also the last marker, under that name
+    seen = {c[: -len("_x")]: s.index for c, s in body.senses.items() if s.group == "marker"}
+    guides = {f"site.{site}" for sites in body.tendon_sites for site in sites}  # of an MJCF, on its tendons
+    names = [name for name in seen if name != "tip" and name not in guides] or list(seen)  # the tip is also the last marker
     if not names:
         return []
     at = np.array([data.site(body.marker_sites[seen[name]]).xpos for name in names])

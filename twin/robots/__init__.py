@@ -7,7 +7,7 @@ families/         one module a family                      schemas/    the rows 
 named_points.py   points of a body by name (`points.csv`)
 effect_tables.py  [[effect]] tables of robots and twins
 numbers.py        a robot's numbers in the units of its file
-starter.py        a folder to start one's own robot (`twin new`)
+starter.py        a folder to start one's own robot (`twin new`); model_starter.py  that of one's own MJCF
 """
 
 from twin.robots.family import Family, family_names, load_family

@@ -1,17 +1,20 @@
 """Starter folder for a user's own robot: a `robot.toml` that loads, a README, and a measurement set to fill.
 
-The numbers are those of a robot of the same family that ships with the twin, each with the explanation from its schema.
+The numbers are those of a robot of the same family that ships with the twin, each with the explanation from its schema, or those of
+an MJCF of the user's own (`model_starter.py`).
 """
 
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from twin.foundation.errors import DataError, UnknownNameError, short_repr
 from twin.foundation.units import unit_scale
 from twin.measurements.parsing.toml_text import toml_lines, toml_value
 from twin.robots.family import family_names, load_family
+from twin.robots.model_starter import assumed_widths, copy_model, model_text
 from twin.robots.numbers import FileEntry, file_entries, in_file_unit
 from twin.robots.robot import ROBOT_FILE, ROBOT_FORMAT, Robot, load, robot_names
 from twin.robots.schema import SOURCE_OF_DEFAULT
@@ -21,6 +24,19 @@ FIRST_SET = "samples/first"
 _ROBOT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
+def begin_robot(name: str, family: str | None, model: Path | None, place: Path) -> tuple[Path, list[str]]:
+    """Write a robot's folder from a family's example or from an MJCF; return it, and remarks on what was assumed.
+
+    Raises DataError unless just one of the two is given, and as `write_starter` and `write_model_starter`.
+    """
+    if (family is None) == (model is None):
+        raise DataError(f"{name}: what it is made from is missing or told twice; give --family FAMILY or --mjcf MODEL.xml")
+    if model is not None:
+        folder, widths = write_model_starter(name, model, place)
+        return folder, [widths]
+    return write_starter(name, str(family), place), []
+
+
 def write_starter(name: str, family: str, place: Path) -> Path:
     """Write the folder `place`/`name` whole or not at all, and return it.
 
@@ -28,20 +44,46 @@ def write_starter(name: str, family: str, place: Path) -> Path:
     """
     if family not in family_names():
         raise UnknownNameError("family", family, family_names())
+    robot = next(r for r in map(load, robot_names()) if r.family == family)
+
+    def fill(draft: Path) -> Robot:
+        (draft / ROBOT_FILE).write_text(robot_text(name, robot), "utf-8")
+        if load_family(family).SCHEMA.model_file is not None:
+            shutil.copy(str(robot.structure["model"]), draft)
+        return robot
+
+    return _write_whole(name, place, fill)
+
+
+def write_model_starter(name: str, model: Path, place: Path) -> tuple[Path, str]:
+    """Write the folder `place`/`name` of an MJCF, whole or not at all; return it, and which widths were assumed.
+
+    Raises DataError as `write_starter`, and for a model that cannot be used.
+    """
+    said = []
+
+    def fill(draft: Path) -> Robot:
+        loaded = copy_model(model, draft)
+        said.append(assumed_widths(loaded))
+        (draft / ROBOT_FILE).write_text(model_text(name, model.name, loaded, ROBOT_FORMAT), "utf-8")
+        return load(str(draft))
+
+    return _write_whole(name, place, fill), said[0]
+
+
+def _write_whole(name: str, place: Path, fill: Callable[[Path], Robot]) -> Path:
+    """Write a robot's folder by `fill`, which returns the robot whose channels its empty set has."""
     if not _ROBOT_NAME.fullmatch(name) or name in robot_names():
         taken = ", ".join(robot_names())
         raise DataError(f"{short_repr(name)} cannot be a robot's name; write up to 64 letters, digits, - and _, none of {taken}")
     folder = place / name
     draft = place / f".{name}.{os.getpid()}.writing"
-    robot = next(r for r in map(load, robot_names()) if r.family == family)
     try:
         if folder.exists():
             raise DataError(f"{folder} is there already and is not overwritten; choose another name, or another place with --out")
         (draft / FIRST_SET).mkdir(parents=True)
         try:
-            (draft / "robot.toml").write_text(robot_text(name, robot), "utf-8")
-            if load_family(family).SCHEMA.model_file is not None:
-                shutil.copy(str(robot.structure["model"]), draft)
+            robot = fill(draft)
             (draft / "README.md").write_text(readme_text(name), "utf-8")
             write_set(draft / FIRST_SET, robot)
             draft.rename(folder)

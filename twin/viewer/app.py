@@ -19,6 +19,7 @@ from twin.viewer.scrubber import Scrubber, neighbours
 from twin.viewer.shown_twin import DESCRIBED, ShownTwin
 
 TEXT_PERIOD, PLOT_PERIOD = 0.1, 1.0  # s between texts and between plots of a running replay
+LEAST_TENSION = 0.1  # N, the end of a colour bar where nothing pulls
 REPLAY, BY_HAND = "replay", "by hand"
 
 
@@ -59,7 +60,8 @@ class TwinPanel(Panel):
         self._replaying = gui.add_folder("replay", visible=replay is not None)
         lines = [s.name for s in self.shown_twins] if len(self.shown_twins) > 1 else [DESCRIBED, "as shown"]
         with self._replaying:
-            self.scrubber = Scrubber(gui, replay.labels if replay else (), lines, self._redraw_on_change)
+            what = f"{replay.compared.name} error, {replay.compared.unit}" if replay else ""
+            self.scrubber = Scrubber(gui, replay.labels if replay else (), lines, self._redraw_on_change, what)
             self._add_film_button(gui)
         self._driving = gui.add_folder("by hand", visible=replay is None)
         with self._driving:
@@ -138,12 +140,13 @@ class TwinPanel(Panel):
         i, share = neighbours(self._predictions[0].time, t)
         for side, track in zip(self.shown_twins, self._predictions, strict=True):
             assert side.replay is not None
-            measured, shown = side.replay.measured(k), track.frames.frame_at(i, share)
+            measured, shown = side.replay.measured_markers(k), track.frames.frame_at(i, share)
             j = min(i + 1, len(measured) - 1)
             predicted, seen = ((1.0 - share) * m[i] + share * m[j] for m in (track.markers, measured))
             side.scene.draw(shown, self._colour_field, self._ranges)
             side.scene.draw_markers(predicted, seen, self.scrubber.arrows.value)
-            side.scene.draw_push(predicted[0], np.zeros(3))
+            side.scene.draw_ghost(None if track.measured_pose is None else track.measured_pose.frame_at(i, share))
+            side.scene.draw_push(np.zeros(3), np.zeros(3))
         now = time.monotonic()
         if asked or now - self._text_written > TEXT_PERIOD:
             self._text_written = now
@@ -158,10 +161,15 @@ class TwinPanel(Panel):
             self.scrubber.draw_plots(replay, self._predictions if len(self.shown_twins) > 1 else [*before, *self._predictions], i)
         lines = [f"t = {self._predictions[0].time[i]:.2f} s"]
         for side, track, described in zip(self.shown_twins, self._predictions, before, strict=True):
-            now, whole, was = (1e3 * e for e in (track.error[i], track.rms, described.rms))
-            words = f"error **{now:.2f} mm**, over the trial **{whole:.2f} mm** ({side.model_label}); as described {was:.2f} mm"
+            assert side.replay is not None
+            what = side.replay.compared
+            now, whole, was = (f"{what.factor * e:.2f} {what.unit}" for e in (track.error[i], track.rms, described.rms))
+            kind = "" if what.name == "marker" else f"{what.name} "
+            words = f"{kind}error **{now}**, over the trial **{whole}** ({side.model_label}); as described {was}"
             lines.append(_name_prefix(side) + words)
-        self.words.content = "  \n".join([*lines, "blue: predicted markers, red: measured, arrows: residual"])
+        told = ["blue: predicted markers, red: measured, arrows: residual"] if self._predictions[0].markers.size else []
+        told += ["red and see-through: its joints as measured"] if self._predictions[0].measured_pose is not None else []
+        self.words.content = "  \n".join([*lines, *told])
 
     def _show_live(self, passed: float) -> None:
         self._replaying.visible, self._driving.visible = False, True
@@ -174,15 +182,18 @@ class TwinPanel(Panel):
                 shown = side.solve_statics(hand.drive, hand.command, hand.loads)
             self._fit_colour_ranges([shown], hand.largest_tension, hand.warmest_spring)
             side.scene.draw(shown, self._colour_field, self._ranges)
-            side.scene.draw_markers(shown.markers[0], np.full_like(shown.markers[0], np.nan), 0.0)
-            side.scene.draw_push(side.figure.push_positions(shown)[hand.pushed_point()], hand.force / LARGEST_PUSH)
-            lines.append(_name_prefix(side) + _describe_pose(shown) + _describe_heating(side))
+            markers = shown.markers[0] if not side.figure.solids else shown.markers[0][side.figure.tip :][:1]  # others are guides
+            side.scene.draw_markers(markers, np.full_like(markers, np.nan), 0.0)
+            side.scene.draw_ghost(None)
+            if len(side.figure.push_points):
+                side.scene.draw_push(side.figure.push_positions(shown)[hand.pushed_point()], hand.force / LARGEST_PUSH)
+            lines.append(_name_prefix(side) + _describe_pose(shown, side.figure.tip) + _describe_heating(side))
         self.words.content = "  \n".join(lines)
 
     def _fit_colour_ranges(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
         """Set colour ranges that hold `frames`, up to the given largest tension (N) and warmest spring (K)."""
-        figure, pulled = self.shown_twins[0].figure, max(float(f.tension.max()) for f in frames)
-        most = tension if tension is not None and tension > pulled else float(np.ceil(10.0 * pulled) / 10.0)
+        figure, pulled = self.shown_twins[0].figure, max(float(f.tension.max(initial=0.0)) for f in frames)
+        most = tension if tension is not None and tension > pulled else max(float(np.ceil(10.0 * pulled) / 10.0), LEAST_TENSION)
         ranges = {shade: figure.colour_scale(shade, most) for shade in figure.colour_fields}
         if any(f.temperature.size for f in frames):
             ranges["temperature"] = figure.colour_scale("temperature", max(warmest, *(f.temperature.max() for f in frames)))
@@ -193,10 +204,14 @@ def _name_prefix(side: ShownTwin) -> str:
     return f"{side.name}: " if side.name else ""
 
 
-def _describe_pose(shown: Frames) -> str:
-    x, y, z = 1e3 * shown.markers[0, -1]
-    ends = f"; tension along the tendons {shown.tension.min():.2f} to {shown.tension.max():.2f} N"
-    return f"tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm{ends}"
+def _describe_pose(shown: Frames, tip: int) -> str:
+    told = []
+    if shown.markers.size:
+        x, y, z = 1e3 * shown.markers[0, tip]
+        told.append(f"tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm")
+    if shown.tension.size:
+        told.append(f"tension along the tendons {shown.tension.min():.2f} to {shown.tension.max():.2f} N")
+    return "; ".join(told)
 
 
 def _describe_heating(side: ShownTwin) -> str:

@@ -8,12 +8,15 @@ import viser
 
 from twin.body import Drive, Loads, Push
 from twin.body.drawable import Drawable
+from twin.body.hinge_chain import REFERENCE_SIZE
 from twin.foundation.errors import DataError
 from twin.prediction.kinematics import warmest_current
 from twin.prediction.rollout import full_pull
 from twin.prediction.twin import Twin
+from twin.viewer.live import rest_command
 
 SLIDER_RANGE = 1.5  # full pulls at the end of a slider
+SLIDER_STEPS = 400  # of a control's slider
 LARGEST_PUSH = 0.2  # N: bends the rod and the finger by centimetres
 DRIVE_WORDS = {  # drive -> name, unit, hint, SI value of one unit
     Drive.TENSION: ("tension", "N", "tension that the load cell reads", 1.0),
@@ -23,6 +26,7 @@ DRIVE_WORDS = {  # drive -> name, unit, hint, SI value of one unit
         "length that the motor takes up from the rest pose, negative lets out; the other motors hold",
         1e-3,
     ),
+    Drive.CONTROL: ("control", "", "control of the model's actuator", 1.0),
     Drive.CURRENT: ("current", "A", "current through the SMA spring, which heats in tens of seconds and then pulls", 1.0),
 }
 
@@ -32,9 +36,13 @@ class HandControls:
 
     def __init__(self, gui: viser.GuiApi, twin: Twin, figure: Drawable, changed: Callable[[Any], None]) -> None:
         """Call `changed` with every handle that a user may move. Raises DataError for a robot that no pull bends sideways."""
-        self._gravity, self._figure, self.warmest_spring = twin.robot.gravity, figure, 0.0
+        self._twin, self._gravity, self._figure, self.warmest_spring = twin, twin.robot.gravity, figure, 0.0
         self.drives = _available_drives(twin)
-        self._add_pull_sliders(gui, twin)
+        self.largest_tension: float | None = None
+        if Drive.CONTROL in self.drives:
+            self._add_control_sliders(gui, twin)
+        else:
+            self._add_pull_sliders(gui, twin)
         self._clock_panel(gui)
         self._add_load_sliders(gui)
         self._add_push_sliders(gui)
@@ -77,6 +85,23 @@ class HandControls:
         }
         self.largest_tension = most[Drive.TENSION]
 
+    def _add_control_sliders(self, gui: viser.GuiApi, twin: Twin) -> None:
+        """Add a slider for each actuator of an MJCF, over its range, else over what moves a robot of its size."""
+        self.drive_choice = gui.add_dropdown("pull by", (DRIVE_WORDS[Drive.CONTROL][0],), visible=False)
+        reach = self._figure.height
+        force = REFERENCE_SIZE[1] * twin.robot.size.force
+        usual = {"rad": 0.5 * np.pi, "m": 0.1 * reach, "N": force, "N*m": force * reach}
+        sliders = []
+        for port, *_ in twin.robot.build().ports:
+            wide = usual.get(port.unit, 1.0)
+            low, rest, high = port.span
+            low, high = max(low, rest - wide) if np.isinf(low) else low, min(high, rest + wide) if np.isinf(high) else high
+            label = port.channel.removeprefix("actuator.").removesuffix(".ctrl")
+            step = float(f"{max(high - low, 1e-9) / SLIDER_STEPS:.0e}")
+            hint = f"{DRIVE_WORDS[Drive.CONTROL][2]}, {port.unit}"
+            sliders.append(gui.add_slider(f"{label}, {port.unit}", low, high, step, rest, hint=hint))
+        self.sliders = {Drive.CONTROL: sliders}
+
     def _clock_panel(self, gui: viser.GuiApi) -> None:
         self.clock = gui.add_slider(
             "clock x", 0.0, 60.0, 1.0, 10.0, visible=False, hint="how much faster than real time the springs run; 0 stops the clock"
@@ -91,8 +116,11 @@ class HandControls:
         self.azimuth = gui.add_slider("gravity azimuth, deg", 0, 355, 5, 0, hint="about the robot's axis")
 
     def _add_push_sliders(self, gui: viser.GuiApi) -> None:
-        tall, fingers = round(1e3 * self._figure.height), 1 + int(self._figure.push_points[:, 2].max())
-        self.push = gui.add_slider("push, N", 0.0, LARGEST_PUSH, 0.005, 0.0, hint="force at one point, drawn as an orange arrow")
+        tall, fingers = max(round(1e3 * self._figure.height), 1), 1 + int(self._figure.push_points[:, 2].max(initial=0.0))
+        able = bool(len(self._figure.push_points))
+        self.push = gui.add_slider(
+            "push, N", 0.0, LARGEST_PUSH, 0.005, 0.0, hint="force at one point, drawn as an orange arrow", visible=able
+        )
         self.height = gui.add_slider(
             "push at, mm",
             0,
@@ -100,17 +128,19 @@ class HandControls:
             1,
             tall,
             hint="distance from the base along the robot at rest; or click on the robot to push it there, inwards",
+            visible=able,
         )
-        self.push_azimuth = gui.add_slider("push azimuth, deg", 0, 355, 5, 0, hint="direction about the robot's axis, 0 along x")
-        self.push_lift = gui.add_slider("push lift, deg", -90, 90, 5, 0, hint="direction: 0 sideways, 90 from base to tip")
+        about, lift = "direction about the robot's axis, 0 along x", "direction: 0 sideways, 90 from base to tip"
+        self.push_azimuth = gui.add_slider("push azimuth, deg", 0, 355, 5, 0, hint=about, visible=able)
+        self.push_lift = gui.add_slider("push lift, deg", -90, 90, 5, 0, hint=lift, visible=able)
         names = tuple(str(k) for k in range(1, fingers + 1))
         self.finger = gui.add_dropdown("pushed finger", names, visible=fingers > 1, hint="number around the palm, from x")
 
     def release(self) -> None:
         """Set all pulls to zero and show only the sliders of the chosen drive."""
         for drive, sliders in self.sliders.items():
-            for slider in sliders:
-                slider.value, slider.visible = 0.0, drive is self.drive
+            for slider, rest in zip(sliders, rest_command(self._twin, drive), strict=True):
+                slider.value, slider.visible = float(rest), drive is self.drive
         self.clock.visible = self.rest_button.visible = self.drive is Drive.CURRENT
 
     @property

@@ -12,6 +12,7 @@ from twin.prediction.simulate import simulate_alone
 from twin.prediction.twin import Twin
 
 MOST_TURNING_POINTS = 24  # of the pulls, kept as the history of friction
+REST_ROWS = 1  # s, a row each, in which an MJCF comes to rest
 HEATING_STEP = 0.1  # s between equilibria while springs heat, which takes them tens of seconds
 TIME_ROUNDING = 1e-9  # s
 REST_RATE = 0.01  # K/s; slower springs are at rest
@@ -27,6 +28,7 @@ class LiveRobot:
 
     def __init__(self, twin: Twin, drive: Drive = Drive.TENSION) -> None:
         self._twin, self._drive, self._figure = twin, drive, twin.figure()
+        self._rest = rest_command(twin, drive)
         self._loads: Loads | None = None
         self._turns: list[np.ndarray] = []
 
@@ -36,16 +38,27 @@ class LiveRobot:
         Raises SolveError where there is no equilibrium.
         """
         if self._loads is None or not _same_loads(loads, self._loads):
-            self._turns, self._loads = [np.zeros_like(pull)], loads
+            self._turns, self._loads = [self._rest], loads
         turns = [*(self._turns if _reverses(self._turns, pull) else self._turns[:-1]), pull][-MOST_TURNING_POINTS:]
-        command, time = np.stack(turns), np.arange(float(len(turns)))
-        inputs = Inputs("here", time, time, command, (self._drive,) * len(pull), np.full(len(turns), ROOM_TEMPERATURE), loads)
+        stepped = self._drive is Drive.CONTROL  # a motion that comes to rest under the last command
+        command = np.stack([*turns, *([pull] * REST_ROWS if stepped else [])])
+        time = np.arange(float(len(command)))
+        inputs = Inputs(
+            "here", time, time, command, (self._drive,) * len(pull), np.full(len(command), ROOM_TEMPERATURE), loads,
+            smooth=not stepped,
+        )  # fmt: skip
         trace = simulate_alone(self._twin, inputs)
         assert trace.solution is not None  # statics without one raise
         self._turns = turns
         return self._figure.frames(trace.solution, self._twin.effect_chain.surround(loads), self._twin.effect_chain.route).frame_at(
             -1
         )
+
+
+def rest_command(twin: Twin, drive: Drive) -> np.ndarray:
+    """Return the command (n_tendon,) SI where nothing is asked for: no pull, or where controls of an MJCF rest."""
+    ports = [next(p for p in port if p.drive is drive) for port in twin.robot.build().ports]
+    return np.array([p.span[1] for p in ports]) if drive is Drive.CONTROL else np.zeros(twin.robot.n_tendon)
 
 
 class LiveHeatedRobot:

@@ -59,13 +59,13 @@ class Panel(ABC):
 
     def _add_colour_choice(self, gui: viser.GuiApi, shades: Sequence[str]) -> None:
         """Add the choice of what the colours mean."""
-        told = tuple(COLOUR_FIELDS[s] for s in shades)
+        told = tuple(COLOUR_FIELDS[s] for s in shades) or ("nothing",)
         self.colour_choice = gui.add_dropdown("colour by", told, visible=len(told) > 1, hint="what the colours of the robot mean")
         self._redraw_on_change(self.colour_choice)
 
     @property
     def _colour_field(self) -> str:
-        return next(s for s, told in COLOUR_FIELDS.items() if told == self.colour_choice.value)
+        return next((s for s, told in COLOUR_FIELDS.items() if told == self.colour_choice.value), "")
 
     @property
     def _visible_ranges(self) -> list[ColourScale]:

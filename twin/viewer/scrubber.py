@@ -54,15 +54,17 @@ class Clock:
 class Scrubber(Clock):
     """The controls in the panel's folder "replay", of predicted trials."""
 
-    def __init__(self, gui: viser.GuiApi, labels: Sequence[str], lines: Sequence[str], changed: Callable[[Any], None]) -> None:
-        """Offer trials with these `labels`; `lines` name the errors in `plot`."""
+    def __init__(
+        self, gui: viser.GuiApi, labels: Sequence[str], lines: Sequence[str], changed: Callable[[Any], None], what: str
+    ) -> None:
+        """Offer trials with these `labels`; `lines` name the errors in `plot`, of `what`."""
         super().__init__(gui, labels, changed)
         self.arrows = gui.add_slider("residual x", 0.0, 20.0, 1.0, 5.0, hint="length of the arrows from predicted to measured")
         self._lines = tuple(lines)
         series = ({}, *({"label": n, "stroke": c} for n, c in zip(lines, LINE_COLOURS, strict=False)), PRESENT_SERIES)
         self.plot = gui.add_uplot(
             (np.zeros(2),) * len(series), tuple(viser.uplot.Series(**line) for line in series),  # type: ignore[typeddict-item]
-            title="marker error, mm, over time, s", scales={"x": viser.uplot.Scale(time=False)}, height=200,
+            title=f"{what}, over time, s", scales={"x": viser.uplot.Scale(time=False)}, height=200,
         )  # fmt: skip
         self.loop = gui.add_html("")
         changed(self.arrows)
@@ -72,12 +74,11 @@ class Scrubber(Clock):
 
         It is marked as a spike among the errors, since that plot takes no missing numbers.
         """
-        tips = [t.markers[:, -1] for t in tracks]
-        self.loop.content = draw_svg(
-            TipLoop(*replay.strongest_pull(self.trial_index), replay.measured(self.trial_index)[:, -1], tips), LINE_COLOURS, i
-        )
+        tips, what = [t.compared[:, -1] for t in tracks], replay.compared
+        pull, measured = replay.strongest_pull(self.trial_index), replay.measured(self.trial_index)[:, -1]
+        self.loop.content = draw_svg(TipLoop(*pull, measured, tips, what.last, what.unit, what.factor), LINE_COLOURS, i)
         present = np.where(np.arange(len(tracks[-1].time)) == i, tracks[-1].error, 0.0)
-        self.plot.data = (tracks[0].time, *(1e3 * np.nan_to_num(e) for e in (*(t.error for t in tracks), present)))
+        self.plot.data = (tracks[0].time, *(what.factor * np.nan_to_num(e) for e in (*(t.error for t in tracks), present)))
 
 
 def neighbours(time: np.ndarray, t: float) -> tuple[int, float]:

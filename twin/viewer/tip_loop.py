@@ -14,15 +14,21 @@ MOST_LINE_POINTS = 400
 
 @dataclass(frozen=True)
 class TipLoop:
-    """The strongest pull (n,) of a trial with its label, and the tip (n, 3) m as measured and as predicted."""
+    """The strongest pull (n,) of a trial with its label, and the tip (n, 3) m as measured and as predicted.
+
+    Of a robot without markers it is a joint or a tendon (n, 1), SI, `called` so, shown in `unit`, `factor` times SI.
+    """
 
     pull_label: str
     pull: np.ndarray
     measured: np.ndarray
     predicted: Sequence[np.ndarray]
+    called: str = "tip along its path"
+    unit: str = "mm"
+    factor: float = 1e3
 
     def tip_errors(self) -> list[np.ndarray]:
-        """Return measured - predicted (n,) mm for each prediction, along the direction in which the pull moves the tip.
+        """Return measured - predicted (n,), in `unit`, for each prediction, along the direction in which the pull moves the tip.
 
         NaN where the tip was not measured; empty where it was measured less than three times.
         """
@@ -32,7 +38,7 @@ class TipLoop:
         about = self.measured[seen] - self.measured[seen].mean(axis=0)
         way = np.linalg.svd(about, full_matrices=False)[2][0]
         way = way if np.dot(about @ way, self.pull[seen]) >= 0.0 else -way
-        return [1e3 * (self.measured - tip) @ way for tip in self.predicted]
+        return [self.factor * (self.measured - tip) @ way for tip in self.predicted]
 
 
 def draw_svg(loop: TipLoop, colours: Sequence[str], i: int) -> str:
@@ -66,7 +72,7 @@ def draw_svg(loop: TipLoop, colours: Sequence[str], i: int) -> str:
     ):  # fmt: skip
         drawn.append(f'<text x="{a}" y="{b}" text-anchor="{how}">{told}</text>')
     return (
-        '<div style="padding:0 1em;font-size:12px"><div>error of the tip along its path, mm, against the pull</div>'
+        f'<div style="padding:0 1em;font-size:12px"><div>error of the {loop.called}, {loop.unit}, against the pull</div>'
         f'<svg viewBox="0 0 {PICTURE_WIDTH} {PICTURE_HEIGHT}" style="width:100%;font-size:11px">{"".join(drawn)}</svg></div>'
     )
 

@@ -26,14 +26,16 @@ class Rollout:
     twin: Positional[Annotated[str, arg(help="a twin.toml, a report's folder, a robot's name or the path to its folder")]]
     out: Annotated[Path, arg(help="new folder for the simulated set")]
     controls: Annotated[
-        Path | None, arg(help="controls: the folder of a measurement set, or a CSV in SI (time, tendon_1_tension, ...)")
+        Path | None, arg(help="controls: the folder of a measurement set, or a CSV in SI (time, and each drive's channel)")
     ] = None
     random: Annotated[int | None, arg(help="instead of --controls: number of rollouts with random controls")] = None
     seed: Annotated[int, arg(help="seed of the controls and the noise")] = 0
     seconds: Annotated[float, arg(help="length of a random rollout, s")] = 10.0
     rate: Annotated[float, arg(help="samples a second of a random rollout")] = 50.0
     drive: Annotated[Literal["tension", "displacement"], arg(help="quantity of random controls")] = "tension"
-    pull: Annotated[float | None, arg(help="largest random pull, N or m; default: bends the robot by about one radian")] = None
+    pull: Annotated[
+        float | None, arg(help="largest random pull, N, m or a control's unit; default: a bend of about one radian, or ctrlrange")
+    ] = None
     noise: Annotated[float, arg(help="standard deviation of the noise of the markers, m")] = 0.0
     dynamic: Annotated[bool | None, arg(help="MuJoCo steps or static equilibria; default: steps if the robot has dynamics")] = None
     jobs: Annotated[int, arg(help="worker threads")] = cpu_count()

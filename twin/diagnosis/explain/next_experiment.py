@@ -50,32 +50,30 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     """Return trials that this robot could run, within the commands already used.
 
     The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
-    are commanded, the tendons that do not pull are let out, so that they are slack. Springs heated by currents cool within a minute
-    and would not respond to a fast pull of a motor. A robot in motion is asked for trials as long as its longest.
+    are commanded, the tendons that do not pull are let out, so that they are slack. Controls of an MJCF go from where they rest,
+    for as long as the longest trial. Springs heated by currents cool within a minute and would not respond to a fast pull of a motor.
     """
-    n = prepared.n_tendon
+    n, like = prepared.n_tendon, prepared.inputs[0]
     slow = SLOW_TRIAL
     if Drive.CONTROL in prepared.drives:
         slow = min(slow, max(float(np.ptp(i.time)) for i in prepared.inputs))
-    top = np.max([i.command.max(axis=0) for i in prepared.inputs], axis=0)
     held = prepared.driven_by(Drive.DISPLACEMENT)
-    top = np.where(held, np.max(top[held], initial=0.0), np.max(top[~held], initial=0.0))
-    words = [f"{_shown(d.display_unit[1] * x)} {d.display_unit[0]}" for x, d in zip(top, prepared.drives, strict=True)]
-    like = prepared.inputs[0]
+    home, top = _from_and_to(prepared)
+    words = [_worded(prepared, i, x) for i, x in enumerate(top)]
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
     def add(label: str, duration: float, *shares: np.ndarray) -> None:
         pull = np.stack(shares, axis=1)
-        command = top * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
+        command = home + (top - home) * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
         shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
     up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
     hold = np.concatenate([[0.0], np.full(60, HELD_COMMAND_SHARE)])
-    for i in np.flatnonzero(top > 0.0):  # a tendon that was never commanded has no range
+    for i in np.flatnonzero(top - home if like.home is not None else top > 0.0):  # what was never commanded has no range
         alone = np.eye(n)[i]
-        what, fast = (f"spring {i + 1}", 40.0) if prepared.drives[i] is Drive.CURRENT else (f"tendon {i + 1}", min(4.0, 0.1 * slow))
-        pull = f"heat {what} with up" if prepared.drives[i] is Drive.CURRENT else f"pull {what}"
+        what, pull, fast = _deed(prepared, int(i))
+        fast = min(fast, 0.1 * slow) if like.home is not None else fast
         add(f"{pull} to {words[i]} and release it, slowly ({slow:.0f} s)", slow, *np.outer(alone, up_down))
         add(f"{pull} to {words[i]} and release it, fast ({fast:.2g} s)", fast, *np.outer(alone, up_down))
         again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly ({2.0 * slow:.0f} s)"
@@ -83,20 +81,27 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
         add(f"step {what} to three quarters of {words[i]} and hold for {slow:.0f} s", slow, *np.outer(alone, hold))
     turns = np.linspace(0, 4 * np.pi, 80)
     circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
-    if not held.any() and top.all():
+    if not held.any() and top.all() and like.home is None:
         add(f"two circles with all tendons up to 0.6 of {words[0]} ({4.0 / 3.0 * slow:.0f} s)", 4.0 / 3.0 * slow, *circle)
     add(f"rest unloaded for {0.5 * slow:.0f} s", 0.5 * slow, *np.zeros((n, 30)))
-    last = max(float(i.clock[-1]) for i in prepared.inputs)
+    last = max(float(i.clock[-1]) for i in prepared.inputs) + 60.0
     out = []
     for load, loads in _loads(prepared):
         for motion, time, command in shapes:
-            label = f"{motion}, {load}"
             warm = np.full(len(time), like.temperature[0])
-            inputs = Inputs(
-                label, time, last + 60.0 + time, command, prepared.drives, warm, loads, turned=like.turned, damped=like.damped
-            )
-            out.append((label, inputs))
+            own = {"time": time, "clock": last + time, "command": command, "temperature": warm, "loads": loads, "clouds": None}
+            out.append((f"{motion}, {load}", replace(like, name=f"{motion}, {load}", **own)))
     return out
+
+
+def _from_and_to(prepared: PreparedRecording) -> tuple[np.ndarray, np.ndarray]:
+    """Return where commands (n_drive,) begin, controls where they rest, pulls at zero, and the farthest that they go."""
+    like, n = prepared.inputs[0], prepared.n_tendon
+    every = np.concatenate([i.command for i in prepared.inputs])
+    if like.home is not None:
+        return like.home, every[np.abs(every - like.home).argmax(axis=0), np.arange(n)]
+    top, held = every.max(axis=0), prepared.driven_by(Drive.DISPLACEMENT)
+    return np.zeros(n), np.where(held, np.max(top[held], initial=0.0), np.max(top[~held], initial=0.0))
 
 
 def _loads(prepared: PreparedRecording) -> list[tuple[str, Loads]]:
@@ -109,6 +114,24 @@ def _loads(prepared: PreparedRecording) -> list[tuple[str, Loads]]:
     heaviest = max(i.loads.payload for i in prepared.inputs)
     payloads = sorted({0.0, min(HEAVIEST_PAYLOAD, max(LEAST_PAYLOAD, 3.0 * heaviest))})
     return [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
+
+
+def _deed(prepared: PreparedRecording, i: int) -> tuple[str, str, float]:
+    """Return what a trial moves, the words for moving it, and how long a fast move takes, s."""
+    if prepared.drives[i] is Drive.CURRENT:
+        return f"spring {i + 1}", f"heat spring {i + 1} with up", 40.0
+    if prepared.drives[i] is Drive.CONTROL:
+        name = prepared.drivers[i].name
+        return name, f"move {name}", 4.0
+    return f"tendon {i + 1}", f"pull tendon {i + 1}", 4.0
+
+
+def _worded(prepared: PreparedRecording, i: int, command: float) -> str:
+    """Return a command with its unit."""
+    if prepared.drives[i] is Drive.CONTROL:
+        return f"{command:.3g} {prepared.drivers[i].si_unit}"
+    unit, factor = prepared.drives[i].display_unit
+    return f"{_shown(factor * command)} {unit}"
 
 
 def _shown(x: float) -> str:

@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 
 from twin.body import Drive, Loads, Problem
+from twin.env.episodes.validation import select_arrays
 from twin.env.plants.effect_io import EffectIO
-from twin.env.validation import select_arrays
 from twin.foundation.errors import SolveError
 from twin.mechanics.rod.balance.newton import update_kinematics
 from twin.mechanics.rod.dynamics import ChainMotion, Dynamics, MotionSamples

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from twin.body import Drive, Loads, Problem
+from twin.env.episodes.validation import select_arrays
 from twin.env.plants.effect_io import EffectIO
 from twin.env.plants.rod_plant import get_mujoco_state, set_mujoco_state
-from twin.env.validation import select_arrays
 from twin.foundation.errors import DataError
 from twin.mechanics.silicone.material.flex import flex_spec
 from twin.mechanics.silicone.motion.dynamics import CreepBetweenSamples, RestingBody, SoftMotion, motion_step

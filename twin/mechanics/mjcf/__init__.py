@@ -4,13 +4,15 @@ loading.py   an MJCF, or why not         numbers.py   its numbers by address
 body.py      channels and changes        poses.py     starts and payloads
 solver.py    trials                      stepping.py  the compiled loop
 friction.py  joints and tendons that rub        written.py    numbers back into the MJCF
-precise_xml.py  an MJCF as text to the last digit
+precise_xml.py  an MJCF as text to the last digit    drawing.py  its geoms and tendons to draw
 """
 
-from twin.mechanics.mjcf.body import ModelBody, element_senses, payload_places, tip_site
+from twin.mechanics.mjcf.body import ModelBody, control_span, control_unit, element_senses, model_size, payload_places, tip_site
+from twin.mechanics.mjcf.drawing import ModelFigure
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
-from twin.mechanics.mjcf.precise_xml import WrittenModel, exact_text, with_comments
+from twin.mechanics.mjcf.poses import contacts_at_start
+from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
 from twin.mechanics.mjcf.written import check_same, name_element, written_model
 
@@ -22,15 +24,21 @@ __all__ = [
     "Attribute",
     "LoadedModel",
     "ModelBody",
+    "ModelFigure",
     "ModelSolver",
     "Motion",
     "WrittenModel",
     "applies",
     "check_same",
+    "contacts_at_start",
+    "control_span",
+    "control_unit",
+    "copied",
     "element_senses",
     "exact_text",
     "half_step",
     "load_model",
+    "model_size",
     "name_element",
     "payload_places",
     "si_unit",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -53,6 +53,40 @@ def sensor_unit(model: mujoco.MjModel, k: int) -> str:
     if kind in (_S.mjSENS_ACTUATORPOS, _S.mjSENS_ACTUATORVEL, _S.mjSENS_ACTUATORFRC) and not slides(model, "actuator", element):
         return {"m": "rad", "m/s": "rad/s", "N": "N*m"}[unit]
     return unit
+
+
+def control_unit(model: mujoco.MjModel, k: int) -> str:
+    """Return the SI unit of an actuator's control: of a position, a rate, or a torque; "1" where its gain is none of a motor."""
+    if model.actuator_gaintype[k] != int(mujoco.mjtGain.mjGAIN_FIXED):
+        return "1"
+    sliding, bias = slides(model, "actuator", k), model.actuator_biasprm[k]
+    kind = "position" if bias[1] != 0.0 else "velocity" if bias[2] != 0.0 else "force"
+    return _PORT_UNITS[kind][sliding]
+
+
+def control_span(model: mujoco.MjModel, k: int) -> tuple[float, float, float]:
+    """Return the least, resting and greatest control of an actuator by its ctrlrange, else by its joint's or its force's range.
+
+    It rests where the first keyframe has it, else at the allowed value nearest to where a servo does not pull in the model's
+    reference pose, zero for others. Ends that nothing bounds are infinite.
+    """
+    joint, gear, bias = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0]), model.actuator_biasprm[k]
+    of_joint = model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT) and bias[1] < 0.0
+    gain, unit = float(model.actuator_gainprm[k, 0]), control_unit(model, k)
+    ends: Sequence[float] = (-np.inf, np.inf)
+    if model.actuator_ctrllimited[k]:
+        ends = model.actuator_ctrlrange[k]
+    elif of_joint and model.jnt_limited[joint]:
+        ends = gear * model.jnt_range[joint]
+    elif model.actuator_forcelimited[k] and unit in ("N", "N*m") and gain:
+        ends = model.actuator_forcerange[k] / gain
+    servo, held = unit in ("rad", "m") and gain != 0.0, bias[0] + bias[1] * model.actuator_length0[k]
+    if servo and np.isinf(ends[0]) and model.actuator_forcelimited[k]:
+        ends = (model.actuator_forcerange[k] - held) / gain  # where it pulls most in that pose
+    low, high = float(min(ends)), float(max(ends))
+    rest = -held / gain if servo else 0.0
+    rest = float(model.key_ctrl[0, k] if model.nkey else rest)
+    return low, min(max(rest, low), high), high
 
 
 def element_senses(loaded: LoadedModel) -> dict[str, Sense]:
@@ -121,8 +155,10 @@ class ModelBody(Body):
                 model.jnt_solref[joint], model.jnt_solimp[joint] = HARD_STOP
 
     def scale_actuators(self, share: np.ndarray) -> None:
-        self.model.actuator_gainprm[:, :3] *= share[:, None]
-        self.model.actuator_biasprm[:, :3] *= share[:, None]
+        muscle = self.model.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_MUSCLE)
+        for numbers in (self.model.actuator_gainprm, self.model.actuator_biasprm):
+            numbers[~muscle, :3] *= share[~muscle, None]
+            numbers[muscle, 2:4] *= share[muscle, None]  # its peak force, or the scale of that; the others are lengths
 
 
 def model_size(model: mujoco.MjModel) -> Size:

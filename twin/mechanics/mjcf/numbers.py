@@ -20,7 +20,7 @@ Read = Callable[[mujoco.MjModel, int], np.ndarray]
 
 @dataclass(frozen=True)
 class Attribute:
-    """One attribute of a kind of element: how it is read and written, its units, its least value and its usual relative std.
+    """One attribute of a kind of element: how it is read and written, its units, its least value, its usual relative std and why.
 
     `unit` is that of an element that turns (a hinge, or what acts on one), `sliding_unit` that of one that slides or pulls.
     """
@@ -31,6 +31,7 @@ class Attribute:
     sliding_unit: str
     positive: bool = True
     relative_std: float = 0.0  # by which built robots usually differ, where nothing is declared; 0: exact
+    why: str = ""  # they differ by so much
 
 
 def _field(name: str, at: Callable[[mujoco.MjModel, int], object] = lambda m, k: k) -> tuple[Read, Write]:
@@ -84,32 +85,39 @@ def _write_kv(model: mujoco.MjModel, k: int, value: np.ndarray) -> None:
     model.actuator_biasprm[k, 2] = -value[0]
 
 
+_WEIGHED = "parts are weighed, or drawn without screws, glue and cables"
+_ONE_DENSITY = "drawn as if each part had one density"
+_SPRING = "springs are sold to ten per cent"
+_BY_HAND = "seldom measured; mostly chosen by hand"
+_ROTOR = "a rotor's inertia times its gear ratio squared, seldom on a data sheet"
+_GAIN = "a drive's units and its supply are known to some per cent"
+
 ATTRIBUTES: dict[str, dict[str, Attribute]] = {
     "body": {
-        "mass": Attribute(*_field("body_mass"), "kg", "kg", relative_std=0.03),
-        "inertia": Attribute(_read_inertia, _write_inertia, "kg*m^2", "kg*m^2", relative_std=0.05),
+        "mass": Attribute(*_field("body_mass"), "kg", "kg", relative_std=0.03, why=_WEIGHED),
+        "inertia": Attribute(_read_inertia, _write_inertia, "kg*m^2", "kg*m^2", relative_std=0.05, why=_ONE_DENSITY),
         "pos": Attribute(*_field("body_pos"), "m", "m", positive=False),
         "ipos": Attribute(*_field("body_ipos"), "m", "m", positive=False),
     },
     "joint": {
-        "stiffness": Attribute(*_field("jnt_stiffness"), "N*m/rad", "N/m", relative_std=0.1),
-        "damping": Attribute(*_field("dof_damping", _dof), "N*m*s/rad", "N*s/m", relative_std=0.3),
-        "armature": Attribute(*_field("dof_armature", _dof), "kg*m^2", "kg", relative_std=0.3),
-        "frictionloss": Attribute(*_field("dof_frictionloss", _dof), "N*m", "N", relative_std=0.3),
+        "stiffness": Attribute(*_field("jnt_stiffness"), "N*m/rad", "N/m", relative_std=0.1, why=_SPRING),
+        "damping": Attribute(*_field("dof_damping", _dof), "N*m*s/rad", "N*s/m", relative_std=0.3, why=_BY_HAND),
+        "armature": Attribute(*_field("dof_armature", _dof), "kg*m^2", "kg", relative_std=0.3, why=_ROTOR),
+        "frictionloss": Attribute(*_field("dof_frictionloss", _dof), "N*m", "N", relative_std=0.3, why=_BY_HAND),
         "springref": Attribute(*_field("qpos_spring", _qpos), "rad", "m", positive=False),
         "range": Attribute(*_field("jnt_range"), "rad", "m", positive=False),
         "pos": Attribute(*_field("jnt_pos"), "m", "m", positive=False),
     },
     "tendon": {
-        "stiffness": Attribute(*_field("tendon_stiffness"), "N/m", "N/m", relative_std=0.1),
-        "damping": Attribute(*_field("tendon_damping"), "N*s/m", "N*s/m", relative_std=0.3),
-        "frictionloss": Attribute(*_field("tendon_frictionloss"), "N", "N", relative_std=0.3),
-        "armature": Attribute(*_field("tendon_armature"), "kg", "kg", relative_std=0.3),
+        "stiffness": Attribute(*_field("tendon_stiffness"), "N/m", "N/m", relative_std=0.1, why=_SPRING),
+        "damping": Attribute(*_field("tendon_damping"), "N*s/m", "N*s/m", relative_std=0.3, why=_BY_HAND),
+        "frictionloss": Attribute(*_field("tendon_frictionloss"), "N", "N", relative_std=0.3, why=_BY_HAND),
+        "armature": Attribute(*_field("tendon_armature"), "kg", "kg", relative_std=0.3, why=_ROTOR),
         "springlength": Attribute(*_field("tendon_lengthspring"), "m", "m"),
     },
     "actuator": {
-        "kp": Attribute(_read_kp, _write_kp, "N*m/rad", "N/m", relative_std=0.05),
-        "kv": Attribute(_read_kv, _write_kv, "N*m*s/rad", "N*s/m", relative_std=0.3),
+        "kp": Attribute(_read_kp, _write_kp, "N*m/rad", "N/m", relative_std=0.05, why=_GAIN),
+        "kv": Attribute(_read_kv, _write_kv, "N*m*s/rad", "N*s/m", relative_std=0.3, why=_BY_HAND),
         "gain": Attribute(*_field("actuator_gainprm", lambda m, k: (k, 0)), "1", "1", positive=False),
         "bias": Attribute(*_field("actuator_biasprm", lambda m, k: (k, 0)), "N*m", "N", positive=False),
         "damping": Attribute(*_field("actuator_damping"), "N*m*s/rad", "N*s/m"),
@@ -139,5 +147,11 @@ def si_unit(model: mujoco.MjModel, kind: str, k: int, attribute: Attribute) -> s
 
 
 def applies(model: mujoco.MjModel, kind: str, k: int, name: str) -> bool:
-    """Return whether the element has this attribute: joints of several axes have no angle, damping or spring here."""
+    """Return whether the element has this attribute.
+
+    Joints of several axes have no angle, damping or spring here; a muscle has no kp, and only an affine bias has a kv.
+    """
+    if kind == "actuator" and name in ("kp", "kv"):
+        fixed = model.actuator_gaintype[k] == int(mujoco.mjtGain.mjGAIN_FIXED)
+        return bool(fixed and (name == "kp" or model.actuator_biastype[k] == int(mujoco.mjtBias.mjBIAS_AFFINE)))
     return kind != "joint" or name == "pos" or model.jnt_type[k] in SCALAR_JOINTS

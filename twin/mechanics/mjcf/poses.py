@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.foundation.errors import DataError, did_you_mean
-from twin.mechanics.mjcf.loading import SCALAR_JOINTS
+from twin.mechanics.mjcf.loading import SCALAR_JOINTS, LoadedModel
 
 _FILTERS = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
 _ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -51,6 +51,13 @@ def _rest(model: mujoco.MjModel, command: np.ndarray) -> np.ndarray:
         if model.jnt_stiffness[joint] > 0.0 and model.jnt_type[joint] in SCALAR_JOINTS:
             qpos[model.jnt_qposadr[joint]] = model.qpos_spring[model.jnt_qposadr[joint]]
     return qpos
+
+
+def contacts_at_start(loaded: LoadedModel) -> int:
+    """Return how many contacts a model has where its trials are let go under controls of zero."""
+    data = mujoco.MjData(loaded.model)
+    set_start(loaded.model, data, np.zeros(loaded.model.nu), "")
+    return int(data.ncon)
 
 
 def add_masses(model: mujoco.MjModel, masses: Iterable[tuple[str, float]], places: Mapping[str, tuple[int, np.ndarray]]) -> None:

@@ -7,6 +7,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
+from os.path import normpath
 from pathlib import Path
 from threading import Lock
 
@@ -75,21 +76,61 @@ def self_contained(spec: mujoco.MjSpec, folder: Path) -> WrittenModel:
     Raises DataError for a file that cannot be read.
     """
     root = _tree(exact_text(spec))
-    compiler, files = root.find("compiler"), dict[str, bytes]()
-    folders = compiler.attrib if compiler is not None else {}
-    for element in root.iterfind("asset/*"):
-        for name in [n for n in element.keys() if n.startswith("file")]:  # noqa: SIM118
-            there = folder / folders.get(_FOLDERS.get(element.tag, ""), "") / element.get(name, "")
-            try:
-                content = there.read_bytes()
-            except OSError as error:
-                raise DataError(f"{there}: cannot be read ({error.strerror or error}); the model needs it") from None
-            if not element.get("name"):
-                element.set("name", there.stem)
-            element.set(name, _file_name(files, there.name, content))
+    files = dict[str, bytes]()
+    for element, name, there in _needed(root, folder):
+        if not element.get("name"):
+            element.set("name", there.stem)
+        element.set(name, _file_name(files, there.name, _content(there)))
     for attribute in {*_FOLDERS.values(), "assetdir", "strippath"}:
-        folders.pop(attribute, None)
+        _folders(root).pop(attribute, None)
     return WrittenModel(ET.tostring(root, encoding="unicode"), files)
+
+
+def copied(spec: mujoco.MjSpec, path: Path) -> WrittenModel:
+    """Return the MJCF at `path`, whose compiled spec is given, as it stands, and the files beside it that it includes and needs.
+
+    Where one lies outside its folder, it is written anew by `self_contained`. Raises DataError where it cannot be read.
+    """
+    folder = path.parent
+    places = [*_included(path, folder), *(there for _, _, there in _needed(_tree(exact_text(spec)), folder))]
+    within = [normpath(there.relative_to(folder)) for there in places if there.is_relative_to(folder)]
+    if len(within) < len(places) or any(name.startswith("..") for name in within):
+        return self_contained(spec, folder)
+    files = {Path(name).as_posix(): _content(folder / name) for name in within}
+    return WrittenModel(_content(path).decode("utf-8"), files)
+
+
+def _included(path: Path, folder: Path) -> list[Path]:
+    """Return the files that an MJCF of a model in `folder` includes, and those that they do."""
+    found = []
+    for element in _tree(_content(path).decode("utf-8")).iter("include"):
+        there = next((p for at in (folder, path.parent) if (p := at / element.get("file", "")).is_file()), folder)
+        if there != folder:
+            found += [there, *_included(there, folder)]
+    return found
+
+
+def _needed(root: ET.Element, folder: Path) -> list[tuple[ET.Element, str, Path]]:
+    """Return the elements that name a file, the attribute, and where the file lies."""
+    folders = _folders(root)
+    return [
+        (element, name, folder / folders.get(_FOLDERS.get(element.tag, ""), "") / element.get(name, ""))
+        for element in root.iterfind("asset/*")
+        for name in element.keys()  # noqa: SIM118
+        if name.startswith("file")
+    ]
+
+
+def _folders(root: ET.Element) -> dict[str, str]:
+    compiler = root.find("compiler")
+    return compiler.attrib if compiler is not None else {}
+
+
+def _content(there: Path) -> bytes:
+    try:
+        return there.read_bytes()
+    except OSError as error:
+        raise DataError(f"{there}: cannot be read ({error.strerror or error}); the model needs it") from None
 
 
 def _file_name(files: dict[str, bytes], name: str, content: bytes) -> str:

@@ -46,7 +46,9 @@ def written_model(loaded: LoadedModel, wanted: mujoco.MjModel) -> tuple[mujoco.M
 def check_same(written: mujoco.MjModel, wanted: mujoco.MjModel, name: str) -> None:
     """Raise DataError, with the element, where a written model is another than the one wanted."""
     for field in _PHYSICS:
-        a, b = np.asarray(getattr(written, field), float), np.asarray(getattr(wanted, field), float)
+        a, b = (np.array(getattr(model, field), float) for model in (written, wanted))
+        if field == "geom_size" and a.shape == b.shape:  # a sphere has one size, whatever stands in the others
+            a, b = (np.where(_sizes(wanted), sizes, 0.0) for sizes in (a, b))
         if a.shape != b.shape or not np.allclose(a, b, rtol=ROUNDING, atol=1e-14):
             where = np.argwhere(~np.isclose(a, b, rtol=ROUNDING, atol=1e-14))[0] if a.shape == b.shape else ()
             at = f"[{', '.join(map(str, where))}]" if len(where) else ""
@@ -54,6 +56,13 @@ def check_same(written: mujoco.MjModel, wanted: mujoco.MjModel, name: str) -> No
                 f"model {name!r} cannot be written with its new numbers: {field}{at} would be another; say in the MJCF what the "
                 "compiler works out by itself (inertial instead of settotalmass or balanceinertia)"
             )
+
+
+def _sizes(model: mujoco.MjModel) -> np.ndarray:
+    """Return (ngeom, 3) which sizes a geom of its type has."""
+    G = mujoco.mjtGeom
+    few = {int(G.mjGEOM_SPHERE): 1, int(G.mjGEOM_CAPSULE): 2, int(G.mjGEOM_CYLINDER): 2}
+    return np.arange(3) < np.array([few.get(int(kind), 3) for kind in model.geom_type]).reshape(-1, 1)
 
 
 def name_element(spec: mujoco.MjSpec, loaded: LoadedModel, kind: str, name: str) -> None:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Drive, Heating, Loads, Problem, Route, Solution
-from twin.body.drawable import NO_PIECES, NO_VALUES, ColourScale, Frames, FrameShapes, stack_frames
+from twin.body.drawable import NO_PIECES, NO_VALUES, ColourScale, Frames, FrameShapes, Solid, stack_frames
 from twin.body.hinge_chain import HingeChain
 from twin.body.spring import Spring
 from twin.mechanics.rod import ChainSolution, Equilibrium
@@ -22,14 +22,16 @@ SPRING_REACH = 3.0  # initial elongations from the base to a spring's fixed far 
 class ChainFigure:
     """`Drawable` of a chain. Colours show the tension along the tendons and the temperature of SMA springs."""
 
-    colour_fields = ("tension",)
+    colour_fields: tuple[str, ...] = ("tension",)
+    solids: tuple[Solid, ...] = ()
+    view = np.zeros(3)
 
     def __init__(self, body: HingeChain, solver: Equilibrium) -> None:
         self._body, self._solver = body, solver
         self.faces = np.zeros((0, 3), np.uint32)
         self.cylinders = solver.model.geom_size[:, :2].copy()
         self.link_colours = (255 * solver.model.geom_rgba[:, :3]).astype(np.uint8)
-        self.height = body.length
+        self.height, self.middle, self.tip = body.length, np.array([0.0, 0.0, 0.5 * body.length]), -1
         self._place(solver.model.qpos0)
         disks = solver.data.site_xpos[solver.chain.disk]
         self._disk = np.linalg.norm(solver.data.geom_xpos[None] - disks[:, None], axis=2).argmin(axis=1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.body import Heating, Loads, Route, Solution
-from twin.body.drawable import ColourScale, Frames, FrameShapes, stack_frames
+from twin.body.drawable import ColourScale, Frames, FrameShapes, Solid, stack_frames
 from twin.mechanics.silicone.body import SoftBody
 from twin.mechanics.silicone.cables import trace_tendons, unloaded_tendons
 from twin.mechanics.silicone.hand import HandBody, HandSolution
@@ -20,12 +20,14 @@ class SoftFigure:
     """`Drawable` of a finger. Colours show strain of the skin, resistance of the cords, or tension along the tendons."""
 
     colour_fields: tuple[str, ...] = ("strain", "resistance", "tension")
+    solids: tuple[Solid, ...] = ()
+    view = np.zeros(3)
 
     def __init__(self, body: SoftBody) -> None:
         self._body, self._parts, self._statics = body, body_arrays(body), SoftStatics(body)
         self.cylinders, self.link_colours = np.zeros((0, 2)), np.zeros((0, 3), np.uint8)
         cone = body.cone
-        self.height = cone.length
+        self.height, self.middle, self.tip = cone.length, np.array([0.0, 0.0, 0.5 * cone.length]), -1
         z, t = np.linspace(0.0, cone.length, DRAWN_RINGS), 2.0 * np.pi * np.arange(DRAWN_AROUND) / DRAWN_AROUND
         Z, T = (v.ravel() for v in np.meshgrid(z, t, indexing="ij"))
         skin = np.column_stack([cone.radius(Z) * np.cos(T), cone.radius(Z) * np.sin(T), Z])
@@ -90,12 +92,14 @@ class HandFigure:
     """`Drawable` of a hand: the fingers' own, each in its place, and the palm."""
 
     colour_fields = SoftFigure.colour_fields
+    solids: tuple[Solid, ...] = ()
+    view = np.zeros(3)
 
     def __init__(self, body: HandBody) -> None:
         self._body, self._fingers = body, [SoftFigure(finger) for finger in body.fingers]
         radius = float(np.linalg.norm(body.places[:, :2], axis=1).max())
         self.cylinders, self.link_colours = np.array([[radius, PALM_THICKNESS]]), np.array([PALM_COLOUR], np.uint8)
-        self.height = self._fingers[0].height
+        self.height, self.middle, self.tip = self._fingers[0].height, self._fingers[0].middle, -1
         n = self._fingers[0].faces.max() + 1
         self.faces = np.concatenate([f.faces + k * n for k, f in enumerate(self._fingers)]).astype(np.uint32)
         angle = np.arctan2(body.turns[:, 1, 0], body.turns[:, 0, 0])

@@ -6,6 +6,6 @@ comments.py  what is said of its numbers   stepper.py   the laws beside it
 
 from twin.prediction.mjcf.comments import Origins, origins_of
 from twin.prediction.mjcf.export import MODEL_FILE, export_mjcf, write_mjcf
-from twin.prediction.mjcf.stepper import ModelStepper
+from twin.prediction.mjcf.stepper import ModelStepper, TwinStepper
 
-__all__ = ["MODEL_FILE", "ModelStepper", "Origins", "export_mjcf", "origins_of", "write_mjcf"]
+__all__ = ["MODEL_FILE", "ModelStepper", "Origins", "TwinStepper", "export_mjcf", "origins_of", "write_mjcf"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -11,42 +13,29 @@ import numpy as np
 from twin.body import Drive, Loads, Problem, Signals, Start
 from twin.effects import Effect, effect_class
 from twin.effects.base.chain import EffectChain
-from twin.foundation.errors import DataError, TwinError, short_repr
-from twin.mechanics.mjcf import LoadedModel, ModelSolver
+from twin.foundation.errors import DataError, SolveError, TwinError, short_repr
+from twin.mechanics.mjcf import LoadedModel, ModelBody, ModelSolver
 from twin.prediction.mjcf.natives import erase_friction
+from twin.prediction.twin import Twin
 from twin.robots.families.mjcf import body_of
 from twin.robots.schemas.mjcf import counts_of
 
 PREFIX = "twin."  # of the custom numbers that hold laws: twin.EFFECT.PARAMETER
+STEP_ROUNDING = 1e-9
 _NO_ROW, _NOTHING = np.full(1, -1, np.int64), np.empty((0, 0))
 _POSITIONS = ("joint angle", "joint shift", "actuator angle", "actuator length", "tendon length", "marker")
 
 
-class ModelStepper:
-    """An exported MJCF in motion.
+class Stepper(ABC):
+    """A model in motion with the laws of effects, under controls given step by step."""
 
-    `model` and `data` are MuJoCo's, to be read, drawn or put into an environment; `model` is the file's without what stands there
-    in place of laws that are stepped here. Steps are as long as the file's timestep. As in the twin, damping acts at the mean of
-    the rates before and after a step, bristles of friction are stepped implicitly, and commands run straight from step to step:
-    along a trial whose rows are steps it gives the twin's own prediction to rounding. Where rows are further apart, give the
-    commands straight between rows; a lag is then exact, where a twin's prediction is straight between rows.
+    effects: tuple[Effect, ...]
+    step_length: float  # s
 
-        stepper = ModelStepper("robot.xml")
-        stepper.reset(control)
-        while True:
-            stepper.step(control)
-            stepper.readings()["joint.knee.position"]
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        """Read the file. Raises DataError for a file that does not load, or holds laws that are not known."""
-        self.effects, loaded = _read(Path(path))
-        self.step_length = float(loaded.spec.option.timestep)
-        self._body = body_of(loaded, {"timestep": self.step_length}, {})
-        self._chain = EffectChain(self.effects)
-        self._chain.check_body(self._body, Path(path).name)
-        self._solver = ModelSolver(self._body)
-        self.reset(np.zeros(loaded.model.nu), settle=0.0)
+    def _take(self, effects: tuple[Effect, ...], body: ModelBody, loads: Loads) -> None:
+        """Take what is stepped."""
+        self.effects, self.step_length, self._body, self._loads = effects, body.longest_step, body, loads
+        self._chain, self._solver = EffectChain(effects), ModelSolver(body)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -61,9 +50,8 @@ class ModelStepper:
     def reset(self, control: np.ndarray, settle: float = 2.0, pose: str = "") -> None:
         """Begin as a trial does: from a keyframe (or where springs and servos rest), held under `control` (nu,) for `settle` s."""
         control = np.asarray(control, float)
-        loads = Loads(np.array(self._body.model.opt.gravity))
         problem = Problem(
-            np.zeros(1), control[None], loads, self._chain.route, (Drive.CONTROL,) * len(control), start=Start(settle, pose)
+            np.zeros(1), control[None], self._loads, self._chain.route, (Drive.CONTROL,) * len(control), start=Start(settle, pose)
         )
         first, self._laws = control, list[Callable[[np.ndarray], np.ndarray]]()
         for effect in (
@@ -77,12 +65,12 @@ class ModelStepper:
         self._scratch = mujoco.MjData(self._motion.model)
 
     def step(self, control: np.ndarray) -> None:
-        """Advance by one step under controls (nu,). Raises TwinError for a motion that diverges."""
+        """Advance by one step under controls (nu,). Raises SolveError for a motion that diverges."""
         delivered = np.array(control, float)
         for law in self._laws:
             delivered = law(delivered)
         if not self._motion.stands or self._motion.advance(delivered[None], _NO_ROW, _NOTHING) < 1:
-            raise TwinError("the model's motion diverges; check the controls, or give the file a shorter timestep")
+            raise SolveError("the model's motion diverges; check the controls, or give the file a shorter timestep")
 
     def readings(self) -> dict[str, float]:
         """Return the positions (SI) of joints, actuators, tendons and sites by channel, as its encoders and camera report them."""
@@ -100,6 +88,44 @@ class ModelStepper:
         seen = self._chain.sense(true)
         senses = {name: s for name, s in self._body.senses.items() if s.group in _POSITIONS}
         return {name: float(seen.group(s.group)[0, s.index, s.axis]) for name, s in senses.items()}
+
+
+class TwinStepper(Stepper):
+    """A twin of an MJCF in motion: its own prediction, step by step."""
+
+    def __init__(self, twin: Twin, interval: float, loads: Loads | None = None) -> None:
+        """Take steps that divide an `interval` (s), under `loads` beside the twin's own. Raises DataError for another robot."""
+        body = twin.body()
+        if not isinstance(body, ModelBody):
+            raise DataError(f"robot {twin.robot.name!r} is no MJCF, which is what is stepped here; give a twin of one")
+        self.steps = max(1, int(np.ceil(interval / body.longest_step - STEP_ROUNDING)))
+        own = twin.effect_chain.surround(loads or Loads(twin.robot.gravity))
+        self._take(twin.effects, replace(body, longest_step=interval / self.steps), own)
+
+
+class ModelStepper(Stepper):
+    """An exported MJCF in motion.
+
+    `model` and `data` are MuJoCo's, to be read, drawn or put into an environment; `model` is the file's without what stands there
+    in place of laws that are stepped here. Steps are as long as the file's timestep. As in the twin, damping acts at the mean of
+    the rates before and after a step, bristles of friction are stepped implicitly, and commands run straight from step to step:
+    along a trial whose rows are steps it gives the twin's own prediction to rounding. Where rows are further apart, give the
+    commands straight between rows; a lag is then exact, where a twin's prediction is straight between rows.
+
+        stepper = ModelStepper("robot.xml")
+        stepper.reset(control)
+        while True:
+            stepper.step(control)
+            stepper.readings()["joint.knee.position"]
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Read the file. Raises DataError for a file that does not load, or holds laws that are not known."""
+        effects, loaded = _read(Path(path))
+        body = body_of(loaded, {"timestep": float(loaded.spec.option.timestep)}, {})
+        self._take(effects, body, Loads(np.array(body.model.opt.gravity)))
+        self._chain.check_body(body, Path(path).name)
+        self.reset(np.zeros(loaded.model.nu), settle=0.0)
 
 
 def _read(path: Path) -> tuple[tuple[Effect, ...], LoadedModel]:

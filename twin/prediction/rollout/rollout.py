@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from joblib import delayed
 
+from twin.body import Drive
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parallel import run_parallel
 from twin.measurements import Recording, Trial
@@ -13,6 +14,7 @@ from twin.prediction.prepared import prepare
 from twin.prediction.simulate import can_step
 from twin.prediction.twin import Twin
 
+MARKERS = ("disk", "marker", "tip", "site")  # kinds of channels that are read with noise
 FEWEST_ROLLOUT_SAMPLES = 2  # of a rollout that is lost early
 
 
@@ -35,6 +37,11 @@ class Rollouts:
 def can_step_controls(twin: Twin, controls: Recording) -> bool:
     """Return whether MuJoCo can step the controls: the family has dynamics, and they accept the tendons' drives."""
     return can_step(prepare(controls, twin.robot))
+
+
+def _always_steps(twin: Twin, controls: Recording) -> bool:
+    """Return whether the controls are an MJCF's, whose prediction is in motion always."""
+    return Drive.CONTROL in prepare(controls, twin.robot).drives
 
 
 def rollout(
@@ -66,8 +73,8 @@ def rollout(
         progress(f"{k} of {len(single)} rollouts" + (f", {len(lost_rollouts)} ended early" if lost_rollouts else ""))
     if not trials:
         raise SolveError(f"all rollouts are lost at their start: {lost_rollouts[0].why}")
-    how = "MuJoCo steps" if steps else "static equilibria"
-    channels = tuple(replace(c, noise=noise) if noise and c.kind in ("disk", "marker", "tip") else c for c in controls.channels)
+    how = "MuJoCo steps" if steps or _always_steps(twin, controls) else "static equilibria"
+    channels = tuple(replace(c, noise=noise) if noise and c.kind in MARKERS else c for c in controls.channels)
     source = f"simulation: twin of {twin.robot.name}, {how}" + (f", marker noise {1e3 * noise:g} mm" if noise else "")
     return Rollouts(replace(controls, channels=channels, trials=tuple(trials), source=source), tuple(lost_rollouts))
 
@@ -88,5 +95,5 @@ def _with_noise(trial: Trial, controls: Recording, noise: float, seed: list[int]
     if not noise:
         return trial
     rng = np.random.default_rng(seed)
-    named = [c.name for c in controls.outputs() if c.kind in ("disk", "marker", "tip")]
+    named = [c.name for c in controls.outputs() if c.kind in MARKERS]
     return replace(trial, values={**trial.values, **{n: trial.values[n] + rng.normal(0.0, noise, len(trial.time)) for n in named}})

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.body import Drive
 from twin.prediction.prepared import PreparedRecording
 from twin.report.plots.predictions import complete_markers
 
@@ -33,15 +34,16 @@ def variables(prepared: PreparedRecording) -> Iterator[tuple[str, Variable]]:
     pull = np.concatenate([i.command for i in inputs]) * factor
     slope = np.concatenate([_smoothed_rates(i.time, i.command) for i in inputs]) * factor
     still = REST_RATE_SHARE * np.median(np.abs(slope), axis=0)
-    strongest = np.argmax(pull, axis=1)
+    away = np.concatenate([i.pull for i in inputs])
+    strongest = np.argmax(away * factor if inputs[0].home is None else np.abs(away), axis=1)
     every, no = np.ones(n, bool), np.zeros(n)
     for t in range(prepared.n_tendon):
         side = np.where(np.abs(slope[:, t]) > still[t], np.sign(slope[:, t]), 0.0)
-        what, unit = prepared.drives[t], prepared.drives[t].display_unit[0]
-        title, which, shown = f"{what} of tendon {t + 1} ({unit})", f"in which tendon {t + 1} pulls most", strongest == t
+        title, rate, which = _pull_names(prepared, t)
+        shown = strongest == t
         yield "loop", Variable(title, pull[:, t], side, shown, True, which)
         yield "tension", Variable(title, pull[:, t], no, shown, False, which)
-        yield "rate", Variable(f"rate of tendon {t + 1}'s {what} ({unit}/s)", slope[:, t], no, every)
+        yield "rate", Variable(rate, slope[:, t], no, every)
     for kind, title, parts in (
         ("elapsed", "time in the trial (s)", [i.time - i.time[0] for i in inputs]),
         ("clock", "time since the first trial (min)", [i.clock / 60.0 for i in inputs]),
@@ -52,6 +54,23 @@ def variables(prepared: PreparedRecording) -> Iterator[tuple[str, Variable]]:
         yield kind, Variable(title, np.concatenate(parts), no, every)
     for kind, title, values in _tip_variables(prepared):
         yield kind, Variable(title, values, no, every)
+
+
+def _pull_names(prepared: PreparedRecording, t: int) -> tuple[str, str, str]:
+    """Return the titles of a tendon's command and of its rate, and which samples are shown; a control goes by its column's name."""
+    what, unit = prepared.drives[t], prepared.drives[t].display_unit[0]
+    if what is Drive.CONTROL:
+        driver = prepared.drivers[t]
+        return (
+            f"{driver.name} ({driver.si_unit})",
+            f"rate of {driver.name} ({driver.si_unit}/s)",
+            f"in which {driver.name} moves most",
+        )
+    return (
+        f"{what} of tendon {t + 1} ({unit})",
+        f"rate of tendon {t + 1}'s {what} ({unit}/s)",
+        f"in which tendon {t + 1} pulls most",
+    )
 
 
 def _tip_variables(prepared: PreparedRecording) -> Iterator[tuple[str, str, np.ndarray]]:

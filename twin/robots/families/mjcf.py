@@ -14,7 +14,10 @@ from twin.mechanics.mjcf import (
     LONGEST_STEP,
     LoadedModel,
     ModelBody,
+    ModelFigure,
     ModelSolver,
+    control_span,
+    control_unit,
     element_senses,
     load_model,
     payload_places,
@@ -69,7 +72,15 @@ class _Known:
         self.tip = tip_site(loaded, tip)
         self.places = frozenset(payload_places(loaded))
         self.ports = tuple(
-            (Port(f"actuator.{name}.ctrl", Drive.CONTROL, tuple(np.eye(model.nu)[k])),)
+            (
+                Port(
+                    f"actuator.{name}.ctrl",
+                    Drive.CONTROL,
+                    tuple(np.eye(model.nu)[k]),
+                    control_unit(model, k),
+                    control_span(model, k),
+                ),
+            )
             for k, name in enumerate(loaded.names("actuator"))
         )
         self.tendon_sites = tendon_sites(loaded)
@@ -116,5 +127,11 @@ def statics(body: Body) -> ModelSolver:
     return ModelSolver(body)
 
 
+def figure(body: Body) -> ModelFigure:
+    """Return its drawing: the model's geoms and tendons."""
+    assert isinstance(body, ModelBody)
+    return ModelFigure(body)
+
+
 dynamics = None  # `statics` steps
-figure = chain = silicone = hand = None
+chain = silicone = hand = None

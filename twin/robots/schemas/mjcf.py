@@ -26,6 +26,8 @@ from twin.mechanics.mjcf import (
     Attribute,
     LoadedModel,
     applies,
+    contacts_at_start,
+    control_unit,
     load_model,
     si_unit,
     slides,
@@ -135,7 +137,12 @@ def addresses(loaded: LoadedModel, key: str) -> list[Address]:
     if not found:
         raise DataError(f"{key}: the model has no {kind} {short_repr(name)}; it has {', '.join(names)}{did_you_mean(name, names)}")
     if any(not applies(loaded.model, kind, k, attribute) for k in found):
-        raise DataError(f"{key}: joint {name!r} has more than one axis; only its pos can be given")
+        why = (
+            "joint {name!r} has more than one axis; only its pos can be given"
+            if kind == "joint"
+            else ("actuator {name!r} is no motor and no servo; give its gain or bias")
+        )
+        raise DataError(f"{key}: {why.format(name=name)}")
     return [Address(kind, k, names[k], attribute) for k in found]
 
 
@@ -177,13 +184,26 @@ def model_parameters(structure: Mapping[str, object], table: Mapping[str, Any], 
 def usual_parameters(loaded: LoadedModel) -> list[Parameter]:
     """Return the numbers in which robots of this kind usually differ, as wide as `Attribute.relative_std` says."""
     found = []
+    for uncertain, _ in usual_classes(loaded).values():
+        for address in uncertain:
+            entry = NumberEntry(source=DEFAULT_SOURCE, relative_std=address.of.relative_std)
+            found += entry_parameters(loaded, address, entry)
+    return found
+
+
+def usual_classes(loaded: LoadedModel) -> dict[tuple[str, str], tuple[list[Address], list[Address]]]:
+    """Return, by kind and attribute, the numbers in which robots usually differ, and those alike that are 0 in the model."""
+    found = {}
     for kind, known in ATTRIBUTES.items():
-        for attribute, of in known.items():
-            for k, name in enumerate(loaded.names(kind)):
-                moves = kind != "body" or (k > 0 and loaded.model.body_weldid[k] != 0)
-                if of.relative_std and moves and applies(loaded.model, kind, k, attribute) and of.read(loaded.model, k)[0] > 0.0:
-                    entry = NumberEntry(source=DEFAULT_SOURCE, relative_std=of.relative_std)
-                    found += entry_parameters(loaded, Address(kind, k, name, attribute), entry)
+        for attribute in [a for a, of in known.items() if of.relative_std]:
+            every = [
+                Address(kind, k, name, attribute)
+                for k, name in enumerate(loaded.names(kind))
+                if applies(loaded.model, kind, k, attribute) and (kind != "body" or (k > 0 and loaded.model.body_weldid[k] != 0))
+            ]
+            sizes = [float(a.of.read(loaded.model, a.element)[0]) for a in every]
+            uncertain = [a for a, size in zip(every, sizes, strict=True) if size > 0.0]
+            found[kind, attribute] = uncertain, [a for a, size in zip(every, sizes, strict=True) if size == 0.0]
     return found
 
 
@@ -258,9 +278,7 @@ def usual_channels(loaded: LoadedModel) -> list[tuple[str, str, str, float]]:
     """Return what is usually logged: controls, and positions of joints."""
     model, found = loaded.model, []
     for k, name in enumerate(loaded.names("actuator")):
-        servo = model.actuator_biasprm[k, 1] != 0.0
-        sliding = slides(model, "actuator", k)
-        found.append((f"actuator.{name}.ctrl", "input", ("m" if sliding else "rad") if servo else "N" if sliding else "N*m", 1e-6))
+        found.append((f"actuator.{name}.ctrl", "input", control_unit(model, k), 1e-6))
     for k in scalar_joints(loaded):
         sliding = slides(model, "joint", k)
         found.append((f"joint.{loaded.names('joint')[k]}.position", "output", "mm" if sliding else "deg", 0.1))
@@ -273,10 +291,14 @@ def model_gravity(structure: Mapping[str, object]) -> np.ndarray:
 
 
 def model_notices(structure: Mapping[str, object], table: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return remarks on what was assumed of a model."""
+    """Return remarks on what was assumed of a model, and on contacts that it begins with."""
+    touching = contacts_at_start(load_model(str(structure["model"])))
+    met = (f"the model begins with {touching} contacts: they are stepped as MuJoCo has them, and nothing is fitted through them",)
+    remarks = met if touching else ()
     if table:
-        return ()
+        return remarks
     return (
+        *remarks,
         "robot.toml declares no [parameters]: masses, inertias, springs, dampers and gains are taken to differ as is usual of "
         "their kind (3 to 30 %)",
     )

@@ -13,11 +13,13 @@ from trimesh.exchange.gltf import export_glb
 
 from twin.body.drawable import ColourScale, Drawable, Frames
 from twin.viewer.drawing.colours import colour_values
+from twin.viewer.drawing.shapes import Shapes
 
 MEASURED_RGB, PREDICTED_RGB, ARROW_RGB, PUSH_RGB, DARK_GREY = (214, 39, 40), (31, 119, 180), (20, 20, 20), (255, 54, 1), 60
 CORD_THICKNESS, THIN_LINE, GLASS_RGB = 0.014, 0.006, (200, 205, 215)
 EMPTY_CLOUD = np.zeros((0, 3), np.float32)
 ROBOT_DISTANCE, NARROW_ROBOT = 0.9, 0.2  # heights: distance of two robots side by side, up to this width
+OBLIQUE = 0.5  # of a figure's best view, that must lie across gravity to be taken
 LONGEST_PUSH_ARROW = 0.3  # heights, of the largest push
 
 
@@ -26,15 +28,24 @@ def place_robots(server: viser.ViserServer, down: np.ndarray, figures: Sequence[
     up = -down / np.linalg.norm(down) if np.any(down) else np.array([0.0, 0.0, 1.0])
     server.scene.set_up_direction(tuple(up))
     side = np.cross(up, [1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.cross(up, [0.0, 1.0, 0.0])
+    best = figures[0].view - up * (up @ figures[0].view)
+    if np.linalg.norm(best) > OBLIQUE * np.linalg.norm(figures[0].view):
+        side = best if best @ side >= 0.0 else -best
     side /= np.linalg.norm(side)
-    n, wide = len(figures), max(2.0 * float(f.cylinders[:, 0].max(initial=0.0)) / f.height for f in figures)
+    n, wide = len(figures), max(_width(f) for f in figures)
     apart = ROBOT_DISTANCE + max(0.0, wide - NARROW_ROBOT)
     away = 1.45 if n == 1 else 1.05 + 0.5 * apart
     camera = server.initial_camera
-    camera.position = tuple(np.array([0.0, 0.0, 0.5]) + away * side + 0.35 * up)
-    camera.look_at, camera.up = (0.0, 0.0, 0.5), tuple(up)
+    middle = figures[0].middle / figures[0].height
+    camera.position = tuple(middle + away * side + 0.35 * up)
+    camera.look_at, camera.up = tuple(middle), tuple(up)
     right = np.cross(-side, up)
     return [(k - 0.5 * (n - 1)) * apart * right for k in range(n)]
+
+
+def _width(figure: Drawable) -> float:
+    """Return how wide a figure is, heights."""
+    return 1.0 if figure.solids else 2.0 * float(figure.cylinders[:, 0].max(initial=0.0)) / figure.height
 
 
 class Scene:
@@ -49,6 +60,8 @@ class Scene:
         if name:
             scene.add_label(f"{root}/name", name, position=(0.0, 0.0, 1.12), anchor="center-center", font_screen_scale=1.2)
         self._links = self._cylinders(figure) if len(figure.cylinders) else None
+        self._shapes = Shapes(server, f"{root}/shapes", self.scale, figure.solids)
+        self._ghost: Shapes | None = None
         self._lines = {kind: self._segments(kind) for kind in ("tendons", "cords", "coils")}
         self._skin: viser.GlbHandle | None = None
         self._glass: viser.MeshHandle | None = None
@@ -84,6 +97,8 @@ class Scene:
             if self._links is not None:
                 self._links.batched_positions = (self.scale * shown.link_positions[0]).astype(np.float32)
                 self._links.batched_wxyzs = shown.link_quaternions[0].astype(np.float32)
+            if self._figure.solids:
+                self._shapes.move(shown.link_positions[0], shown.link_quaternions[0])
             self._draw_lines("tendons", shown.tendon_pieces[0], shown.tension[0], over["tension"] if shade == "tension" else None)
             self._draw_lines(
                 "cords", shown.cord_pieces[0], shown.resistance[0], over["resistance"] if shade == "resistance" else None
@@ -137,8 +152,22 @@ class Scene:
             arrows = np.stack([start, start + enlarged * away], axis=1) if enlarged > 0.0 else np.zeros((0, 2, 3))
             self._arrows.points = (s * arrows).astype(np.float32)
 
+    def draw_ghost(self, measured: Frames | None) -> None:
+        """Draw the robot once more where its joints were measured, in the measured markers' colour; None hides it."""
+        if measured is None and self._ghost is None:
+            return
+        if self._ghost is None:
+            self._ghost = Shapes(self._server, f"{self.root}/ghost", self.scale, self._figure.solids, MEASURED_RGB)
+        with self._server.atomic():
+            if measured is not None:
+                self._ghost.move(measured.link_positions[0], measured.link_quaternions[0])
+            else:
+                self._ghost.hide()
+
     def draw_push(self, at: np.ndarray, force: np.ndarray) -> None:
         """Draw an arrow that ends at (3,) m, along a force (3,) divided by the largest force."""
+        if not len(self._figure.push_points):
+            return
         size, faces = float(np.linalg.norm(force)), len(self._figure.faces)
         rim = 0.0 if faces else float(self._figure.cylinders[:, 0].max())  # a disk is pushed at its centre
         end = self.scale * (at - rim * force / max(size, 1e-12))
@@ -148,6 +177,8 @@ class Scene:
     def point_on_ray(self, shown: Frames, origin: np.ndarray, direction: np.ndarray) -> int | None:
         """Return the index of the figure's hold that a ray (heights) meets first; None if it meets none."""
         points = self.scale * self._figure.push_positions(shown) + self._position
+        if not len(points):
+            return None
         along = (points - origin) @ direction
         off = np.linalg.norm(points - origin - along[:, None] * direction, axis=1)
         near = np.flatnonzero(off < max(1.3 * float(off.min()), RAY_TOLERANCE))

@@ -3,6 +3,7 @@
 import numpy as np
 import plotly.graph_objects as go
 
+from twin.body import Drive
 from twin.diagnosis import Diagnosis
 from twin.report.numbers import DISPLAY_UNITS, MINUS, capitalised
 from twin.report.plots.effect_plot import ResidualPlot, bin_means, choose_residual_plots
@@ -37,6 +38,7 @@ def section(story: Story) -> Section:
                 "reason": capitalised(g.reason),
                 "channel": channel,
                 "is_loop": g.variable.is_loop,
+                "is_control": Drive.CONTROL in d.prepared.drives,
                 "selection": g.variable.selection,
                 "panels": panels,
             }

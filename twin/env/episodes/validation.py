@@ -1,4 +1,4 @@
-"""Check options and actions of an environment: unknown options are refused, actions clipped or refused."""
+"""Check options, actions and own goals of an environment: unknown options are refused, actions clipped or refused."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -59,11 +59,29 @@ class ActionBounds:
         return np.clip(values, -1.0, 1.0)
 
 
-def refuse_reset_options(given: Mapping[str, Any] | None) -> None:
-    """Raise DataError for options of a reset: there are none."""
-    if given:
-        names = ", ".join(map(repr, given))
-        raise DataError(f"reset options {names} came; reset takes none (there are none), give options when the environment is made")
+def parse_reset_options(given: Mapping[str, Any] | None) -> Any | None:
+    """Return the own goal in the options of a reset, or None without one. Raises DataError for another option."""
+    others = ", ".join(repr(name) for name in given or {} if name != "goal")
+    if others:
+        raise DataError(f"reset options {others} came; reset takes 'goal' only, give other options when the environment is made")
+    return None if given is None else given.get("goal")
+
+
+def parse_goal(given: Any, shape: tuple[int, ...], words: str) -> np.ndarray:
+    """Return an own goal as finite numbers; -1 in `shape` stands for any number of rows, and `words` for what they are.
+
+    Raises DataError for a goal of another shape and one that is not finite.
+    """
+    try:
+        goal = np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise DataError(f"the goal {given!r} came; {words} is needed, in numbers") from None
+    fits = goal.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, goal.shape, strict=True))
+    if not fits or not goal.size:
+        raise DataError(f"a goal of shape {goal.shape} came; {words} is needed")
+    if not np.isfinite(goal).all():
+        raise DataError(f"the goal {goal.tolist()} is not finite; {words} is needed")
+    return goal
 
 
 def select_arrays(state: Mapping[str, np.ndarray], part: str) -> dict[str, np.ndarray]:

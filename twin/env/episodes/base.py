@@ -1,4 +1,4 @@
-"""Base of the environments on a twin: options, drawn twins, saved states, copies and pickles."""
+"""Base of the environments on a twin: options, drawn twins, own goals, saved states, copies and pickles."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -8,9 +8,10 @@ from typing import Any, ClassVar, Protocol
 import gymnasium
 import numpy as np
 
-from twin.env.domain_randomisation import ParameterSpread, draw_twin, read_spread, twin_arrays, twin_from_arrays
-from twin.env.rendering import FrameRenderer
-from twin.env.validation import parse_options, refuse_reset_options, select_arrays
+from twin.env.episodes.domain_randomisation import ParameterSpread, draw_twin, read_spread, twin_arrays, twin_from_arrays
+from twin.env.episodes.observation import ObservationLayout
+from twin.env.episodes.rendering import FrameRenderer
+from twin.env.episodes.validation import parse_options, parse_reset_options, select_arrays
 from twin.foundation.errors import DataError, SolveError
 from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
@@ -26,16 +27,17 @@ class Plant(Protocol):
     def set_state(self, state: Mapping[str, np.ndarray]) -> None: ...
 
 
-class TwinEnv(gymnasium.Env[np.ndarray, np.ndarray], ABC):
+class TwinEnv(gymnasium.Env[Any, np.ndarray], ABC):
     """Base of the environments on a twin.
 
     `copy.deepcopy` and `pickle` give an environment that continues identically; `set_state` continues from what `get_state` saved.
-    The episode's robot is built from `_drawn`, a twin and further drawn numbers.
+    The episode's robot is built from `_drawn`, a twin and further drawn numbers. `layout` names the observation's parts.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
     options_type: ClassVar[type]
     plant: Any
+    layout: ObservationLayout
 
     def __init__(self, twin: str | Path | Twin, render_mode: str | None, options: Mapping[str, Any]) -> None:
         """Raises UnknownNameError for an unknown option or render mode, DataError for a number that is not above zero."""
@@ -47,13 +49,14 @@ class TwinEnv(gymnasium.Env[np.ndarray, np.ndarray], ABC):
         self._drawn: tuple[Any, ...] = (self.described,)
         self._renderer: FrameRenderer | None = None
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start an episode at rest, with a drawn twin and goal.
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode at rest, with a drawn twin and goal, or with the own goal in `options={"goal": ...}`.
 
-        Raises DataError for any reset option, SolveError where no drawn twin has an equilibrium.
+        Raises DataError for another option and for a goal that is out of reach, SolveError where no drawn twin has an equilibrium.
         """
         super().reset(seed=seed)
-        refuse_reset_options(options)
+        given = parse_reset_options(options)
+        goal = None if given is None else self._check_goal(given)
         for attempt in range(MOST_REDRAWS):
             try:
                 self._draw_episode()
@@ -63,6 +66,8 @@ class TwinEnv(gymnasium.Env[np.ndarray, np.ndarray], ABC):
                     raise SolveError(
                         f"{MOST_REDRAWS} drawn twins in a row have no equilibrium, the last: {fault}; draw less widely"
                     ) from None
+        if goal is not None:
+            self._place_goal(goal)
         return self._observation(), self._info()
 
     def close(self) -> None:
@@ -118,9 +123,33 @@ class TwinEnv(gymnasium.Env[np.ndarray, np.ndarray], ABC):
     def _build_plant(self) -> Plant:
         """Build the robot of `_drawn`, at rest. Raises SolveError where it has no equilibrium."""
 
-    @abstractmethod
-    def _observation(self) -> np.ndarray:
+    def _check_goal(self, given: Any) -> np.ndarray:
+        """Return an own goal as an array. Raises DataError where it is misshaped or out of reach."""
+        raise DataError("a goal came, but this task has none to choose: its things are drawn; reset without options")
+
+    def _place_goal(self, goal: np.ndarray) -> None:
+        """Set a goal that `_check_goal` returned as the episode's."""
+        raise NotImplementedError
+
+    def _achieved(self) -> np.ndarray:
+        """Return what of the goal is true now, (d,), in the observation's units."""
+        raise NotImplementedError
+
+    def _desired(self) -> np.ndarray:
+        """Return the goal (d,), in the observation's units."""
+        raise NotImplementedError
+
+    def _goal_reward(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """Return the reward (...) of what was achieved (..., d) where that (..., d) was desired."""
+        raise NotImplementedError
+
+    def _observation(self) -> Any:
         """Return the observation now."""
+        return self.layout.join(self._observation_parts(), self.layout.parts)
+
+    @abstractmethod
+    def _observation_parts(self) -> dict[str, np.ndarray]:
+        """Return the observation's parts now, by name."""
 
     @abstractmethod
     def _info(self) -> dict[str, Any]:

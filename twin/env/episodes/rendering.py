@@ -42,8 +42,10 @@ def _open_renderer(model: mujoco.MjModel) -> mujoco.Renderer:
 class FrameRenderer:
     """A camera on one model; only its coordinates change, not its parameters."""
 
-    def __init__(self, spec: mujoco.MjSpec, size: float, upside_down: bool = False) -> None:
-        """`size` (m): extent of the model along z, which `upside_down` points to the ground.
+    def __init__(
+        self, spec: mujoco.MjSpec, size: float, upside_down: bool = False, middle: np.ndarray | None = None
+    ) -> None:  # fmt: skip
+        """`size` (m): extent of the model along z, which `upside_down` points to the ground; `middle` (3,) m: else half of it.
 
         Raises TwinError where this machine cannot draw.
         """
@@ -60,7 +62,8 @@ class FrameRenderer:
         self._model = spec.compile()
         self._data, self._upside_down = mujoco.MjData(self._model), upside_down
         self._camera = mujoco.MjvCamera()
-        self._camera.lookat[:], self._camera.distance = [0.0, 0.0, 0.5 * size], 2.6 * size
+        self._camera.lookat[:] = [0.0, 0.0, 0.5 * size] if middle is None else middle
+        self._camera.distance = 2.6 * size
         self._camera.azimuth, self._camera.elevation = 130.0, -20.0 * up
         self._renderer = _open_renderer(self._model)
 
