@@ -51,7 +51,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
 
     The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
     are commanded, the tendons that do not pull are let out, so that they are slack. Controls of an MJCF go from where they rest,
-    for as long as the longest trial. Springs heated by currents cool within a minute and would not respond to a fast pull of a motor.
+    for as long as the longest trial. Springs heated by currents cool within a minute and would not respond to a fast pull.
     """
     n, like = prepared.n_tendon, prepared.inputs[0]
     slow = SLOW_TRIAL
