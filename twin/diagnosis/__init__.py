@@ -1,10 +1,11 @@
 """The diagnosis: which effect, or none, explains what calibration leaves.
 
-pipeline.py     the stages in order: preview -> calibrate -> screen -> search -> choose -> judge -> held-out error
+pipeline.py     the stages in order: thin -> preview -> calibrate -> screen -> search -> choose -> judge -> held-out error
 diagnosis.py    what a diagnosis finds
 conclusion.py   what the stages decided before held-out trials are used
 fit_context.py  what every stage fits with
 budget.py       the time for the search
+thinning.py     the rows of a long log that are used
 split.py        fitted and held-out trials
 held_out.py     the error on trials that neither fit nor choice has used
 thresholds.py   every threshold, its reason and its evidence

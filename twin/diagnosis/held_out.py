@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from twin.diagnosis.diagnosis import Errors
 from twin.diagnosis.evidence.polynomial import predict_by_polynomial
 from twin.diagnosis.split import blind
 from twin.foundation.errors import SolveError
-from twin.prediction.evaluate import headline_group, rms, squared_errors
+from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms, squared_errors
 from twin.prediction.prepared import PreparedRecording
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
@@ -66,6 +66,12 @@ class HeldOut:
             return float("nan")
         groups = [o.group for o in self.prepared.outputs]
         return rms(self.prepared, [self.prepared.measured[k] - at[k] for k in self.trials], headline_group(groups))
+
+    def in_all_rows(self, whole: PreparedRecording) -> tuple[float, float, str]:
+        """Return the RMS error of the headline outputs in the rows used and in those of the `whole` log, and the unit of both."""
+        shown = OUTPUT_GROUPS[headline_group(o.group for o in self.prepared.outputs)]
+        full = replace(self, prepared=whole)
+        return shown.factor * self.error(lambda c: c.final), shown.factor * full.error(lambda c: c.final), shown.unit
 
     def rezeroed(self, group: str) -> tuple[float, float]:
         """Return the RMS error (SI) of one group of outputs by the final twins, twice.

@@ -1,7 +1,7 @@
 """The diagnosis: find what the twin lacks, how sure that is, and the error before and after on held-out trials.
 
-preview -> calibrate -> screen -> search -> choose -> lag_or_delay -> gate -> resolve_ties -> judge -> systematic -> describe, all
-on the fitted trials; then the errors on the held-out trials.
+thin -> preview -> calibrate -> screen -> search -> choose -> lag_or_delay -> gate -> resolve_ties -> judge -> systematic ->
+describe, all on the fitted trials; then the errors on the held-out trials.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,6 +28,8 @@ from twin.diagnosis.search.lag_or_delay import lag_or_delay
 from twin.diagnosis.search.screen import screen
 from twin.diagnosis.search.search import search
 from twin.diagnosis.split import blind, split
+from twin.diagnosis.thinning import thinned
+from twin.diagnosis.thinning import words as thinning_words
 from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, ROWS_FOR_ZERO
 from twin.diagnosis.verdict.gate import gate
 from twin.diagnosis.verdict.judge import judge, withdraw
@@ -63,18 +65,26 @@ def diagnose(
     loops; no number depends on it. Raise TwinError for data that cannot be used.
     """
     settings, twin = settings or Settings(), twin or Twin.of_recording(recording)
-    prepared = prepare(on_rows_of_outputs(recording), twin.robot)
-    if len(prepared.inputs) < 2:
+    log = on_rows_of_outputs(recording)
+    whole = prepare(log, twin.robot)
+    if len(whole.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one to hold out")
+    part, every = thinned(log, whole, settings.budget)
+    prepared = whole if every == 1 else prepare(part, twin.robot)
     with single_thread():
         preview = preview_data(prepared, twin, settings, progress)
         on_preview(preview)
-        return _held_out_diagnosis(recording, preview, twin, settings, progress)
+        found, held_out = _held_out_diagnosis(recording, preview, twin, settings, progress)
+        return (
+            found
+            if every == 1
+            else replace(found, notices=(*found.notices, thinning_words(log, every, *held_out.in_all_rows(whole))))
+        )
 
 
 def _held_out_diagnosis(
     recording: Recording, preview: DataPreview, twin: Twin, settings: Settings, progress: Progress
-) -> Diagnosis:
+) -> tuple[Diagnosis, HeldOut]:
     n = len(preview.prepared.inputs)
     prepared, nominal = preview.prepared, preview.nominal
     if n >= FEWEST_TRIALS_FOR_HELD_OUT:
@@ -115,7 +125,7 @@ def _reported(
     found: Conclusion,
     parts: Sequence[tuple[Conclusion, Sequence[int]]],
     settings: Settings,
-) -> Diagnosis:
+) -> tuple[Diagnosis, HeldOut]:
     """Assemble the diagnosis; each held-out trial is predicted by a conclusion that was not fitted to it.
 
     Claims that do not reduce the error on held-out trials are withdrawn.
@@ -123,12 +133,12 @@ def _reported(
     held_out = HeldOut.of(preview.prepared, preview.nominal, parts)
     errors = held_out.errors(settings.seed)
     if not found.judged.claims or errors.improved:
-        return _diagnosis(recording, preview, found, parts, settings, (held_out, errors))
+        return _diagnosis(recording, preview, found, parts, settings, (held_out, errors)), held_out
     words = _withdrawal_words(found, errors)
     found, parts = _withdrawn(found), [(_withdrawn(c), trials) for c, trials in parts]
     held_out = HeldOut.of(preview.prepared, preview.nominal, parts)
     calibrated = _diagnosis(recording, preview, found, parts, settings, (held_out, held_out.errors(settings.seed)))
-    return replace(calibrated, caveats=(words, *calibrated.caveats))
+    return replace(calibrated, caveats=(words, *calibrated.caveats)), held_out
 
 
 def _diagnosis(

@@ -35,6 +35,17 @@ def _row(name: str, value: Number, unit: str, reason: str, evidence: str) -> Num
 
 
 # fmt: off
+# ---- thin: rows of long logs that are used --------------------------------------------------------------------------------------
+
+ROWS_THAT_SUFFICE = _row("ROWS_THAT_SUFFICE", 5000, "rows", "several times those of a day of the bench, which decide its verdicts",
+    "judgement")
+FEWEST_ROWS_OF_TRIAL = _row("FEWEST_ROWS_OF_TRIAL", 200, "rows", "enough for the shape of a loop", "judgement")
+MOTION_BETWEEN_ROWS = _row("MOTION_BETWEEN_ROWS", 0.02, "of a command's range", "the path of a hysteresis is followed", "judgement")
+MOST_MISSING_TO_THIN = _row("MOST_MISSING_TO_THIN", 0.1, "of the rows",
+    "where more lack, devices take turns, and one of them might be left out altogether", "judgement")
+ROWS_PER_SECOND_OF_BUDGET = _row("ROWS_PER_SECOND_OF_BUDGET", 25.0, "1/s",
+    "with two trials, diagnosed three times, two cores end within 1.3 budgets", "python -m tools.benchmarks.diagnosis.raw_log")
+
 # ---- split: which trials are held out ----------------------------------------------------------------------------------------
 
 HELD_OUT_SHARE = _row("HELD_OUT_SHARE", 0.25, "of the trials",
