@@ -26,6 +26,7 @@ from twin.viewer import TwinPanel
 from twin.viewer import app as app_module
 from twin.viewer import panel as panel_module
 from twin.viewer import replay as replay_module
+from twin.viewer.drawing import headless
 from twin.viewer.drawing.colours import colour_bar, colour_values
 from twin.viewer.drawing.film import Film
 from twin.viewer.live import LiveHeatedRobot, LiveRobot
@@ -282,6 +283,40 @@ def test_a_film_has_every_instant_from_first_to_last(server: Any) -> None:
     assert picture.size == (800, 600)
     with pytest.raises(DataError, match=r"set the speed to 2\.1 or more"):
         Film(client, 100.0, 1.0)
+
+
+def test_a_film_begins_once_the_browser_looks_from_the_servers_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It connects with viser's own camera (3, 3, 3): a first picture from there came in three films of three."""
+    camera, polls = SimpleNamespace(position=np.array([3.0, 3.0, -3.0])), []
+
+    def clients() -> dict[int, Any]:
+        polls.append(1)
+        if len(polls) == 4:
+            camera.position = np.array([0.0, -1.45, 0.15])
+        return {} if len(polls) == 1 else {0: SimpleNamespace(camera=camera)}
+
+    server = cast(Any, SimpleNamespace(get_clients=clients, initial_camera=SimpleNamespace(position=(0.0, -1.45, 0.15))))
+    now = [0.0]
+    clock = SimpleNamespace(monotonic=lambda: now[0], sleep=lambda s: now.__setitem__(0, now[0] + s))
+    monkeypatch.setattr(headless, "time", clock)
+    assert headless._placed_client(server).camera is camera
+    assert len(polls) == 4
+    camera.position = np.array([3.0, 3.0, -3.0])
+    with pytest.raises(DataError, match="did not open the viewer within 60 s"):
+        headless._placed_client(server)
+
+
+def test_a_film_begins_once_pictures_stay_alike() -> None:
+    """The first are darker, as the page loads its light while it draws: two of those, then one between, then the same for good."""
+    shades = iter([40, 40, 120, 200, 200, 200])
+    drawn: list[int] = []
+
+    def get_render(high: int, wide: int, timeout: float) -> np.ndarray:
+        drawn.append(next(shades))
+        return np.full((high, wide, 3), drawn[-1], np.uint8)
+
+    headless._await_light(cast(Any, SimpleNamespace(get_render=get_render)))
+    assert drawn == [40, 40, 120, 200, 200]
 
 
 def test_a_browser_that_goes_ends_its_film_and_nothing_else(server: Any) -> None:
