@@ -11,7 +11,7 @@ from twin.body.drawable import Frames
 from twin.foundation.errors import DataError
 from twin.measurements import Recording
 from twin.prediction.twin import Twin
-from twin.viewer.controls import LARGEST_PUSH, HandControls
+from twin.viewer.controls import LARGEST_PUSH, HandControls, finger_name
 from twin.viewer.drawing.scene import place_robots
 from twin.viewer.panel import Panel
 from twin.viewer.replay import PredictedTrial
@@ -176,7 +176,7 @@ class TwinPanel(Panel):
             side.scene.draw(shown, self._colour_field, self._ranges)
             side.scene.draw_markers(shown.markers[0], np.full_like(shown.markers[0], np.nan), 0.0)
             side.scene.draw_push(side.figure.push_positions(shown)[hand.pushed_point()], hand.force / LARGEST_PUSH)
-            lines.append(_name_prefix(side) + _describe_pose(shown) + _describe_heating(side))
+            lines.append(_name_prefix(side) + _describe_pose(shown, hand.fingers) + _describe_heating(side))
         self.words.content = "  \n".join(lines)
 
     def _fit_colour_ranges(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
@@ -193,10 +193,14 @@ def _name_prefix(side: ShownTwin) -> str:
     return f"{side.name}: " if side.name else ""
 
 
-def _describe_pose(shown: Frames) -> str:
-    x, y, z = 1e3 * shown.markers[0, -1]
-    ends = f"; tension along the tendons {shown.tension.min():.2f} to {shown.tension.max():.2f} N"
-    return f"tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm{ends}"
+def _describe_pose(shown: Frames, fingers: int) -> str:
+    """Describe where each finger's tip is, and the tensions."""
+    tips = 1e3 * shown.markers[0].reshape(fingers, -1, 3)[:, -1]
+    places = [
+        f"{finger_name(k, fingers)}tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm" for k, (x, y, z) in enumerate(tips)
+    ]
+    ends = f"tension along the tendons {shown.tension.min():.2f} to {shown.tension.max():.2f} N"
+    return "  \n".join([*places, ends]) if fingers > 1 else f"{places[0]}; {ends}"
 
 
 def _describe_heating(side: ShownTwin) -> str:
