@@ -30,9 +30,9 @@ from twin.viewer import replay as replay_module
 from twin.viewer.drawing import headless
 from twin.viewer.drawing.colours import colour_bar, colour_values
 from twin.viewer.drawing.film import Film
+from twin.viewer.drawing.tip_loop import TipLoop, draw_svg
 from twin.viewer.live import LiveHeatedRobot, LiveRobot
 from twin.viewer.replay import MOST_PREDICTIONS, Replay
-from twin.viewer.tip_loop import TipLoop, draw_svg
 
 G = np.array([0.0, 0.0, 9.81])
 
