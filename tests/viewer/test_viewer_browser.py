@@ -140,8 +140,8 @@ def test_two_twins_two_clients_one_that_goes_and_a_second_server_on_the_port(loo
 
 
 def test_a_page_opened_before_the_robot_says_what_it_waits_for_and_lives(look: Look) -> None:
-    """Five seconds of work in place of a compiler: the page counts them and takes what is entered; its camera is then the one it would
-    have had."""
+    """Five seconds of work in place of a compiler: the page counts them and takes what is entered; its camera is then the one it
+    would have had."""
     server = start_server("127.0.0.1", 8690)
     notice, over, panels = WorkNotice(server), threading.Event(), list[TwinPanel]()
 
