@@ -1,7 +1,8 @@
-"""`twin shape`, `align` and `train` given what they cannot use: one line, exit code 2, nothing written."""
+"""`twin shape`, `align` and `train`: on the bundled day as their page says; given what they cannot use, one line, exit code 2."""
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
@@ -11,9 +12,12 @@ import numpy as np
 import pytest
 
 from twin import cli
+from twin.prediction.storage import read_twin
+from twin.robots import sample
 from twin.robots.robot import models_folder
 
-SET = Path(__file__).parents[1] / "data/finger_shape"
+DATA = Path(__file__).parents[1] / "data"
+SET, PAGE = DATA / "finger_shape", Path(__file__).parents[2] / "twin/shape/README.md"
 SENSOR = "sensor_3_resistance"
 
 
@@ -28,6 +32,29 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
     assert len(lines) == 1
     assert lines[0].startswith("twin: ")
     return lines[0]
+
+
+def test_the_pages_lines_run_on_the_bundled_day(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Against what the finite elements that made the day know. The day is at most 3 MB."""
+    day = sample("monday")
+    assert sum(file.stat().st_size for file in day.rglob("*")) < 3e6
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli, "_leave", sys.exit)  # which a refusal would end in
+    for line in re.findall(r"^twin ((?:align|shape) .*?)\s+#", PAGE.read_text("utf-8"), flags=re.MULTILINE):
+        monkeypatch.setattr(sys, "argv", ["twin", *line.split()])
+        cli.main()
+        assert "using the bundled day" in " ".join(capsys.readouterr().out.split())
+    built, found = json.loads(day.with_name("monday_truth.json").read_text())["finger"], read_twin("aligned").values
+    assert np.rad2deg(found["mounting.angle"]) == pytest.approx(built["phi_deg"], abs=0.12)  # deg, as the page says
+    for k, ohm in enumerate(built["R0_ohm"], start=1):
+        assert found[f"sensors.resistance_{k}"] == pytest.approx(ohm, rel=1e-3)
+    with np.load(DATA / "monday_truth.npz") as true, np.load("shape.npz") as told:
+        for trial, most in (("test_1", 0.3), ("test_2", 1.0), ("test_3", 1.0)):  # mm; 0.11, 0.54 and 0.47 were seen
+            rows = np.searchsorted(told[f"{trial}_time"], true[f"{trial}_time"] - 1e-6)
+            places = float(true["unit_mm"]) * true[f"{trial}_vertices"]
+            assert np.linalg.norm(1e3 * told[f"{trial}_vertices"][rows] - places, axis=2).mean() < most
 
 
 def broken_set(folder: Path, what: str) -> Path:

@@ -7,6 +7,7 @@ import shutil
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from twin.effects import Effect, catalogue
 from twin.foundation.errors import DataError, TwinError, UnknownNameError
 from twin.foundation.parameters import FittedValue, Parameter
-from twin.prediction.storage import read_twin, twin_table, write_twin
+from twin.prediction.storage import correlations, read_twin, twin_table, write_twin
 from twin.prediction.twin import Twin
 from twin.robots import load, robot_names
 from twin.robots.robot import models_folder
@@ -186,3 +187,42 @@ def test_a_twin_that_is_not_there_says_what_would_be(source: str, tmp_path: Path
 def test_a_name_that_is_none_lists_those_there_are() -> None:
     with pytest.raises(UnknownNameError, match=r"contineum.*available.*continuum"):
         read_twin("contineum")
+
+
+E_MU = ("backbone.youngs_modulus", "tendon_friction.mu")
+
+
+def test_correlations_are_kept_beside_the_standard_errors(tmp_path: Path) -> None:
+    """To the four digits that are written, and by pairs; a twin without them has none, nor one whose matrix is not finite."""
+    twin, path = Twin(load("continuum"), {}, (catalogue()["tendon_friction"]({"mu": 0.2}, 3),)), tmp_path / "twin.toml"
+    matrix = np.array([[1.0, -0.123456], [-0.123456, 1.0]])
+    write_twin(path, twin_table(twin, tmp_path, {}, {}), {"seed": 0}, (E_MU, matrix))
+    assert correlations(path) == correlations(tmp_path) == {
+        (E_MU[0], E_MU[0]): 1.0, E_MU: -0.1235, E_MU[::-1]: -0.1235, (E_MU[1], E_MU[1]): 1.0
+    }  # fmt: skip
+    assert read_twin(path).effects == twin.effects
+    assert tomllib.loads(path.read_text("utf-8"))["provenance"] == {"seed": 0}
+    for other in (None, ((), np.zeros((0, 0))), (E_MU, np.full((2, 2), np.nan))):
+        write_twin(path, twin_table(twin, tmp_path, {}, {}), {}, other)
+        assert correlations(path) is None
+    assert correlations("continuum") is None
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ('parameters = ["backbone.young"]\nmatrix = [[1.0]]', "unknown parameter 'backbone.young'"),
+        ('parameters = ["disks.mass", "disks.mass"]\nmatrix = [[1.0, 0.0], [0.0, 1.0]]', "names one twice"),
+        ('parameters = ["disks.mass"]\nmatrix = [[1.0, 0.5]]', "rows of 2; 1 rows of 1 are needed"),
+        ('parameters = ["disks.mass", "tendons.radius"]\nmatrix = [[1.0, 0.5], [0.4, 1.0]]', "not symmetric"),
+        ('parameters = ["disks.mass", "tendons.radius"]\nmatrix = [[1.0, 1.5], [1.5, 1.0]]', "beyond"),
+        ('parameters = ["disks.mass"]\nmatrix = [[0.5]]', "another than 1 on its diagonal"),
+        ('parameters = ["disks.mass"]', "matrix is missing"),
+        ('parameters = ["disks.mass"]\nmatrix = [["much"]]', "matrix"),
+    ],
+)
+def test_correlations_that_are_none_are_refused(table: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    path.write_text(f"{HEAD}[correlation]\n{table}\n")
+    with pytest.raises(DataError, match=words):
+        read_twin(path)

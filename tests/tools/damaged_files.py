@@ -47,6 +47,10 @@ parameters = { delay = { value = 100.0, unit = "ms" } }
 
 [provenance]
 seed = 0
+
+[correlation]
+parameters = ["backbone.youngs_modulus", "tendon_friction.mu"]
+matrix = [[1.0, -0.25], [-0.25, 1.0]]
 """
 CHANNELS = (
     ("tendon_1_tension", "input", 'unit = "gf"\nnoise = 2.0'), ("tendon_2_tension", "input", 'unit = "N"'),

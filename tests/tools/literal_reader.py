@@ -19,6 +19,7 @@ import pint
 import pyarrow.parquet
 
 from twin.measurements import Recording
+from twin.prediction.storage import correlations
 from twin.prediction.twin import Twin
 from twin.robots import Robot
 from twin.robots.schema import SOURCE_OF_DEFAULT
@@ -138,7 +139,7 @@ def number_or_table(entry: object, unit: str, what: str) -> float:
 
 
 def check_twin(path: Path, twin: Twin) -> None:
-    file = only("twin.toml", tomllib.loads(text_of(path)), "format robot parameters effect provenance")
+    file = only("twin.toml", tomllib.loads(text_of(path)), "format robot parameters effect correlation provenance")
     same("format", file["format"], "twin/1")
     same("robot", Path(file["robot"]).name, twin.robot.name)
     units = {p.name: p.unit for p in twin.robot.parameters}
@@ -147,6 +148,17 @@ def check_twin(path: Path, twin: Twin) -> None:
     for name, entry in written.items():
         same(name, number_or_table(entry, units[name], name), float(twin.values[name]))
     check_effects(file.get("effect", []), [(e.id, e.values) for e in twin.effects], twin)
+    if "correlation" in file:
+        check_correlation(file["correlation"], path)
+
+
+def check_correlation(table: object, path: Path) -> None:
+    """Of the errors, which a twin holds no more than its standard errors: read apart."""
+    written, read = only("correlation", table, "parameters matrix"), correlations(path)
+    names, matrix = written["parameters"], np.array([[plain(x, "matrix") for x in row] for row in written["matrix"]])
+    if matrix.size and (matrix.shape != (len(names),) * 2 or np.abs(matrix - matrix.T).max() > 1e-3 or np.abs(matrix).max() > 1.0):
+        raise Differs(f"correlation: {table!r} was taken for one")
+    same("correlation", read, {(a, b): float(matrix[i, j]) for i, a in enumerate(names) for j, b in enumerate(names)})
 
 
 SI = {

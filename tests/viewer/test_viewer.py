@@ -20,17 +20,19 @@ from twin.cli.use.view import View
 from twin.foundation.errors import DataError
 from twin.prediction.evaluate import evaluate
 from twin.prediction.kinematics import warmest_current
+from twin.prediction.rollout import full_pull
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
 from twin.viewer import TwinPanel
 from twin.viewer import app as app_module
 from twin.viewer import panel as panel_module
 from twin.viewer import replay as replay_module
+from twin.viewer.drawing import headless
 from twin.viewer.drawing.colours import colour_bar, colour_values
 from twin.viewer.drawing.film import Film
+from twin.viewer.drawing.tip_loop import TipLoop, draw_svg
 from twin.viewer.live import LiveHeatedRobot, LiveRobot
 from twin.viewer.replay import MOST_PREDICTIONS, Replay
-from twin.viewer.tip_loop import TipLoop, draw_svg
 
 G = np.array([0.0, 0.0, 9.81])
 
@@ -259,6 +261,60 @@ def test_a_push_taken_at_a_point_is_at_that_point(server: Any, robot: str) -> No
     assert app.shown_twins[0].scene.point_on_ray(shown, np.array([9.0, 9.0, 9.0]), np.array([1.0, 0.0, 0.0])) is None
 
 
+def driven(app: TwinPanel, drive: str, *values: float) -> str:
+    """The words of the page with the sliders of a drive at these values, the others at zero."""
+    hand = app.controls
+    hand.drive_choice.value = drive
+    app._pending.append(app._release)
+    app.tick()
+    for slider, value in zip(hand.pulls, values, strict=False):
+        slider.value = value
+    app._redraw = True
+    app.tick()
+    return app.words.content
+
+
+@pytest.mark.parametrize("robot", ["continuum", "finger", "three_cable"])
+def test_lengths_move_in_bends_that_jam_nothing(server: Any, robot: str) -> None:
+    """0.2 mm of one tendon alone pulled all of a rod's to 16.7 N. A bend of one full pull takes about one full pull's tension."""
+    twin = Twin.of(robot)
+    app, full = TwinPanel(server, [("", twin)]), full_pull(twin)
+    for share, most in ((0.02, 0.1), (1.0, 1.3)):
+        bend = 1e3 * share * full.displacement
+        assert "tip at" in driven(app, "displacement", bend)
+        assert app.controls.command == pytest.approx(share * full.displacement * full.towards[:, 0])
+        frames = app.shown_twins[0].frames
+        assert frames is not None
+        assert frames.tension.max() < most * full.tension
+    # Both ends at once are a bend no larger than one.
+    end = app.controls.pulls[0].max
+    assert "tip at" in driven(app, "displacement", end, end)
+    assert np.abs(app.controls.command).max() <= 1e-3 * end * (1.0 + 1e-9)
+
+
+def test_fingers_are_named(server: Any) -> None:
+    app = TwinPanel(server, [("", Twin.of("hand"))])
+    words = driven(app, "tension", *[0.0] * 4, 1.0)  # finger 2 tendon 1
+    assert [s.label for s in app.controls.pulls[3:6]] == ["finger 1 tendon 4, N", "finger 2 tendon 1, N", "finger 2 tendon 2, N"]
+    rest = driven(app, "tension")
+    moved = [
+        line.partition(" tip at")[0] for line, before in zip(words.splitlines(), rest.splitlines(), strict=True) if line != before
+    ]
+    assert moved[0] == "finger 2"
+    assert moved[1].startswith("tension along")
+    assert len(moved) == 2
+    assert [line[:15] for line in rest.splitlines()[:3]] == [f"finger {k} tip at" for k in (1, 2, 3)]
+    driven(app, "displacement", 0.0, 0.0, 0.0, 0.0, 0.0, 3.0)
+    assert app.controls.pulls[5].label == "finger 3 bend y, mm"
+    lengths = app.controls.command.reshape(3, 4)
+    assert lengths[:2].tolist() == np.zeros((2, 4)).tolist()
+    # Finger 3 stands at 240 degrees, its tendons 1 and 3 towards and from the palm's axis, 2 and 4 across.
+    assert lengths[2] == pytest.approx(3e-3 * np.array([np.sqrt(0.75), 0.5, -np.sqrt(0.75), -0.5]), abs=1e-5)
+    one = TwinPanel(server, [("", Twin.of("finger"))])
+    assert one.controls.pulls[0].label == "tendon 1, N"
+    assert driven(one, "tension").startswith("tip at x **")
+
+
 def test_a_film_has_every_instant_from_first_to_last(server: Any) -> None:
     app = TwinPanel(server, [("", rubbing())], sample())
     app.tick()
@@ -282,6 +338,40 @@ def test_a_film_has_every_instant_from_first_to_last(server: Any) -> None:
     assert picture.size == (800, 600)
     with pytest.raises(DataError, match=r"set the speed to 2\.1 or more"):
         Film(client, 100.0, 1.0)
+
+
+def test_a_film_begins_once_the_browser_looks_from_the_servers_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It connects with viser's own camera (3, 3, 3): a first picture from there came in three films of three."""
+    camera, polls = SimpleNamespace(position=np.array([3.0, 3.0, -3.0])), []
+
+    def clients() -> dict[int, Any]:
+        polls.append(1)
+        if len(polls) == 4:
+            camera.position = np.array([0.0, -1.45, 0.15])
+        return {} if len(polls) == 1 else {0: SimpleNamespace(camera=camera)}
+
+    server = cast(Any, SimpleNamespace(get_clients=clients, initial_camera=SimpleNamespace(position=(0.0, -1.45, 0.15))))
+    now = [0.0]
+    clock = SimpleNamespace(monotonic=lambda: now[0], sleep=lambda s: now.__setitem__(0, now[0] + s))
+    monkeypatch.setattr(headless, "time", clock)
+    assert headless._placed_client(server).camera is camera
+    assert len(polls) == 4
+    camera.position = np.array([3.0, 3.0, -3.0])
+    with pytest.raises(DataError, match="did not open the viewer within 60 s"):
+        headless._placed_client(server)
+
+
+def test_a_film_begins_once_pictures_stay_alike() -> None:
+    """The first are darker, as the page loads its light while it draws: two of those, then one between, then the same for good."""
+    shades = iter([40, 40, 120, 200, 200, 200])
+    drawn: list[int] = []
+
+    def get_render(high: int, wide: int, timeout: float) -> np.ndarray:
+        drawn.append(next(shades))
+        return np.full((high, wide, 3), drawn[-1], np.uint8)
+
+    headless._await_light(cast(Any, SimpleNamespace(get_render=get_render)))
+    assert drawn == [40, 40, 120, 200, 200]
 
 
 def test_a_browser_that_goes_ends_its_film_and_nothing_else(server: Any) -> None:

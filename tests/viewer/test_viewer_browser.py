@@ -6,9 +6,13 @@ Needs Chromium (Debian's `chromium`) and is skipped, loudly, where there is none
 from __future__ import annotations
 
 import io
+import threading
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+import viser
 from PIL import Image
 
 from tests.viewer_page import Look, Page, browser, look, rubbing, sample, served
@@ -16,6 +20,8 @@ from twin.body import Drive
 from twin.prediction.twin import Twin
 from twin.viewer import TwinPanel
 from twin.viewer.drawing import film as film_module
+from twin.viewer.panel import open_panel, start_server
+from twin.viewer.waiting import WorkNotice
 
 __all__ = ["browser", "look"]  # fixtures
 
@@ -131,3 +137,43 @@ def test_two_twins_two_clients_one_that_goes_and_a_second_server_on_the_port(loo
         assert second.changed(before)
         with served([("", Twin.of("continuum"))], port=int(here.address.rpartition(":")[2])) as other:
             assert other.address != here.address
+
+
+def test_a_page_opened_before_the_robot_says_what_it_waits_for_and_lives(look: Look) -> None:
+    """Five seconds of work in place of a compiler: the page counts them and takes what is entered; its camera is then the one it
+    would have had."""
+    server = start_server("127.0.0.1", 8690)
+    notice, over, panels = WorkNotice(server), threading.Event(), list[TwinPanel]()
+
+    def make(on: viser.ViserServer) -> TwinPanel:
+        panel = TwinPanel(on, [("", Twin.of("continuum"))])
+        time.sleep(5.0)
+        return panel
+
+    def work() -> None:
+        with notice:
+            panels.append(open_panel(make, server))
+        while not over.wait(0.01):
+            with notice:
+                panels[0].tick()
+
+    thread = threading.Thread(target=work)
+    try:
+        page = look(f"http://127.0.0.1:{server.get_port()}")
+        thread.start()
+        words = page.page.get_by_text("compiling and solving, ")
+        assert page.until(words.is_visible)
+        first = words.inner_text()
+        assert page.until(lambda: words.is_visible() and words.inner_text() != first)
+        page.put("tendon 1, N", "2")
+        assert not panels  # entered while the work went on
+        assert page.until(lambda: bool(panels) and "2.00 N" in panels[0].words.content)
+        assert page.until(lambda: not words.is_visible())
+        client = next(iter(server.get_clients().values()))
+        assert page.until(lambda: bool(np.allclose(client.camera.position, server.initial_camera.position, atol=1e-3)))
+        assert page.there()
+    finally:
+        over.set()
+        thread.join()
+        notice.close()
+        server.stop()

@@ -21,13 +21,19 @@ def load_set_and_twin(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
     return recording, read_twin(twin) if twin else Twin.of_recording(recording)
 
 
-def load_finger_set(folder: Path, twin: str | None) -> tuple[Any, Any]:
-    """Return the recording, of one trial or more, and a twin of its robot. Raises DataError for a twin of another robot."""
+def load_finger_set(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
+    """Return the recording, by default the bundled day with clouds, of one trial or more, and a twin of its robot.
+
+    Raises DataError for a twin of another robot.
+    """
     from twin.measurements import read
     from twin.prediction.storage import read_twin
     from twin.prediction.twin import Twin
-    from twin.robots import load
+    from twin.robots import load, sample
 
+    if folder is None:
+        folder = sample("monday")
+        out.print("no measurement set given: using the bundled day with clouds (simulated, see its `source`)")
     recording = read(folder, least_trials=1)
     robot = load(recording.robot, recording.folder)
     found = read_twin(twin) if twin else Twin.of(robot)

@@ -144,7 +144,7 @@ class ContinuumReach(TwinEnv):
         """Return (480, 640, 3) bytes with `render_mode="rgb_array"`. Raises TwinError where this machine cannot draw."""
         if self.render_mode is None:
             return None
-        self._renderer = self._renderer or FrameRenderer(self.plant.body.spec, self.length)
+        self._renderer = self._renderer or FrameRenderer(self.plant.body.spec, self.length, self.described.robot.gravity[2] > 0.0)
         return self._renderer.draw(self.plant.q, [Mark(self.goal, 0.025 * self.length)])
 
     @property

@@ -35,7 +35,7 @@ def load(
     if task not in DM_TASKS:
         raise UnknownNameError("task", task, list(DM_TASKS))
     physics = Physics(DM_TASKS[task](twin, **options), seed)
-    steps = ENVIRONMENTS[f"{task}-v0"][1]
+    steps = ENVIRONMENTS[f"{task}-v0"].steps
     return control.Environment(physics, Task(), time_limit=(steps - 0.5) * physics.timestep())
 
 

@@ -1,19 +1,22 @@
 """`twin.toml`: the robot, the calibrated parameters and the effects in force, all that a prediction needs."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 from pydantic import Field
 
+from twin.effects import catalogue
 from twin.foundation.atomic_write import write_atomically
 from twin.foundation.errors import DataError, join_problems, short_repr
 from twin.foundation.file_schema import TableSchema, TextLine, validate_table
 from twin.foundation.files import is_file
 from twin.foundation.parameters import FittedValue
 from twin.foundation.toml_file import open_toml
+from twin.prediction.joint_errors import CorrelationTable
 from twin.prediction.twin import Twin
 from twin.robots import Robot, load, robot_names
 from twin.robots.effect_tables import read_effects, read_values
@@ -57,6 +60,18 @@ def standard_errors(source: str | Path) -> dict[str, float]:
     return {n: float(e["std"]) for n, e in entries.items() if isinstance(e, dict) and isinstance(e.get("std"), float)}
 
 
+def correlations(source: str | Path) -> dict[tuple[str, str], float] | None:
+    """Return the correlations of the errors that `standard_errors` names, by pairs; None where the twin's file has none."""
+    path = Path(source)
+    path = path / "twin.toml" if is_file(path / "twin.toml") else path
+    if path.suffix != ".toml":
+        return None
+    with open_toml(path, TWIN_FORMAT) as table:
+        file = validate_table(TwinFile, table, "", [])
+    together = None if file is None else validate_table(CorrelationTable, file.correlation, "correlation", [])
+    return None if together is None else together.pairs()
+
+
 class TwinFile(TableSchema):
     """The top of a `twin.toml`."""
 
@@ -64,6 +79,7 @@ class TwinFile(TableSchema):
     robot: TextLine = Field(description="a robot's name, or the path to its folder from this file")
     parameters: dict[str, Any] = Field({}, description="calibrated values; what is absent keeps the robot's nominal value")
     effect: list[Any] = Field([], description="[[effect]] tables: the laws in force")
+    correlation: dict[str, Any] | None = Field(None, description="how the errors of fitted values go together")
     provenance: dict[str, Any] = Field({}, description="versions, seed, data hash, command, date; free")
 
 
@@ -76,6 +92,10 @@ def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
     robot = load(file.robot, folder)
     values = read_values(file.parameters, robot.parameters, "parameters", problems)
     effects = read_effects(file.effect, robot.n_tendon, robot.size, problems)
+    together = None if file.correlation is None else validate_table(CorrelationTable, file.correlation, "correlation", problems)
+    if together is not None:
+        of_effects = (f"{e}.{p.name}" for e, kind in catalogue().items() for p in kind.all_parameters(robot.n_tendon))
+        problems += together.faults({*(p.name for p in robot.parameters), *of_effects})
     if not problems:
         problems += robot.find_conflicts(values)
     if problems:
@@ -86,7 +106,8 @@ def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
 def twin_table(
     twin: Twin, folder: Path, parameters: Mapping[str, FittedValue], effects: Mapping[str, Mapping[str, FittedValue]]
 ) -> dict[str, Any]:
-    """Return a twin as the content of its file in `folder`, with standard errors where a fit found them."""
+    """Return a twin as the content of its file in `folder`, with standard errors where a fit found them; `twin_text` adds
+    correlations."""
     units = {p.name: p.unit for p in twin.robot.parameters}
     table: dict[str, Any] = {"format": TWIN_FORMAT, "robot": robot_reference(twin.robot, folder)}
     table["parameters"] = {
@@ -115,11 +136,17 @@ def value_entry(fitted: FittedValue) -> dict[str, Any]:
     return out if fitted.std is None else {**out, "std": fitted.std}
 
 
-def write_twin(path: Path, table: Mapping[str, Any], provenance: Mapping[str, Any]) -> None:
+def write_twin(
+    path: Path, table: Mapping[str, Any], provenance: Mapping[str, Any], correlation: tuple[Sequence[str], np.ndarray] | None = None
+) -> None:  # fmt: skip
     """Write a twin completely or not at all, through a temporary file."""
-    write_atomically(path, twin_text(table, provenance).encode(), "give another place with --out")
+    write_atomically(path, twin_text(table, provenance, correlation).encode(), "give another place with --out")
 
 
-def twin_text(table: Mapping[str, Any], provenance: Mapping[str, Any]) -> str:
-    """Return the text of a `twin.toml`."""
-    return tomli_w.dumps({**table, "provenance": dict(provenance)})
+def twin_text(
+    table: Mapping[str, Any], provenance: Mapping[str, Any], correlation: tuple[Sequence[str], np.ndarray] | None = None
+) -> str:  # fmt: skip
+    """Return the text of a `twin.toml`, with the `correlation` (p, p) of the errors of named parameters."""
+    together = None if correlation is None else CorrelationTable.of(*correlation)
+    text = tomli_w.dumps({**table, "provenance": dict(provenance)})
+    return text if together is None else f"{text}\n{together.text()}"

@@ -35,7 +35,7 @@ def write(diagnosis: Diagnosis, folder: Path | str, provenance: Mapping[str, Any
     for effect, p in diagnosis.prepared.robot.uncertain:
         effects.setdefault(effect, {})[p.name] = diagnosis.parameters[f"{effect}.{p.name}"]
     table = twin_table(diagnosis.twin, folder, diagnosis.parameters, effects)
-    texts["twin.toml"] = twin_text(table, provenance)
+    texts["twin.toml"] = twin_text(table, provenance, diagnosis.correlation)
     files = _model_files(diagnosis, effects)
     way_out = "give a folder you may write to"
     try:

@@ -4,8 +4,8 @@ app.py         the panel of twins                    trials.py      the panel of
 panel.py       what panels share, and their loop     address.py     host and port, checked before serving
 controls.py    sliders of a robot by hand            live.py        the robot under these sliders
 replay.py      trials of a set, predicted            scrubber.py    clock and error plots of a replay
-shown_twin.py  one of the twins shown                tip_loop.py    the error of the tip against the pull
-drawing/       scene, solids, colours, pictures and films
+shown_twin.py  one of the twins shown                waiting.py     says in the page what takes long
+drawing/       scene, solids, colours, plots, pictures and films
 """
 
 from twin.viewer.app import TwinPanel

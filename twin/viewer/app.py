@@ -11,7 +11,7 @@ from twin.body.drawable import Frames
 from twin.foundation.errors import DataError
 from twin.measurements import Recording
 from twin.prediction.twin import Twin
-from twin.viewer.controls import LARGEST_PUSH, HandControls
+from twin.viewer.controls import LARGEST_PUSH, HandControls, finger_name
 from twin.viewer.drawing.scene import place_robots
 from twin.viewer.panel import Panel
 from twin.viewer.replay import PredictedTrial
@@ -187,7 +187,7 @@ class TwinPanel(Panel):
             side.scene.draw_ghost(None)
             if len(side.figure.push_points):
                 side.scene.draw_push(side.figure.push_positions(shown)[hand.pushed_point()], hand.force / LARGEST_PUSH)
-            lines.append(_name_prefix(side) + _describe_pose(shown, side.figure.tip) + _describe_heating(side))
+            lines.append(_name_prefix(side) + _describe_pose(shown, side.figure.tip, hand.fingers) + _describe_heating(side))
         self.words.content = "  \n".join(lines)
 
     def _fit_colour_ranges(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
@@ -204,14 +204,16 @@ def _name_prefix(side: ShownTwin) -> str:
     return f"{side.name}: " if side.name else ""
 
 
-def _describe_pose(shown: Frames, tip: int) -> str:
+def _describe_pose(shown: Frames, tip: int, fingers: int) -> str:
+    """Describe where each finger's tip is, or the marker `tip` of one body, and the tensions."""
     told = []
     if shown.markers.size:
-        x, y, z = 1e3 * shown.markers[0, tip]
-        told.append(f"tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm")
+        ends = shown.markers[0].reshape(fingers, -1, 3)[:, -1] if fingers > 1 else shown.markers[0, [tip]]
+        for k, (x, y, z) in enumerate(1e3 * ends):
+            told.append(f"{finger_name(k, fingers)}tip at x **{x:z.1f}**, y **{y:z.1f}**, z **{z:z.1f}** mm")
     if shown.tension.size:
         told.append(f"tension along the tendons {shown.tension.min():.2f} to {shown.tension.max():.2f} N")
-    return "; ".join(told)
+    return ("  \n" if fingers > 1 else "; ").join(told)
 
 
 def _describe_heating(side: ShownTwin) -> str:

@@ -23,7 +23,7 @@ DRIVE_WORDS = {  # drive -> name, unit, hint, SI value of one unit
     Drive.DISPLACEMENT: (
         "displacement",
         "mm",
-        "length that the motor takes up from the rest pose, negative lets out; the other motors hold",
+        "length that motors on this side take up from the rest pose and those opposite let out; none is wound in alone, which jams",
         1e-3,
     ),
     Drive.CONTROL: ("control", "", "control of the model's actuator", 1.0),
@@ -37,6 +37,7 @@ class HandControls:
     def __init__(self, gui: viser.GuiApi, twin: Twin, figure: Drawable, changed: Callable[[Any], None]) -> None:
         """Call `changed` with every handle that a user may move. Raises DataError for a robot that no pull bends sideways."""
         self._twin, self._gravity, self._figure, self.warmest_spring = twin, twin.robot.gravity, figure, 0.0
+        self.fingers = fingers(figure)
         self.drives = _available_drives(twin)
         self.largest_tension: float | None = None
         if Drive.CONTROL in self.drives:
@@ -62,27 +63,19 @@ class HandControls:
         if Drive.CURRENT in self.drives:
             amperes, self.warmest_spring = warmest_current(twin)
             most[Drive.CURRENT] = round(amperes, 2)
-        # A motor can take up only the length that others let out.
-        least = {d: -most[d] if d is Drive.DISPLACEMENT else 0.0 for d in most}
         names = tuple(DRIVE_WORDS[d][0] for d in self.drives)
         self.drive_choice = gui.add_dropdown(
             "pull by", names, visible=len(names) > 1, hint="what the motors hold, or what heats the springs"
         )
-        self.sliders = {
-            d: [
-                gui.add_slider(
-                    f"{_driven_part(d)} {i}, {DRIVE_WORDS[d][1]}",
-                    least[d],
-                    most[d],
-                    0.01,
-                    0.0,
-                    hint=DRIVE_WORDS[d][2],
-                    visible=d is first,
-                )
-                for i in range(1, twin.robot.n_tendon + 1)
+        self._largest_bend, self._bends = most[Drive.DISPLACEMENT], _bends_by_finger(full.towards, self.fingers)
+        self.sliders = {}
+        for d in self.drives:
+            bends = d is Drive.DISPLACEMENT
+            (_, unit, hint, _), least = DRIVE_WORDS[d], -most[d] if bends else 0.0
+            self.sliders[d] = [
+                gui.add_slider(f"{part}, {unit}", least, most[d], 0.01, 0.0, hint=hint, visible=d is first)
+                for part in (self._bend_names() if bends else self._tendon_names(_driven_part(d), twin.robot.n_tendon))
             ]
-            for d in self.drives
-        }
         self.largest_tension = most[Drive.TENSION]
 
     def _add_control_sliders(self, gui: viser.GuiApi, twin: Twin) -> None:
@@ -102,6 +95,15 @@ class HandControls:
             sliders.append(gui.add_slider(f"{label}, {port.unit}", low, high, step, rest, hint=hint))
         self.sliders = {Drive.CONTROL: sliders}
 
+    def _tendon_names(self, part: str, n: int) -> list[str]:
+        """Return a name for each of n tendons, or springs, with its finger's where there are several."""
+        each = n // self.fingers
+        return [f"{finger_name(k // each, self.fingers)}{part} {k % each + 1}" for k in range(n)]
+
+    def _bend_names(self) -> list[str]:
+        """Return a name for each bend, with its finger's where there are several."""
+        return [f"{finger_name(k, self.fingers)}bend {axis}" for k in range(self.fingers) for axis in "xy"]
+
     def _clock_panel(self, gui: viser.GuiApi) -> None:
         self.clock = gui.add_slider(
             "clock x", 0.0, 60.0, 1.0, 10.0, visible=False, hint="how much faster than real time the springs run; 0 stops the clock"
@@ -116,8 +118,7 @@ class HandControls:
         self.azimuth = gui.add_slider("gravity azimuth, deg", 0, 355, 5, 0, hint="about the robot's axis")
 
     def _add_push_sliders(self, gui: viser.GuiApi) -> None:
-        tall, fingers = max(round(1e3 * self._figure.height), 1), 1 + int(self._figure.push_points[:, 2].max(initial=0.0))
-        able = bool(len(self._figure.push_points))
+        tall, able = max(round(1e3 * self._figure.height), 1), bool(len(self._figure.push_points))
         self.push = gui.add_slider(
             "push, N", 0.0, LARGEST_PUSH, 0.005, 0.0, hint="force at one point, drawn as an orange arrow", visible=able
         )
@@ -133,8 +134,8 @@ class HandControls:
         about, lift = "direction about the robot's axis, 0 along x", "direction: 0 sideways, 90 from base to tip"
         self.push_azimuth = gui.add_slider("push azimuth, deg", 0, 355, 5, 0, hint=about, visible=able)
         self.push_lift = gui.add_slider("push lift, deg", -90, 90, 5, 0, hint=lift, visible=able)
-        names = tuple(str(k) for k in range(1, fingers + 1))
-        self.finger = gui.add_dropdown("pushed finger", names, visible=fingers > 1, hint="number around the palm, from x")
+        names = tuple(str(k) for k in range(1, self.fingers + 1))
+        self.finger = gui.add_dropdown("pushed finger", names, visible=self.fingers > 1, hint="number around the palm, from x")
 
     def release(self) -> None:
         """Set all pulls to zero and show only the sliders of the chosen drive."""
@@ -155,8 +156,13 @@ class HandControls:
 
     @property
     def command(self) -> np.ndarray:
-        """Return the pulls of the sliders, (n_tendon,) SI."""
-        return np.array([p.value for p in self.pulls]) * DRIVE_WORDS[self.drive][3]
+        """Return the pulls that the sliders ask for, (n_tendon,) SI. A bend is no larger than a slider's end in any direction."""
+        values, unit = np.array([p.value for p in self.pulls]), DRIVE_WORDS[self.drive][3]
+        if self.drive is not Drive.DISPLACEMENT:
+            return unit * values
+        bends = values.reshape(-1, 2)
+        size = np.linalg.norm(bends, axis=1, keepdims=True)
+        return unit * self._bends @ (bends * np.minimum(1.0, self._largest_bend / np.maximum(size, 1e-12))).ravel()
 
     @property
     def force(self) -> np.ndarray:
@@ -192,6 +198,28 @@ class HandControls:
         axis = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         along = g * np.cos(tilt) + np.cross(axis, g) * np.sin(tilt) + axis * (axis @ g) * (1.0 - np.cos(tilt))  # Rodrigues
         return Loads(along, 1e-3 * self.payload.value, push=self.applied_push if self.push.value else None)
+
+
+def fingers(figure: Drawable) -> int:
+    """Return how many fingers a figure has; a backbone is one."""
+    return 1 + int(figure.push_points[:, 2].max(initial=0.0))
+
+
+def finger_name(k: int, of: int) -> str:
+    """Return how finger k (from 0) is named before a part of it, empty for the only one."""
+    return f"finger {k + 1} " if of > 1 else ""
+
+
+def _bends_by_finger(towards: np.ndarray, fingers: int) -> np.ndarray:
+    """Return lengths (n_tendon, 2 fingers) by bends along x and y, for tendons that bend `towards` (n_tendon, 2).
+
+    A tendon is taken up by the component of its own finger's bend towards it, and let out by that away from it.
+    """
+    n = len(towards)
+    own = np.arange(n) // (n // fingers)
+    lengths = np.zeros((n, fingers, 2))
+    lengths[np.arange(n), own] = towards
+    return lengths.reshape(n, 2 * fingers)
 
 
 def _driven_part(drive: Drive) -> str:

@@ -16,6 +16,7 @@ from twin.viewer.address import free_port
 from twin.viewer.drawing.colours import colour_bar
 from twin.viewer.drawing.film import Film, add_caption, encode_png, strip_markdown, take_picture
 from twin.viewer.scrubber import Clock
+from twin.viewer.waiting import WorkNotice
 
 LOOP_RATE = 60.0  # Hz, of the loop
 LONGEST_TICK = 0.25  # s; after a longer delay the clock does not catch up
@@ -132,11 +133,12 @@ class Panel(ABC):
 
     # ---- the loop -------------------------------------------------------------------------------------------------------
 
-    def run(self) -> None:
-        """Serve until interrupted."""
+    def run(self, notice: WorkNotice) -> None:
+        """Serve until interrupted; `notice` tells in the page what takes long."""
         while True:
             started = time.monotonic()
-            self.tick()
+            with notice:
+                self.tick()
             time.sleep(max(0.001, 1.0 / LOOP_RATE - (time.monotonic() - started)))
 
     def tick(self) -> None:
@@ -166,12 +168,30 @@ def start_server(host: str, port: int, label: str | None = None) -> viser.ViserS
 
 
 def serve(make: MakePanel, name: str, host: str, port: int, announce: Callable[[int], None]) -> None:
-    """Serve at the first free port from `port` on until interrupted; `announce` the port once the first picture is drawn."""
+    """Serve at the first free port from `port` on until interrupted; `announce` the port at once.
+
+    A page that is opened before the first picture says what it waits for.
+    """
     server = start_server(host, port, f"twin view {name}")
+    notice = WorkNotice(server)
     try:
-        panel = make(server)
-        panel.tick()
         announce(server.get_port())
-        panel.run()
+        with notice:
+            panel = open_panel(make, server)
+        panel.run(notice)
     finally:
+        notice.close()
         server.stop()
+
+
+def open_panel(make: MakePanel, server: viser.ViserServer) -> Panel:
+    """Return the panel with its first picture, and set the cameras of pages that were opened before the panel set one for all."""
+    panel = make(server)
+    panel.tick()
+    for client in server.get_clients().values():
+        camera, wanted = client.camera, server.initial_camera
+        with client.atomic():
+            if wanted.up is not None:
+                camera.up_direction = wanted.up
+            camera.position, camera.look_at = wanted.position, wanted.look_at
+    return panel

@@ -7,8 +7,8 @@ import numpy as np
 import viser
 import viser.uplot
 
+from twin.viewer.drawing.tip_loop import TipLoop, draw_svg
 from twin.viewer.replay import PredictedTrial, Replay
-from twin.viewer.tip_loop import TipLoop, draw_svg
 
 LINE_COLOURS = ("#999999", "#1f77b4", "#9467bd")
 PRESENT_SERIES = {"label": "now", "stroke": "#d62728"}

@@ -57,7 +57,7 @@ class Calibrate:
         table = twin_table(
             fitted.model.twin, self.out.parent, found, {e.id: fitted.fitted(e.id) for e in fitted.model.twin.effects}
         )
-        write_twin(self.out, table, report.provenance(recording, settings, command_line()))
+        write_twin(self.out, table, report.provenance(recording, settings, command_line()), fitted.correlation())
         out.print(f"twin: {self.out}", highlight=False, markup=False)
 
 

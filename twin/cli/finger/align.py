@@ -18,8 +18,13 @@ class Align:
     Writes twin.toml, alignment.json and alignment.txt.
     """
 
-    set: Positional[Annotated[Path, arg(help="folder of a measurement set with clouds and at least one trial without a hand")]]
     out: Annotated[Path, arg(help="folder for the aligned twin")]
+    set: Positional[
+        Annotated[
+            Path | None,
+            arg(help="folder of a measurement set with clouds and at least one trial without a hand; default: the bundled day"),
+        ]
+    ] = None
     twin: Annotated[str | None, arg(help="start: a twin.toml or a robot's name; default: the robot named in the set")] = None
 
     def run(self) -> None:

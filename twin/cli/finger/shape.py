@@ -17,9 +17,9 @@ class Shape:
     Writes NAME_time, NAME_vertices, NAME_std, NAME_outside and NAME_cloud of every trial, in metres.
     """
 
-    set: Positional[Annotated[Path, arg(help="folder of a measurement set")]]
     twin: Annotated[str, arg(help="an aligned twin: its folder or twin.toml, or a robot's name")]
     out: Annotated[Path, arg(help="the npz file to write")]
+    set: Positional[Annotated[Path | None, arg(help="folder of a measurement set; default: the bundled day")]] = None
     estimator: Annotated[str, arg(help="name of the estimator; an unknown name lists those available")] = "modal"
 
     def run(self) -> None:

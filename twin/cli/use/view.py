@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -55,15 +54,12 @@ class View:
 
         free_port(self.host, self.port)  # before the work of reading and drawing
         name, make, _ = self._task_panel() or self._twin_panel()
-        with ExitStack() as spinner:
-            spinner.enter_context(show_progress(f"drawing {name}"))
 
-            def announce(port: int) -> None:
-                spinner.close()
-                for line in opening_words(self.host, port):
-                    out.print(line, highlight=False, markup=False, soft_wrap=True)
+        def announce(port: int) -> None:
+            for line in opening_words(self.host, port):
+                out.print(line, highlight=False, markup=False, soft_wrap=True)
 
-            serve(make, name, self.host, self.port, announce)
+        serve(make, name, self.host, self.port, announce)
 
     def _take_film(self, path: Path) -> None:
         from twin.viewer import take_film

@@ -1,7 +1,7 @@
 """Draw twins from the uncertainty of a robot: the errors of its diagnosis, doubtful effects, and plain ranges.
 
-Parameters are drawn jointly, normal about their values with the standard errors of twin.toml and the correlations of the report
-beside it (independently without a report), and clipped to their bounds.
+Parameters are drawn jointly, normal about their values with the full covariance of twin.toml: its standard errors and its
+correlations, or for older files those of the report beside it (independently without either), and clipped to their bounds.
 """
 
 import json
@@ -19,7 +19,7 @@ from twin.foundation.files import is_file
 from twin.foundation.parameters import Parameter
 from twin.foundation.toml_file import open_toml
 from twin.foundation.units import unit_scale
-from twin.prediction.storage import TWIN_FORMAT
+from twin.prediction.storage import TWIN_FORMAT, correlations
 from twin.prediction.twin import Twin
 
 
@@ -63,12 +63,20 @@ def read_spread(source: str | Path, twin: Twin) -> ParameterSpread:
         for c in report_table.get("effects", [])
         if c.get("probability") is not None and c["id"] in known
     }
-    correlation_table = report_table.get("correlation", {"parameters": [], "matrix": []})
-    names = correlation_table["parameters"]
-    correlation = {
-        (a, b): float(x) for a, row in zip(names, correlation_table["matrix"], strict=True) for b, x in zip(names, row, strict=True)
+    together = correlations(path)
+    return ParameterSpread(std, probability, _reported_correlations(report_table) if together is None else together)
+
+
+def _reported_correlations(report: Mapping[str, Any]) -> dict[tuple[str, str], float]:
+    """Return the correlations by pairs of a report.json, for a twin.toml from before it kept its own; null stands for none."""
+    table = report.get("correlation", {"parameters": [], "matrix": []})
+    names = table["parameters"]
+    return {
+        (a, b): float(x)
+        for a, row in zip(names, table["matrix"], strict=True)
+        for b, x in zip(names, row, strict=True)
+        if x is not None
     }
-    return ParameterSpread(std, probability, correlation)
 
 
 def _read_stds(table: Mapping[str, Any], units: Mapping[str, str], prefix: str) -> dict[str, float]:

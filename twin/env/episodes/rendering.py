@@ -67,6 +67,10 @@ class FrameRenderer:
         self._camera.azimuth, self._camera.elevation = 130.0, -20.0 * up
         self._renderer = _open_renderer(self._model)
 
+    def move(self, name: str, height: float) -> None:
+        """Move a body that has no coordinates, to this height (m)."""
+        self._model.body(name).pos[2] = height
+
     def draw(self, q: np.ndarray, marks: Sequence[Mark]) -> np.ndarray:
         """Return a frame (FRAME_HEIGHT, FRAME_WIDTH, 3), bytes, of the model at coordinates q (nq,), with marks."""
         model, data = self._model, self._data

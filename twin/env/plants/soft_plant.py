@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from twin.body import Drive, Loads, Problem
+from twin.body import Drive, Loads, Problem, Route
 from twin.env.episodes.validation import select_arrays
 from twin.env.plants.effect_io import EffectIO
 from twin.env.plants.rod_plant import get_mujoco_state, set_mujoco_state
 from twin.foundation.errors import DataError
+from twin.mechanics.silicone import HandBody
 from twin.mechanics.silicone.material.flex import flex_spec
 from twin.mechanics.silicone.motion.dynamics import CreepBetweenSamples, RestingBody, SoftMotion, motion_step
 from twin.mechanics.silicone.motion.scene import Scene, SceneState, Thing
@@ -100,6 +101,21 @@ class FingerPlant:
         )
 
 
+def hand_among_things(twin: Twin) -> tuple[HandBody, np.ndarray, Route]:
+    """Return the hand of a twin, gravity (3,) m/s^2 in the palm's frame and the tendons' route.
+
+    Raises DataError for a robot that is no hand and for effects that do not act among things.
+    """
+    body = twin.robot.hand(twin.body())
+    idle = [e.id for e in twin.effects if e.acts_in("soften", "deform", "command", "drive", "sense")]
+    if idle:
+        raise DataError(f"effects {', '.join(idle)} do not act among things that the hand touches: remove them from the twin")
+    loads = twin.effect_chain.surround(Loads(twin.robot.gravity))
+    if loads.payload or loads.force.any() or loads.wall[4]:
+        raise DataError("a payload, a force or a wall does not act among things that the hand touches: remove that effect")
+    return body, loads.gravity, twin.effect_chain.route
+
+
 class HandPlant:
     """A hand and things, its pairs of antagonist tendons driven by servos. One instance serves one thread."""
 
@@ -108,14 +124,8 @@ class HandPlant:
 
         Raises DataError for a robot that is no hand and for effects that do not act here, SolveError where it has no equilibrium.
         """
-        body = twin.robot.hand(twin.body())
-        idle = [e.id for e in twin.effects if e.acts_in("soften", "deform", "command", "drive", "sense")]
-        if idle:
-            raise DataError(f"effects {', '.join(idle)} do not act among things that the hand touches: remove them from the twin")
-        loads = twin.effect_chain.surround(Loads(twin.robot.gravity))
-        if loads.payload or loads.force.any() or loads.wall[4]:
-            raise DataError("a payload, a force or a wall does not act among things that the hand touches: remove that effect")
-        self.body, self.scene = body, StoredScene(body, things, loads.gravity, twin.effect_chain.route)
+        body, gravity, route = hand_among_things(twin)
+        self.body, self.scene = body, Scene(body, things, gravity, route)
         self.interval = max(1, round(interval / self.scene.motion.step)) * self.scene.motion.step
         self.rest = np.stack([finger.cords.rest for finger in body.fingers])
         self.state = self.scene.observe()
@@ -144,14 +154,6 @@ class HandPlant:
         scene: dict[str, Any] = {name: a.copy() if a.ndim else a.item() for name, a in select_arrays(state, "scene").items()}
         self.state = SceneState(**scene)
         self.scene.restore_shortening(self.state.shortening)
-
-
-class StoredScene(Scene):
-    """A scene whose state can be restored."""
-
-    def restore_shortening(self, shortening: np.ndarray) -> None:
-        """Set the tendons' present shortenings (finger, tendon) m."""
-        self._shortening = shortening.copy()
 
 
 def get_motion_state(motion: SoftMotion) -> dict[str, np.ndarray]:

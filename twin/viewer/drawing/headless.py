@@ -7,15 +7,21 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import viser
+
 from twin.foundation.atomic_write import write_atomically
 from twin.foundation.errors import DataError
 from twin.viewer.address import THIS_MACHINE
-from twin.viewer.drawing.film import FILM_HEIGHT, FILM_WIDTH
+from twin.viewer.drawing.film import FILM_HEIGHT, FILM_WIDTH, take_picture
 from twin.viewer.panel import MakePanel, Panel, start_server
 
 BROWSER_NAMES = ("chromium", "chromium-browser", "google-chrome")
 FILM_PORT = 8080  # or the next free one
-BROWSER_TIMEOUT = 60.0  # s for the browser to connect
+BROWSER_TIMEOUT = 60.0  # s for the browser to connect and to take its camera
+CAMERA_TOLERANCE = 1e-3  # heights
+FIRST_TRIALS, MOST_TRIALS = 3, 20  # pictures before a film: the second may still be as dark as the first
+SAME_PICTURE = 0.1  # grey levels, mean difference of two pictures of the same
 # Without a screen; the processor draws.
 BROWSER_OPTIONS = (
     "--headless=new",
@@ -57,14 +63,8 @@ def take_film(make: MakePanel, trial: str | None, speed: float, out: Path, progr
 
 
 def _record(app: Panel, out: Path, progress: Callable[[str], None]) -> None:
-    end = time.monotonic() + BROWSER_TIMEOUT
-    while not app.server.get_clients():
-        if time.monotonic() > end:
-            raise DataError(
-                f"Chromium did not open the viewer within {BROWSER_TIMEOUT:.0f} s; save the film in the page of the viewer"
-            )
-        time.sleep(0.1)
-    client, made = next(iter(app.server.get_clients().values())), []
+    client, made = _placed_client(app.server), []
+    _await_light(client)
     app.begin_film(client, lambda _, content: made.append(content))
     while app.filming:
         app.tick()
@@ -72,3 +72,29 @@ def _record(app: Panel, out: Path, progress: Callable[[str], None]) -> None:
     if not made:
         raise DataError(app.words.content.strip("*"))
     write_atomically(out, made[0])
+
+
+def _placed_client(server: viser.ViserServer) -> viser.ClientHandle:
+    """Return the browser once it looks from the camera that the server gave it.
+
+    A page connects with viser's own camera and takes the server's some messages later: a picture before that is from elsewhere.
+    """
+    end = time.monotonic() + BROWSER_TIMEOUT
+    while time.monotonic() < end:
+        for client in server.get_clients().values():
+            if np.allclose(client.camera.position, server.initial_camera.position, atol=CAMERA_TOLERANCE):
+                return client
+        time.sleep(0.1)
+    raise DataError(f"Chromium did not open the viewer within {BROWSER_TIMEOUT:.0f} s; save the film in the page of the viewer")
+
+
+def _await_light(client: viser.ClientHandle) -> None:
+    """Wait until the browser draws the same picture twice: its first ones lack the light, which it loads beside drawing.
+
+    Raises DataError where it draws nothing.
+    """
+    pictures: list[np.ndarray] = []
+    while len(pictures) < MOST_TRIALS:
+        pictures.append(np.asarray(take_picture(client), int))
+        if len(pictures) >= FIRST_TRIALS and np.abs(pictures[-1] - pictures[-2]).mean() < SAME_PICTURE:
+            return

@@ -121,6 +121,10 @@ class Scene:
         """Move a fixed thing by (3,) m of the palm's frame; contacts do not see its speed."""
         self.model.body(name).pos += np.asarray(shift, float)
 
+    def restore_shortening(self, shortening: np.ndarray) -> None:
+        """Set the tendons' present shortenings (finger, tendon) m, beside a restored motion."""
+        self._shortening = shortening.copy()
+
     def observe(self) -> SceneState:
         """Return the present state."""
         data, hand = self.data, self.motion
