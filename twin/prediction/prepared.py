@@ -177,16 +177,20 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         )  # fmt: skip
         columns = [trial.values[o.channel.name][:, None] for o in read] + measured_columns(turned, trial)
         measured.append(np.hstack([*columns, seen.at(trial.time)] if seen else columns))
-    if set(drives) == {Drive.CONTROL}:
-        home = np.median([i.command[0] for i in inputs], axis=0)
-        reach = np.max([np.abs(i.command - home).max(axis=0) for i in inputs], axis=0)
-        reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
-        inputs = [replace(i, home=home, reach=reach) for i in inputs]
+    inputs = _from_home(inputs) if set(drives) == {Drive.CONTROL} else inputs
     notices += _bridged(gaps)
     if any(_outrun_damping(i, body) for i in inputs):
         inputs = [replace(i, damped=True) for i in inputs]
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
     return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each, turned)
+
+
+def _from_home(inputs: Sequence[Inputs]) -> list[Inputs]:
+    """Return the inputs of controls with where these begin and how far they go from there."""
+    home = np.median([i.command[0] for i in inputs], axis=0)
+    reach = np.max([np.abs(i.command - home).max(axis=0) for i in inputs], axis=0)
+    reach = np.where(reach > 0.0, reach, np.maximum(np.abs(home), 1.0))
+    return [replace(i, home=home, reach=reach) for i in inputs]
 
 
 def _outrun_damping(inputs: Inputs, body: Body) -> bool:
