@@ -371,13 +371,14 @@ class Piped:
         self.heard: list[Any] = []
         looked = SimpleNamespace(prepared=bench, nominal="nominal", suspicions=("odd",), held_out=(1, 3))
         monkeypatch.setattr(pipeline, "on_rows_of_outputs", lambda recording: recording)
+        monkeypatch.setattr(pipeline, "thinned", lambda log, whole, budget: (log, 1))
         monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: bench)
         monkeypatch.setattr(pipeline, "preview_data", lambda bench, twin, settings, progress: looked)
         monkeypatch.setattr(pipeline, "conclude", self.conclude)
         monkeypatch.setattr(
             pipeline,
             "_reported",
-            lambda recording, looked, found, parts, settings: self.reported.append((found, parts, settings)),
+            lambda recording, looked, found, parts, settings: (self.reported.append((found, parts, settings)), None),
         )
 
     def conclude(self, bench: Any, twin: Any, sealed: Any, nominal: Any, settings: Settings, progress: Any) -> str:
@@ -473,6 +474,7 @@ def test_a_calibration_is_judged_on_trials_it_has_not_seen(plan: PreparedRecordi
         return bench, ["a spike"]
 
     monkeypatch.setattr(pipeline, "on_rows_of_outputs", lambda recording: recording)
+    monkeypatch.setattr(pipeline, "thinned", lambda log, whole, budget: (log, 1))
     monkeypatch.setattr(pipeline, "prepare", lambda recording, robot: day)
     monkeypatch.setattr(pipeline, "predicted", lambda twin, bench, trials: [bench.measured[k] - off for k in trials])
     monkeypatch.setattr(pipeline, "without_spikes", clean)

@@ -75,11 +75,9 @@ def diagnose(
         preview = preview_data(prepared, twin, settings, progress)
         on_preview(preview)
         found, held_out = _held_out_diagnosis(recording, preview, twin, settings, progress)
-        return (
-            found
-            if every == 1
-            else replace(found, notices=(*found.notices, thinning_words(log, every, *held_out.in_all_rows(whole))))
-        )
+        if every == 1:
+            return found
+        return replace(found, notices=(*found.notices, thinning_words(log, every, *held_out.in_all_rows(whole))))
 
 
 def _held_out_diagnosis(
@@ -270,15 +268,21 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     Return the fit, the RMS error on held-out trials in words, and notices.
     """
     settings = settings or Settings()
-    prepared = prepare(on_rows_of_outputs(recording), twin.robot)
-    every = list(range(len(prepared.inputs)))
-    nominal = predicted(twin, prepared, every)
+    log = on_rows_of_outputs(recording)
+    whole = prepare(log, twin.robot)
+    part, every = thinned(log, whole, settings.budget)
+    prepared = whole if every == 1 else prepare(part, twin.robot)
+    nominal = predicted(twin, prepared, list(range(len(prepared.inputs))))
     fitted, held_out = split(prepared, settings.seed)
     seen, alone = without_spikes(blind(prepared, held_out), nominal)
     start, objective, _ = objective_of(seen, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
     unseen, _ = without_spikes(blind(prepared, fitted), nominal)
-    raw = [unseen.measured[k] - y for k, y in zip(held_out, predicted(found.model.twin, prepared, held_out), strict=True)]
     group = headline_group(o.group for o in prepared.outputs)
     unit, factor = OUTPUT_GROUPS[group].unit, OUTPUT_GROUPS[group].factor
-    return found, f"{factor * rms(prepared, raw, group):.3f} {unit}", (*prepared.notices, *alone)
+    errors = []
+    for of in (unseen, whole):
+        raw = [of.measured[k] - y for k, y in zip(held_out, predicted(found.model.twin, of, held_out), strict=True)]
+        errors.append(factor * rms(of, raw, group))
+    words = () if every == 1 else (thinning_words(log, every, errors[0], errors[1], unit),)
+    return found, f"{errors[0]:.3f} {unit}", (*prepared.notices, *alone, *words)
