@@ -48,7 +48,7 @@ STEP_PER_PRESLIDING = 2.0  # s/m
 # m, from a wall to a distant site in front of it, to which slack springs of that length tie the disks. The sphere that they cannot
 # leave is flat to x^2 / (2 POST_DISTANCE) = 1e-7 m at a robot's length, and lengths are still resolved to 1e-11 m.
 POST_DISTANCE = 1e5
-PAYLOAD_BODY = "payload"
+PAYLOAD_BODY, WALL_POST = "payload", "post"
 FASTEST_HINGE = 1e5  # rad/s, sixteen turns in a step of a millisecond; beyond it the motion counts as lost
 FORCE_UPDATE_STEPS = 2  # steps between evaluations of the applied forces, which change by a few per cent a step
 
@@ -164,7 +164,8 @@ def step_through(system, motion, tendons, creep, state, samples):
     """Step through the samples. Commands are linear between samples, currents constant. Creep moves MuJoCo's rest angles,
     `system.rest`.
 
-    Returns the number of samples recorded, the time reached, the steps taken so far, and the joint that diverged in the last one or -1.
+    Returns the number of samples recorded, the time reached, the steps taken so far, and the joint that diverged in the last
+    step, or -1.
     """
     chain, time, command, step, holds = system.chain, motion.time, motion.command, motion.step, any_true(tendons.actuation.held)
     now, r, taken = motion.reached, np.zeros(state.q.size), motion.taken
@@ -354,11 +355,11 @@ def loaded_body(body: HingeChain, loads: Loads, scale: float) -> HingeChain:
         spring.wrap_joint(other, -1.0)
     normal, offset, stiffness = loads.wall[:3], loads.wall[3], loads.wall[4]
     if stiffness > 0.0:
-        spec.worldbody.add_site(name="post", pos=(offset + POST_DISTANCE) * normal)
+        spec.worldbody.add_site(name=WALL_POST, pos=(offset + POST_DISTANCE) * normal)
         for disk in body.disks:
             wall = spec.add_tendon(name=wall_spring(disk))
             wall.stiffness, wall.springlength = [stiffness, 0, 0], [0.0, POST_DISTANCE]
-            wall.wrap_site("post")
+            wall.wrap_site(WALL_POST)
             wall.wrap_site(disk)
     if loads.payload > 0.0:
         site = spec.site(body.tip)

@@ -14,7 +14,7 @@ from twin.body import Loads
 from twin.body.hinge_chain import HingeChain, hinge_pairs
 from twin.foundation.errors import DataError
 from twin.mechanics.mjcf import WrittenModel, check_same, exact_text, with_comments
-from twin.mechanics.rod.dynamics import PAYLOAD_BODY, loaded_body, pair_spring, wall_spring
+from twin.mechanics.rod.dynamics import PAYLOAD_BODY, WALL_POST, loaded_body, pair_spring, wall_spring
 from twin.prediction.mjcf.comments import Origins, chain_heading
 from twin.prediction.twin import Twin
 from twin.robots.families.continuum import add_segments
@@ -35,9 +35,12 @@ def export_chain(twin: Twin, body: HingeChain, origins: Origins) -> WrittenModel
         raise DataError(f"effect contact has a round post (curvature above 0), which is not stepped; {_WAY_OUT}")
     spec = loaded_body(body, loads, 1.0).spec
     _remove_segments(spec)
+    for spring in filter(None, (spec.tendon(wall_spring(disk)) for disk in body.disks)):
+        spring.rgba = [0, 0, 0, 0]
     for i, holes in enumerate(body.tendon_sites, 1):
         _add_tendon(spec, f"tendon_{i}", holes)
     spec.modelname, spec.option.gravity = twin.robot.name, loads.gravity
+    spec.stat.center, spec.stat.extent = [0, 0, 0.5 * body.length], 1.5 * body.length  # what a viewer shows: no distant post
     compiled = spec.compile()
     made = WrittenModel(with_comments(exact_text(spec), chain_heading(twin, origins), {}, ""), {})
     check_same(made.compile(), compiled, twin.robot.name)
@@ -60,8 +63,9 @@ def chain_of(spec: mujoco.MjSpec, body: HingeChain) -> HingeChain:
     springs = [pair_spring(*pair) for pair in hinge_pairs(body)] + [wall_spring(disk) for disk in body.disks]
     for spring in filter(None, map(spec.tendon, springs)):
         spec.delete(spring)
-    if (payload := spec.body(PAYLOAD_BODY)) is not None:
-        spec.delete(payload)
+    for load in (spec.body(PAYLOAD_BODY), spec.site(WALL_POST)):
+        if load is not None:
+            spec.delete(load)
     return replace(body, spec=spec)
 
 

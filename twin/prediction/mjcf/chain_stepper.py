@@ -12,22 +12,25 @@ from twin.body import Drive, Loads, Problem, Signals
 from twin.body.hinge_chain import HingeChain
 from twin.effects import Effect
 from twin.foundation.errors import DataError, SolveError, short_repr
-from twin.mechanics.rod.dynamics import ChainMotion, Dynamics
+from twin.mechanics.rod.dynamics import ChainMotion, Dynamics, MotionSamples
 from twin.prediction.mjcf.chain import chain_of
 from twin.prediction.prepared import ROOM_TEMPERATURE
 from twin.prediction.storage import read_twin
 
 TWIN_FILE = "twin.toml"  # beside the model: the laws that MuJoCo has not
+_NO_MARKERS = np.zeros((1, 0, 3))
 _SHOWN = ("marker", "displacement", "tension")  # groups of what is read
 Law = Callable[[np.ndarray, float], np.ndarray]  # commands (n_tendon,) N and time s to those delivered
 
 
 class ChainStepper:
-    """An exported rod in motion, from row to row of tensions: those of `twin rollout`, to rounding.
+    """An exported rod in motion under rows of tensions, as `twin rollout` predicts it, to rounding.
 
-    The model is that of `robot.xml`, friction, creep and the true elastic moment come from `twin.toml` beside it. Tensions run
-    straight from row to row. Steps are MuJoCo's, as long as the file's timestep or shorter where friction asks for it.
+    The model is that of `robot.xml`; friction, creep and the true elastic moment come from `twin.toml` beside it. Tensions run
+    straight from row to row. Steps are MuJoCo's, as long as the file's timestep, or shorter where friction asks for it. Row by row
+    a lag or a delay knows no row to come, and takes commands as straight between rows, where a rollout (and `run`) smooths them.
 
+        ChainStepper("robot.xml", rate=50.0).run(tensions)["tip_x"]
         stepper = ChainStepper("robot.xml", rate=50.0)
         stepper.reset(tension)
         while True:
@@ -68,18 +71,30 @@ class ChainStepper:
         """Its state."""
         return self._motion.data
 
+    def run(self, tensions: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the readings (n,) of a rollout under rows of tensions (n, n_tendon) N, apart from what is stepped.
+
+        Raises SolveError where the motion is lost or has no start.
+        """
+        rows = np.asarray(tensions, float)
+        time = np.arange(len(rows)) / self.rate
+        chain = self.twin.effect_chain
+        delivered = chain.drive(chain.command(_signals(time, rows, np.zeros_like(rows), _NO_MARKERS))).command
+        samples, _, ended = self._start(delivered[0]).run(time, delivered)
+        if ended:
+            raise SolveError(ended)
+        return self._read(time, samples)
+
     def reset(self, tension: np.ndarray) -> None:
-        """Begin as a rollout does: at rest in equilibrium under tensions (n_tendon,) N. Raises SolveError where there is none."""
-        chain, self._row = self.twin.effect_chain, 0
-        first = np.asarray(tension, float)
-        self._laws, self._delivered = _laws(self.twin.effects, 1.0 / self.rate, first), first
+        """Begin as a rollout does: at rest in equilibrium under tensions (n_tendon,) N.
+
+        Raises SolveError where there is none, DataError for an effect that must know all rows.
+        """
+        self._row, first = 0, np.asarray(tension, float)
+        self._laws = _laws(self.twin.effects, 1.0 / self.rate, first)
         self._delivered = self._deliver(first)
-        problem = Problem(
-            np.zeros(1), self._delivered[None], chain.surround(Loads(self.twin.robot.gravity)), chain.route,
-            (Drive.TENSION,) * len(first), chain.creep,
-        )  # fmt: skip
-        self._motion, self._route = ChainMotion(self._dynamics, problem), chain.route
-        self._samples, _, _ = self._motion.run(problem.time, problem.command)
+        self._motion = self._start(self._delivered)
+        self._samples, _, _ = self._motion.run(np.zeros(1), self._delivered[None])
 
     def step(self, tension: np.ndarray) -> None:
         """Advance by a row under tensions (n_tendon,) N. Raises SolveError for a motion that is lost."""
@@ -93,15 +108,22 @@ class ChainStepper:
 
     def readings(self) -> dict[str, float]:
         """Return markers (m), displacements (m) and tensions (N) by channel, as the camera, motors and load cells report them."""
-        seen, body = self._samples, self._body
-        tension = seen.tension[-1:]
-        path = self._dynamics.straight_path - seen.path[-1:]
-        true = _signals(
-            self._row / self.rate, tension, path + self._route.elongation(tension), body.frame.to_marker_frame(seen.markers[-1:])
-        )
-        shown = self.twin.effect_chain.sense(true)
+        now = MotionSamples(*(values[-1:] for values in self._samples))
+        return {name: float(column[0]) for name, column in self._read(np.array([self._row / self.rate]), now).items()}
+
+    def _start(self, first: np.ndarray) -> ChainMotion:
+        """Return the motion from rest under tensions (n_tendon,) N."""
+        chain = self.twin.effect_chain
+        loads, drives = chain.surround(Loads(self.twin.robot.gravity)), (Drive.TENSION,) * len(first)
+        return ChainMotion(self._dynamics, Problem(np.zeros(1), first[None], loads, chain.route, drives, chain.creep))
+
+    def _read(self, time: np.ndarray, samples: MotionSamples) -> dict[str, np.ndarray]:
+        """Return what is reported (n,) of samples at times (n,) s, by channel."""
+        chain, body = self.twin.effect_chain, self._body
+        travel = self._dynamics.straight_path - samples.path + chain.route.elongation(samples.tension)
+        shown = chain.sense(_signals(time, samples.tension, travel, body.frame.to_marker_frame(samples.markers)))
         senses = {name: s for name, s in body.senses.items() if s.group in _SHOWN and s.required_drive in (None, Drive.TENSION)}
-        return {name: float(shown.group(s.group)[0, s.index, s.axis]) for name, s in senses.items()}
+        return {name: shown.group(s.group)[:, s.index, s.axis] for name, s in senses.items()}
 
     def _deliver(self, tension: np.ndarray) -> np.ndarray:
         for law in self._laws:
@@ -121,17 +143,24 @@ def _laws(effects: tuple[Effect, ...], step: float, first: np.ndarray) -> list[L
 
 
 def _law(effect: Effect, place: str, step: float, first: np.ndarray) -> Law:
-    """Return an effect's law: its own from step to step, or of an effect without memory the law of a row."""
-    if (own := effect.by_step(step, first)) is not None:
-        return lambda tension, _: own(tension)
-    of_row = effect.command if place == "command" else effect.drive
-    return lambda tension, time: of_row(_signals(time, tension[None], np.zeros((1, tension.size)), np.zeros((1, 0, 3)))).command[0]
+    """Return an effect's law: of an effect without memory the law of a row, else its own from step to step."""
+    of_rows = effect.command if place == "command" else effect.drive
+
+    def at(time: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        return of_rows(_signals(time, rows, np.zeros_like(rows), _NO_MARKERS)).command
+
+    time, rows = np.array([0.0, step]), np.stack([first, first + 1.0])  # what the second row becomes, with and without the first
+    if np.array_equal(at(time, rows)[1], at(time[1:], rows[1:])[0]):
+        return lambda tension, now: at(np.array([now]), tension[None])[0]
+    if (own := effect.by_step(step, first)) is None:
+        raise DataError(f"effect {effect.id} must know all rows of tensions; give them to `run` at once, or remove the effect")
+    return lambda tension, _: own(tension)
 
 
-def _signals(time: float, tension: np.ndarray, displacement: np.ndarray, markers: np.ndarray) -> Signals:
-    """Return one row of signals of tendons whose tension is given."""
-    now = np.array([time])
+def _signals(time: np.ndarray, tension: np.ndarray, displacement: np.ndarray, markers: np.ndarray) -> Signals:
+    """Return signals (n rows) of tendons whose tension is given, straight or smooth between rows as in a prediction."""
+    n, n_tendon = tension.shape
     return Signals(
-        now, now, tension, displacement, markers, np.full(1, ROOM_TEMPERATURE), (Drive.TENSION,) * tension.shape[1],
-        np.zeros_like(tension),
+        time, time, tension, displacement, np.broadcast_to(markers, (n, *markers.shape[1:])), np.full(n, ROOM_TEMPERATURE),
+        (Drive.TENSION,) * n_tendon, np.zeros_like(tension), smooth=True,
     )  # fmt: skip

@@ -63,7 +63,7 @@ def chain_heading(twin: Twin, origins: Origins) -> str:
     described = {p.name: p for p in twin.robot.parameters}
     lines = [
         f"Twin of {twin.robot.name}: {twin.robot.title}.",
-        "SI units. ctrl is the tension of a tendon in N. Gravity, payload, stiffness, rest shape and routes hold the effects below.",
+        "SI units. ctrl is the tension of a tendon in N. Gravity, payload, springs and routes hold the effects below.",
         *(
             f"calibrated: {name} = {_number(v, origins.std.get(name), described[name].unit)}, described {described[name].value:.6g}"
             for name, v in sorted(twin.values.items())
@@ -73,7 +73,7 @@ def chain_heading(twin: Twin, origins: Origins) -> str:
     for effect in twin.effects:
         lines += [_said(effect, p, origins) for p in effect.all_parameters(effect.n_tendon) if effect[p.name] != p.value]
     lines.append(
-        "Plain MuJoCo does not do: friction of tendons, creep, bowing of the rod between its disks and its bending in several planes "
+        "Plain MuJoCo does not do: friction of tendons, creep, bowing of the rod between its disks and its bending in two planes "
         "at once, stretch of tendons, SMA springs, lags, load cells and cameras. twin.prediction.mjcf.ChainStepper does, by the "
         "twin.toml beside this file: it repeats `twin rollout` under tensions."
     )

@@ -61,14 +61,15 @@ def export_mjcf(twin: Twin, origins: Origins) -> WrittenModel:
     steps; what MuJoCo has nearest to them (`twin.prediction.mjcf.natives`) stands in the model beside that. What is returned is
     compiled and compared with the twin's own model.
 
-    Raises DataError for a robot that is neither MJCF nor rod, an effect that has no place in one, and a number that cannot be written.
+    Raises DataError for a robot that is neither MJCF nor rod, an effect that has no place in one, and a number that
+    cannot be written.
     """
     body = twin.body()
     if isinstance(body, HingeChain) and load_family(twin.robot.family).dynamics is not None:
         return export_chain(twin, body, origins)
     if not isinstance(body, ModelBody):
         raise DataError(
-            f"robot {twin.robot.name!r} is of family {twin.robot.family!r}; families 'mjcf' and 'continuum' are written as an MJCF: "
+            f"robot {twin.robot.name!r} is of family {twin.robot.family!r}; families 'mjcf' and 'continuum' are written as MJCF: "
             "roll this twin out with `twin rollout`, or step it in an environment of twin.env"
         )
     if lost := [e.id for e in twin.effects if not _has_place(e)]:
