@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -40,8 +41,8 @@ def rod_with(effects: tuple[str, ...], values: Mapping[str, float] = CALIBRATED)
     return Twin(rod, values, tuple(effect_class(e)(EFFECTS[e], rod.n_tendon) for e in effects))
 
 
-def rolled_out(twin: Twin) -> Mapping[str, np.ndarray]:
-    given = commands(twin, {f"tendon_{i + 1}_tension": column for i, column in enumerate(TENSIONS.T)}, RATE)
+def rolled_out(twin: Twin, tensions: np.ndarray = TENSIONS) -> Mapping[str, np.ndarray]:
+    given = commands(twin, {f"tendon_{i + 1}_tension": column for i, column in enumerate(tensions.T)}, RATE)
     return rollout(twin, given, dynamic=True).recording.trials[0].values
 
 
@@ -75,6 +76,21 @@ def test_stepped_with_its_laws_an_exported_rod_repeats_the_rollout(case: str, tm
     assert apart(stepped(path), wanted) < (1e-2 if case in SMOOTHED else 1e-9) * motion
     if case != "bare":  # and it moves otherwise, by more than 10 um, than without the effect
         assert apart(found, rolled_out(rod_with(()))) > 1e-5
+
+
+@pytest.mark.parametrize("name", ["three_cable", "tentacle"])
+def test_any_rod_is_written(name: str, tmp_path: Path) -> None:
+    """Thick disks, a cast body that stretches and stiffens; a robot in a folder of its own, which its twin's file finds."""
+    shutil.copytree(load(name).folder, tmp_path / "own")
+    rod = load(str(tmp_path / "own"))
+    twin = Twin(rod, {}, tuple(effect_class(e)(EFFECTS[e], rod.n_tendon) for e in TWO))
+    tensions = np.resize(TENSIONS[:8].T, (rod.build().n_tendon, 8)).T
+    wanted = rolled_out(twin, tensions)
+    found = ChainStepper(write_mjcf(twin, tmp_path / "out", Origins()), RATE).run(tensions)
+    markers = [n for n in wanted if n.endswith(("_x", "_y", "_z"))]
+    motion = max(float(np.ptp(wanted[n])) for n in markers)
+    assert max(float(np.abs(found[n] - wanted[n]).max()) for n in markers) < 1e-9 * motion
+    assert motion > 1e-4
 
 
 def test_the_stepped_model_is_that_of_the_file(tmp_path: Path) -> None:
