@@ -219,12 +219,6 @@ def made_model(folder: Path, values: Mapping[str, float]) -> mujoco.MjModel:
     return load(str(folder)).build(values).model  # type: ignore[attr-defined]
 
 
-def test_a_body_of_another_family_has_no_mjcf_of_its_own(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="robot 'continuum' is of family 'continuum', which has no MJCF of its own"):
-        write_mjcf(Twin.of("continuum"), tmp_path / "out", Origins())
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_log_that_runs_ahead_is_said_and_not_written() -> None:
     leg = load("tendon_leg")
     made = export_mjcf(Twin(leg, {}, (effect_class("time_delay")({"delay": -0.01}, leg.n_tendon),)), Origins())

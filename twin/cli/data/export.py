@@ -16,12 +16,14 @@ class Export:
     """Write what was measured or learnt in the formats of other programs."""
 
     set_or_report: Positional[
-        Annotated[Path, arg(help="folder of a measurement set; for --mjcf a report's folder, a twin.toml or the folder of a robot")]
+        Annotated[
+            Path, arg(help="folder of a measurement set; for --mjcf a report's folder, a twin.toml, a robot's name or folder")
+        ]
     ]
     mcap: Annotated[Path | None, arg(help="new MCAP file for the set: ROS 2 messages, SI")] = None
     lerobot: Annotated[Path | None, arg(help="new folder for the set as a LeRobot v3 dataset, SI")] = None
     parquet: Annotated[Path | None, arg(help="new folder for the set with a Parquet table a trial, its own units")] = None
-    mjcf: Annotated[Path | None, arg(help="new folder for the twin as a better MJCF (robots of family mjcf)")] = None
+    mjcf: Annotated[Path | None, arg(help="new folder for the twin as an MJCF (families mjcf and continuum)")] = None
     rate: Annotated[
         float | None, arg(help="resample for --lerobot to this many frames a second: inputs are held, outputs interpolated")
     ] = None

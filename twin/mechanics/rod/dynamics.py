@@ -48,6 +48,7 @@ STEP_PER_PRESLIDING = 2.0  # s/m
 # m, from a wall to a distant site in front of it, to which slack springs of that length tie the disks. The sphere that they cannot
 # leave is flat to x^2 / (2 POST_DISTANCE) = 1e-7 m at a robot's length, and lengths are still resolved to 1e-11 m.
 POST_DISTANCE = 1e5
+PAYLOAD_BODY, WALL_POST = "payload", "post"
 FASTEST_HINGE = 1e5  # rad/s, sixteen turns in a step of a millisecond; beyond it the motion counts as lost
 FORCE_UPDATE_STEPS = 2  # steps between evaluations of the applied forces, which change by a few per cent a step
 
@@ -56,6 +57,7 @@ class Motion(NamedTuple):
     """MuJoCo's arrays that the loop reads and writes between steps, and the inputs."""
 
     reached: float  # s, the time MuJoCo's state is at
+    taken: int  # steps so far
     step: float  # s
     velocity: np.ndarray  # (nv,)
     ctrl: np.ndarray
@@ -162,10 +164,11 @@ def step_through(system, motion, tendons, creep, state, samples):
     """Step through the samples. Commands are linear between samples, currents constant. Creep moves MuJoCo's rest angles,
     `system.rest`.
 
-    Returns the number of samples recorded, the time reached, and the joint that diverged in the last step, or -1.
+    Returns the number of samples recorded, the time reached, the steps taken so far, and the joint that diverged in the last
+    step, or -1.
     """
     chain, time, command, step, holds = system.chain, motion.time, motion.command, motion.step, any_true(tendons.actuation.held)
-    now, r, taken = motion.reached, np.zeros(state.q.size), 0
+    now, r, taken = motion.reached, np.zeros(state.q.size), motion.taken
     D = np.empty((chain.handedness.size, 3, 3))
     for i in range(time.size):
         while i > 0 and now + step <= time[i]:
@@ -185,7 +188,7 @@ def step_through(system, motion, tendons, creep, state, samples):
             now += step
             for k in range(r.size):
                 if not abs(motion.velocity[k]) < FASTEST_HINGE:
-                    return i, now, k
+                    return i, now, taken, k
         assign(state.q, chain.qpos)
         if holds:
             update_kinematics(system, state.q)
@@ -199,7 +202,7 @@ def step_through(system, motion, tendons, creep, state, samples):
                 r[k] -= system.rest[k]
             advance_creep(creep, r, time[i] - time[i - 1])
             set_rest_shape(motion.rest, creep.delayed, system.rest)
-    return time.size, now, -1
+    return time.size, now, taken, -1
 
 
 class ChainMotion:
@@ -228,7 +231,7 @@ class ChainMotion:
         self.drives = problem.drives or (Drive.TENSION,) * problem.command.shape[1]
         if not start.status.all():
             raise SolveError(f"no equilibrium to start from under {self._format_command(problem.command[0])}")
-        body = _loaded_body(dynamics.body, loads, scale)
+        body = loaded_body(dynamics.body, loads, scale)
         self._by_tension = problem.drive_mask(Drive.TENSION)
         add_held_tendons(body.spec, body, ~self._by_tension)
         compiled = Equilibrium(body)
@@ -250,7 +253,7 @@ class ChainMotion:
             actuator[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id
         nt = problem.command.shape[1]
         self._motion = Motion(
-            self._start_time, float(step), data.qvel, data.ctrl, data.qfrc_applied, actuator, rest,
+            self._start_time, 0, float(step), data.qvel, data.ctrl, data.qfrc_applied, actuator, rest,
             np.zeros(0), np.zeros((0, nt)), np.zeros(0),
         )  # fmt: skip
         self.state = ChainState(start.tension[0].copy(), start.q[0].copy(), start.slip.copy(), start.distal.copy())
@@ -272,8 +275,8 @@ class ChainMotion:
         motion = self._motion._replace(
             time=np.array(time, float), command=command, ambient=np.zeros(n) if ambient is None else np.array(ambient, float)
         )
-        n_sample, now, lost = step_through(self._system, motion, self._held, self._creep, self.state, samples)
-        self._motion = self._motion._replace(reached=now)
+        n_sample, now, taken, lost = step_through(self._system, motion, self._held, self._creep, self.state, samples)
+        self._motion = self._motion._replace(reached=now, taken=taken)
         return samples, n_sample, "" if lost < 0 else self._describe_loss(now, lost)
 
     def _format_command(self, command: np.ndarray) -> str:
@@ -326,7 +329,17 @@ class Dynamics:
         )  # fmt: skip
 
 
-def _loaded_body(body: HingeChain, loads: Loads, scale: float) -> HingeChain:
+def pair_spring(one: str, other: str) -> str:
+    """Return the name of the spring that couples two hinges."""
+    return f"{one}-{other}"
+
+
+def wall_spring(disk: str) -> str:
+    """Return the name of the spring that a wall has for a disk's site."""
+    return f"wall-{disk}"
+
+
+def loaded_body(body: HingeChain, loads: Loads, scale: float) -> HingeChain:
     """Return a copy of the body with payload, wall and set coupling, `scale` times as stiff.
 
     The payload is a point mass at the tip; wall and coupling are MuJoCo tendons.
@@ -336,20 +349,20 @@ def _loaded_body(body: HingeChain, loads: Loads, scale: float) -> HingeChain:
         joint.stiffness = scale * joint.stiffness
     for one, other in hinge_pairs(body) if body.straight_tendons else ():
         stiffness = 0.5 * SET_COUPLING * (spec.joint(one).stiffness[0] + spec.joint(other).stiffness[0])
-        spring = spec.add_tendon(name=f"{one}-{other}")
+        spring = spec.add_tendon(name=pair_spring(one, other))
         spring.stiffness = [stiffness, 0, 0]
         spring.wrap_joint(one, 1.0)
         spring.wrap_joint(other, -1.0)
     normal, offset, stiffness = loads.wall[:3], loads.wall[3], loads.wall[4]
     if stiffness > 0.0:
-        spec.worldbody.add_site(name="post", pos=(offset + POST_DISTANCE) * normal)
+        spec.worldbody.add_site(name=WALL_POST, pos=(offset + POST_DISTANCE) * normal)
         for disk in body.disks:
-            wall = spec.add_tendon(name=f"wall-{disk}")
+            wall = spec.add_tendon(name=wall_spring(disk))
             wall.stiffness, wall.springlength = [stiffness, 0, 0], [0.0, POST_DISTANCE]
-            wall.wrap_site("post")
+            wall.wrap_site(WALL_POST)
             wall.wrap_site(disk)
     if loads.payload > 0.0:
         site = spec.site(body.tip)
-        mass = site.parent.add_body(name="payload", pos=site.pos, mass=loads.payload, inertia=[1e-9, 1e-9, 1e-9])
+        mass = site.parent.add_body(name=PAYLOAD_BODY, pos=site.pos, mass=loads.payload, inertia=[1e-9, 1e-9, 1e-9])
         mass.ipos, mass.explicitinertial = [0, 0, 0], True
     return replace(body, spec=spec)

@@ -58,6 +58,28 @@ def heading(twin: Twin, body: ModelBody, origins: Origins) -> str:
     return "\n       ".join(lines)
 
 
+def chain_heading(twin: Twin, origins: Origins) -> str:
+    """Return what is said on top of a rod's file: its calibrated numbers, its effects, and what plain MuJoCo does not do."""
+    described = {p.name: p for p in twin.robot.parameters}
+    lines = [
+        f"Twin of {twin.robot.name}: {twin.robot.title}.",
+        "SI units. ctrl is the tension of a tendon in N. Gravity, payload, springs and routes hold the effects below.",
+        *(
+            f"calibrated: {name} = {_number(v, origins.std.get(name), described[name].unit)}, described {described[name].value:.6g}"
+            for name, v in sorted(twin.values.items())
+            if v != described[name].value
+        ),
+    ]
+    for effect in twin.effects:
+        lines += [_said(effect, p, origins) for p in effect.all_parameters(effect.n_tendon) if effect[p.name] != p.value]
+    lines.append(
+        "Plain MuJoCo does not do: friction of tendons, creep, bowing of the rod between its disks and its bending in two planes "
+        "at once, stretch of tendons, SMA springs, lags, load cells and cameras. twin.prediction.mjcf.ChainStepper does, by the "
+        "twin.toml beside this file: it repeats `twin rollout` under tensions."
+    )
+    return "\n       ".join(lines)
+
+
 def element_comments(twin: Twin, body: ModelBody, origins: Origins) -> dict[tuple[str, str], list[str]]:
     """Return what is said before each element, by kind and name."""
     said: dict[tuple[str, str], list[str]] = {}

@@ -9,7 +9,7 @@ along its axis; the tendon turns at both faces.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -79,7 +79,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Hinge
                 body.add_site(name=f"imu_{m + 1}", pos=[0, 0, at], quat=turn, size=[5e-4, 0, 0])
         parent, before = body, z
     for i, sites in enumerate(tendons, 1):
-        _add_tendon(spec, i, sites)
+        add_segments(spec, i, sites)
     return _assemble_body(shape, values, spec, tuple(joints), tuple(tuple(s) for s in tendons), length)
 
 
@@ -235,7 +235,7 @@ def _add_holes(body: mujoco.MjsBody, disk: _Disk, z: float, tendons: list[list[s
             tendons[i - 1].append(name)
 
 
-def _add_tendon(spec: mujoco.MjSpec, i: int, sites: list[str]) -> None:
+def add_segments(spec: mujoco.MjSpec, i: int, sites: Sequence[str]) -> None:
     """Add a two-site tendon and a motor for each segment, so that tension may differ along the tendon; ctrl = tension in N."""
     for d in range(len(sites) - 1):
         name = f"tendon_{i}_segment_{d + 1}"

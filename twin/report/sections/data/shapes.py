@@ -15,13 +15,15 @@ POSES_DRAWN = 4
 SHAPES_HEIGHT = 560
 
 
-def section(story: Story) -> Section:
-    """Return the section with the shapes."""
+def section(story: Story) -> Section | None:
+    """Return the section with the shapes; None of a recording with neither two markers nor clouds."""
     d = story.diagnosis
     whole = complete_markers(d.prepared)
     chosen = choose_poses(d) if len(whole) > 1 else []
     content: dict[str, object] = {"plot": _plot(d, chosen) if chosen else None, "poses": _pose_labels(d, chosen)}
     clouds = skin.clouds_before_after(d)
+    if len(whole) < 2 and not clouds:
+        return None
     content["skin"] = skin.plot(d, clouds) if clouds else None
     content["distances"] = skin.describe_distances(d, clouds) if clouds else None
     return Section("shapes", "Shapes", "shapes.html", content)
