@@ -91,10 +91,11 @@ def test_bad_options_are_refused(name: str, tmp_path: Path) -> None:
         gymnasium.make(f"twin/{name}", twin=newer)
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if "Goal" not in name and name not in TASKS[1:]])
+@pytest.mark.parametrize("name", [name for name in ALL if "Goal" not in name and "MJCF" not in name and name not in TASKS[1:]])
 def test_its_tables_name_every_index_of_what_it_says(name: str) -> None:
     """The docstring says how long an observation is, with n = 3 tendons, k = 3 actions, p = 2 servos a finger, s = 4 cords, t = 4
-    tendons a finger, m = 11 markers and f = 3 fingers as large as it is. All tables but the tasks' are in twin/env/README.md."""
+    tendons a finger, m = 11 markers and f = 3 fingers as large as it is. All tables but the tasks' are in twin/env/README.md;
+    what MJCFTrack observes depends on its model."""
     env, full = gymnasium.make(f"twin/{name}").unwrapped, made(name)
     text = inspect.getdoc(ContinuumReach if name == "ContinuumTrack-v0" else type(env)) or ""
     said, size, actions = {

@@ -36,7 +36,7 @@ CHANGES = (  # (file, what a line holds, what it is to hold)
     ("twin/effects/time_delay.py", "current=self._heating(reported))", "current=reported.current)"),
     ("twin/effects/time_delay.py", "np.interp(edges - self", "np.interp(edges + self"),
     # markers on the other side of their disks
-    ("twin/robots/families/continuum.py", "pos=[*offset[:2], at + offset[2]]", "pos=[*offset[:2], at - offset[2]]"),
+    ("twin/robots/families/continuum.py", "place = [*offset[:2], at + offset[2]]", "place = [*offset[:2], at - offset[2]]"),
     # the noise model's bar and what it takes out
     ("twin/diagnosis/noise/estimate.py", "sure = CLEAR_CORRELATION * spread", "sure = 0.1 * CLEAR_CORRELATION * spread"),
     ("twin/diagnosis/noise/estimate.py", "sure = CLEAR_CORRELATION * spread", "sure = 10.0 * CLEAR_CORRELATION * spread"),

@@ -140,7 +140,8 @@ class HandControls:
     def release(self) -> None:
         """Set all pulls to zero and show only the sliders of the chosen drive."""
         for drive, sliders in self.sliders.items():
-            for slider, rest in zip(sliders, rest_command(self._twin, drive), strict=True):
+            still = np.zeros(len(sliders)) if drive is Drive.DISPLACEMENT else rest_command(self._twin, drive)  # of bends: none
+            for slider, rest in zip(sliders, still, strict=True):
                 slider.value, slider.visible = float(rest), drive is self.drive
         self.clock.visible = self.rest_button.visible = self.drive is Drive.CURRENT
 
