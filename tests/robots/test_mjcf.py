@@ -201,7 +201,7 @@ def test_friction_of_an_independent_servo_is_named_with_its_size(tmp_path: Path)
 def test_export_says_what_it_needs(tmp_path: Path) -> None:
     for arguments, said in (
         (("tendon_leg",), "nothing to write; give a format with its target: --mcap FILE"),
-        (("continuum", "--mjcf", "better"), "robot 'continuum' is of family 'continuum'"),
+        (("finger", "--mjcf", "better"), "robot 'finger' is of family 'soft'"),
         (("nowhere", "--mjcf", "better"), "nowhere"),
     ):
         done = twin("export", *arguments, cwd=tmp_path)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -140,14 +139,15 @@ def test_two_twins_two_clients_one_that_goes_and_a_second_server_on_the_port(loo
 
 
 def test_a_page_opened_before_the_robot_says_what_it_waits_for_and_lives(look: Look) -> None:
-    """Five seconds of work in place of a compiler: the page counts them and takes what is entered; its camera is then the one it
-    would have had."""
+    """Work that ends when the test has seen enough, in place of a compiler: the page counts its seconds and takes what is entered;
+    its camera is then the one it would have had."""
     server = start_server("127.0.0.1", 8690)
     notice, over, panels = WorkNotice(server), threading.Event(), list[TwinPanel]()
+    seen = threading.Event()
 
     def make(on: viser.ViserServer) -> TwinPanel:
         panel = TwinPanel(on, [("", Twin.of("continuum"))])
-        time.sleep(5.0)
+        seen.wait(60.0)
         return panel
 
     def work() -> None:
@@ -167,12 +167,14 @@ def test_a_page_opened_before_the_robot_says_what_it_waits_for_and_lives(look: L
         assert page.until(lambda: words.is_visible() and words.inner_text() != first)
         page.put("tendon 1, N", "2")
         assert not panels  # entered while the work went on
+        seen.set()
         assert page.until(lambda: bool(panels) and "2.00 N" in panels[0].words.content)
         assert page.until(lambda: not words.is_visible())
         client = next(iter(server.get_clients().values()))
         assert page.until(lambda: bool(np.allclose(client.camera.position, server.initial_camera.position, atol=1e-3)))
         assert page.there()
     finally:
+        seen.set()
         over.set()
         thread.join()
         notice.close()

@@ -39,7 +39,8 @@ class DynamicRod(ChainMotion):
     def get_state(self) -> dict[str, np.ndarray]:
         """Return MuJoCo's state and the arrays that the motion keeps beside it."""
         return {name: a.copy() for name, a in self._arrays().items()} | {
-            "mujoco": get_mujoco_state(self.model, self.data), "reached": np.array(self._motion.reached)
+            "mujoco": get_mujoco_state(self.model, self.data), "reached": np.array(self._motion.reached),
+            "taken": np.array(self._motion.taken),
         }  # fmt: skip
 
     def set_state(self, state: Mapping[str, np.ndarray]) -> None:
@@ -47,7 +48,7 @@ class DynamicRod(ChainMotion):
         for name, array in self._arrays().items():
             array[:] = state[name]
         set_mujoco_state(self.model, self.data, state["mujoco"])
-        self._motion = self._motion._replace(reached=float(state["reached"]))
+        self._motion = self._motion._replace(reached=float(state["reached"]), taken=int(state["taken"]))
         update_kinematics(self._system, self.state.q)
 
     def _arrays(self) -> dict[str, np.ndarray]:
