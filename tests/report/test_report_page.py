@@ -117,6 +117,16 @@ def shown(d) -> str:
     return render(d).partition('<section id="tip">')[2].partition("</section>")[0]
 
 
+@pytest.mark.parametrize("named", [True, False], ids=["with effects", "without"])
+def test_the_row_that_stands_out_is_the_twin_s(named):
+    """Not that of the polynomial, which comes after it."""
+    d = diagnosis() if named else replace(diagnosis(), claims=())
+    d = replace(d, errors=replace(d.errors, without_physics=dict.fromkeys(d.errors.after, 1e-3)))
+    html = render(d)
+    assert "polynomial, no physics" in html
+    assert set(re.findall(r'<tr class="mine"><td>([^<]*)', html)) == {"with the effects" if named else "calibrated"}
+
+
 def test_it_loads_nothing():
     html = render(diagnosis())
     rest = html.replace(get_plotlyjs(), "")

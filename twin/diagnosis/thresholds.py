@@ -112,7 +112,7 @@ CLOUD_WIDTH_RATIO = _row("CLOUD_WIDTH_RATIO", 1.25, "ratio",
 LEAST_MOTION_SHARE = _row("LEAST_MOTION_SHARE", 0.025, "of the motion described",
     "less, beside noise, counts as no motion: half the weakest gain that counts as one", "derivation: 0.05 / 2")
 WALK_OF_HEADING = _row("WALK_OF_HEADING", 5.0, "times the change of tilt",
-     "of an IMU's heading while commands hold: a body that still moves tilts about as much as it turns; of one public IMU 30 times",
+     "of an IMU's heading while commands hold: a body that still moves tilts about as much as it turns; of one public IMU 20 times",
      "python -m tools.benchmarks.hardware.imu_robot FOLDER OUT")
 HELD_COMMAND_RANGE = _row("HELD_COMMAND_RANGE", 0.01, "of a command's range", "within it a command holds", "judgement")
 FEWEST_HELD_ROWS = _row("FEWEST_HELD_ROWS", 10, "rows", "a command held for fewer shows no rest", "judgement")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,10 @@ from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.calibration.objective import COARSE_ERROR, Objective
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
+from twin.foundation.errors import SolveError
 from twin.mechanics.mjcf import solver
 from twin.prediction.prepared import prepare
+from twin.prediction.twin import Twin
 from twin.robots import load
 
 
@@ -68,3 +71,23 @@ def test_a_refit_to_fewer_trials_keeps_the_derivatives_it_was_given(
     fit(part, Model(changed, model.free), near=whole.evaluation, J=whole.J[:rows])
     assert asked  # of another model's derivatives nobody knows
     assert found.cost <= float(part.evaluate(whole.model).z @ part.evaluate(whole.model).z) + whole.cost - float(whole.z @ whole.z)
+
+
+def test_motion_that_is_lost_in_long_steps_alone_is_taken_by_short_ones(
+    swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    objective, model = swung
+    at, which = objective.evaluate(model), range(len(model.free))
+    coarse = objective.jacobian(at, which)
+    of = Objective.predict
+
+    def lost(self: Objective, twin: Twin, *rest: Any, once: bool = False, **more: Any) -> Any:
+        if once and twin != model.twin:  # every neighbour, and not the model itself
+            raise SolveError("the motion diverges")
+        return of(self, twin, *rest, once=once, **more)
+
+    monkeypatch.setattr(Objective, "predict", lost)
+    fine = objective.jacobian(at, which)
+    assert np.isfinite(fine).all()
+    off = np.linalg.norm(coarse - fine, axis=0) / np.linalg.norm(fine, axis=0)
+    assert 0.0 < off.max() < COARSE_ERROR

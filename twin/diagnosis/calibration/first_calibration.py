@@ -1,4 +1,4 @@
-"""The objective of every fit: the residual of the fitted trials, whitened by a noise model that is estimated from the data."""
+"""The first calibration, under a rough noise model; what it leaves gives the noise by which later fits are whitened."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -7,6 +7,7 @@ tangents of the unchanged one, and one in motion is simulated in longer steps.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -121,22 +122,23 @@ class Objective:
     ) -> np.ndarray:
         """Return the whitened change of the residual per unit (n, n_model), for neighbouring models and the difference of each.
 
-        `once` solves to first order in the difference. A model without an equilibrium raises SolveError, or has a column of zeros
-        with `unsolved` "zeros".
+        `once` solves to first order in the difference; motion is simulated in long steps where these serve, else in short ones. A
+        model without an equilibrium, or whose motion is lost, raises SolveError, or has a column of zeros with `unsolved` "zeros".
         """
         before = self._coarsely(at) if self.bends else None
-        once = before is not None if self.bends else once
 
         def column(model: Model, size: float) -> np.ndarray:
             if _same_simulation(at.model.twin, model.twin):
                 return self._change(at.raw, [at.traces[k].outputs(model.twin, self.prepared) for k in self.trials], size)
             try:
-                predicted = self.predict(model.twin, at.traces, once=once)[1]
+                if before is not None:
+                    with suppress(SolveError):  # motion may be lost in long steps alone
+                        return self._change(before, self.predict(model.twin, once=True)[1], size)
+                return self._change(at.raw, self.predict(model.twin, at.traces, once=once and not self.bends)[1], size)
             except SolveError:
                 if unsolved == "raise":
                     raise
                 return np.zeros(at.z.size)
-            return self._change(before or at.raw, predicted, size)
 
         with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
             done: Any = parallel(delayed(column)(m, s) for m, s in models)
@@ -150,19 +152,25 @@ class Objective:
     def _coarsely(self, at: Evaluation) -> list[np.ndarray] | None:
         """Return the residuals by the long steps that derivatives of motion are computed with, `at.raw` being by short ones.
 
-        None where long steps do not give the derivatives, which is tried once, along a move of all free parameters.
+        None where long steps do not give the derivatives, which is tried once, along a move of all free parameters, and where this
+        motion is lost in them.
         """
+        if self._coarse is False:
+            return None
+        try:
+            before = self._raw(self.predict(at.model.twin, once=True)[1])
+        except SolveError:
+            return None
         if self._coarse is None:
             x, towards = at.model.vector(), MOTION_DIFFERENCE
             try:
                 moved = at.model.at(x + towards).twin
                 fine = self._change(at.raw, self.predict(moved)[1], towards)
-                still, gone = (self.predict(t, once=True)[1] for t in (at.model.twin, moved))
-                coarse = self._change(self._raw(still), gone, towards)
+                coarse = self._change(before, self.predict(moved, once=True)[1], towards)
                 self._coarse = bool(np.linalg.norm(coarse - fine) <= COARSE_ERROR * np.linalg.norm(fine))
             except SolveError:
                 self._coarse = False
-        return self._raw(self.predict(at.model.twin, once=True)[1]) if self._coarse else None
+        return before if self._coarse else None
 
     def _raw(self, predicted: Sequence[np.ndarray]) -> list[np.ndarray]:
         return [self.prepared.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]

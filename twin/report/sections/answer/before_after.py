@@ -23,6 +23,7 @@ def section(story: Story) -> Section:
             "kind": capitalised(display_name(OUTPUT_GROUPS[g].kind)),
             "unit": DISPLAY_UNITS[g][0],
             "rows": error_rows(d, g),
+            "twin": STAGE_LABELS[differing_stages(d)[-1]],
             "plot": plot(d, g),
         }
         for g in output_groups(d)
