@@ -21,18 +21,19 @@ from twin.diagnosis.conclusion import Conclusion
 from twin.diagnosis.diagnosis import Claim, Diagnosis, Errors, Fold, Settings
 from twin.diagnosis.explain.describe import describe
 from twin.diagnosis.explain.next_experiment import Experiment, next_experiment
-from twin.diagnosis.fit_context import Progress, silent
+from twin.diagnosis.evidence.scored_model import ScoredModel
+from twin.diagnosis.fit_context import FitContext, Progress, silent
 from twin.diagnosis.held_out import HeldOut, predicted
 from twin.diagnosis.search.choose import choose
 from twin.diagnosis.search.lag_or_delay import lag_or_delay
-from twin.diagnosis.search.screen import screen
-from twin.diagnosis.search.search import search
+from twin.diagnosis.search.screen import Screening, screen
+from twin.diagnosis.search.search import Search, search
 from twin.diagnosis.split import blind, split
 from twin.diagnosis.thinning import thinned
 from twin.diagnosis.thinning import words as thinning_words
 from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, ROWS_FOR_ZERO
-from twin.diagnosis.verdict.gate import gate
-from twin.diagnosis.verdict.judge import judge, withdraw
+from twin.diagnosis.verdict.gate import Gated, gate
+from twin.diagnosis.verdict.judge import Judgement, judge, withdraw
 from twin.diagnosis.verdict.resolve_ties import resolve_ties
 from twin.diagnosis.verdict.systematic import with_systematic
 from twin.foundation.display_names import display_name
@@ -110,11 +111,16 @@ def conclude(
     """Run all stages without the measurements of the held-out trials."""
     context, base, notes = calibrate(prepared, twin, held_out, nominal, settings, progress)
     screening = screen(context, base, settings.seed)
+    found, gated, judged = decide(context, base, screening)
+    return Conclusion(context, screening, found, gated, judged, (*notes, *context.budget.words()))
+
+
+def decide(context: FitContext, base: ScoredModel, screening: Screening) -> tuple[Search, Gated, Judgement]:
+    """Return what the search found beside the calibrated `base`, what passed the gate, and the judgement of it."""
     found = choose(context, search(context, base, screening.patterns, screening.limits), screening.limits)
     found = lag_or_delay(context, found)
     found, gated = resolve_ties(context, found, gate(context, found, screening), screening.limits)
-    judged = with_systematic(context, judge(context, found, gated, screening.limits), screening.patterns)
-    return Conclusion(context, screening, found, gated, judged, (*notes, *context.budget.words()))
+    return found, gated, with_systematic(context, judge(context, found, gated, screening.limits), screening.patterns)
 
 
 def _reported(

@@ -3,7 +3,7 @@
 case.py         the data, and predictions of a changed file
 units.py        readings, commands, payloads in another unit than declared
 signs.py        displacements, readings and gravity of the opposite sign or direction
-frames.py       markers mirrored, turned, shifted
+frames.py       markers mirrored, turned, shifted; orientations about other axes, or inverse
 order.py        tendons and markers exchanged
 trials.py       duplicates, another robot, clocks, milliseconds
 channels.py     dead channels, declared noise, room temperature
@@ -30,7 +30,7 @@ Kind = Callable[[Case], Iterable[Suspicion]]
 SEEN_IN_FILES: tuple[Kind, ...] = (  # in the files, beside the nominal prediction
     trials.times, trials.clocks, trials.duplicates, trials.robots, units.outputs, channels.room, channels.outputs,
     repeats.lost_markers, repeats.fills, repeats.stuck, repeats.frozen, jumps.exchanged, jumps.rolled,
-    channels.noise, signs.outputs, signs.size, frames.frame, order.markers, clouds.clouds, stops.ends,
+    channels.noise, signs.outputs, signs.size, frames.frame, frames.orientations, order.markers, clouds.clouds, stops.ends,
     headings.walking,
 )  # fmt: skip
 TRIED: tuple[Kind, ...] = (  # by predicting a few trials again

@@ -1,6 +1,7 @@
-"""The markers' frame: mirrored, turned by a quarter or a half, shifted by centimetres."""
+"""Frames of positions and orientations: mirrored, turned by a quarter or a half, shifted; orientations the other way round."""
 
 from collections.abc import Iterator
+from itertools import permutations, product
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -41,6 +42,35 @@ def frame(case: Case) -> Iterator[Suspicion]:
             words = f"all markers are off by {np.round(off, 3).tolist()} {channel.unit}, from the base to the tip"
             change = f"subtract {np.round(off, 3).tolist()} {channel.unit}: the origin is the centre of the base plate"
             yield Suspicion("shifted frame", words, change, turned / before, "marker")
+
+
+def orientations(case: Case) -> Iterator[Suspicion]:
+    """Yield orientations that fit with the axes of their rotation vectors r exchanged or reversed.
+
+    In other axes, M of those declared, R becomes M R M' and r becomes det(M) M r, where M may be a mirror; of the inverse rotation r
+    becomes -r. What turns about two axes alone does not tell these causes apart.
+    """
+    for body in dict.fromkeys(o.index for o in case.prepared.outputs if o.group == "turn") if case.predicted else ():
+        columns = [j for j, o in enumerate(case.prepared.outputs) if o.group == "turn" and o.index == body]
+        y, p = (np.concatenate([v[k][:, columns] for k in case.trials]) for v in (case.prepared.measured, case.predicted or ()))
+        errors = [(rms(y - p @ P.T), P) for P in _exchanges()]
+        enough = min(error for error, _ in errors) + case.floor(columns)
+        # of those that fit alike the one that changes least: a body that hardly turns about an axis says nothing of its sign
+        error, P = min((e for e in errors if e[0] <= enough), key=lambda e: np.abs(e[1] - np.eye(3)).sum())
+        left = None if np.array_equal(P, np.eye(3)) else case.better(rms(y - p), error, columns)
+        if left is not None:
+            name = case.prepared.outputs[columns[0]].channel.name.removesuffix("_turn")
+            words = f"{name} turns about other axes than the robot as described would: {_axes(P)}"
+            change = (
+                f"write the orientation of {name} in the right-handed base frame, as the rotation that turns the base's axes into its "
+                f"own (not the inverse): {_axes(P)} of its rotation vector"
+            )
+            yield Suspicion("orientation", words, change, left, "turn")
+
+
+def _exchanges() -> list[np.ndarray]:
+    """Return the 48 exchanges of axes and signs (3, 3), as they are first."""
+    return [np.diag(s) @ np.eye(3)[list(order)] for s in product((1.0, -1.0), repeat=3) for order in permutations(range(3))]
 
 
 def _axes(turn: np.ndarray) -> str:

@@ -13,11 +13,11 @@ from twin.prediction.prepared import Inputs
 
 
 def outputs(case: Case) -> Iterator[Suspicion]:
-    """Yield scalar outputs that fit if negated, channel by channel. (Positions are checked as a frame.)"""
+    """Yield scalar outputs that fit if negated, channel by channel. (Positions and orientations are checked as frames.)"""
     nominal = case.as_is()
     if nominal is None:
         return
-    for group in dict.fromkeys(o.group for o in case.prepared.outputs if o.group != "marker"):
+    for group in dict.fromkeys(o.group for o in case.prepared.outputs if o.group not in ("marker", "turn")):
         wrong = []
         for j in case.columns(group):
             measured = [np.where(np.arange(y.shape[1]) == j, -y, y) for y in case.prepared.measured]
