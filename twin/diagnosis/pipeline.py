@@ -19,9 +19,9 @@ from twin.diagnosis.checks.zero_jumps import jumps_of, without_zero_jumps
 from twin.diagnosis.checks.zero_jumps import words as jumped
 from twin.diagnosis.conclusion import Conclusion
 from twin.diagnosis.diagnosis import Claim, Diagnosis, Errors, Fold, Settings
+from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.explain.describe import describe
 from twin.diagnosis.explain.next_experiment import Experiment, next_experiment
-from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext, Progress, silent
 from twin.diagnosis.held_out import HeldOut, predicted
 from twin.diagnosis.search.choose import choose

@@ -34,10 +34,9 @@ def told(change: np.ndarray, inverse: bool = False) -> list[tuple[str, str, str]
     T, true = turned()
     rng, trials = np.random.default_rng(0), []
     for k in range(2):
-        read = [
-            Rotation.from_matrix(change @ R.as_matrix() @ change.T) * Rotation.from_rotvec(rng.normal(0, 2e-3, 3)) for R in true
-        ]
-        q = np.array([(R.inv() if inverse else R).as_quat(scalar_first=True) for R in read])
+        noise = Rotation.from_rotvec(rng.normal(0, 2e-3, (len(true), 3)))
+        read = Rotation.from_matrix([change @ R.as_matrix() @ change.T for R in true]) * noise
+        q = (read.inv() if inverse else read).as_quat(scalar_first=True)
         values = {c.name: T[:, i] for i, c in enumerate(PULLS)} | {c.name: q[:, i] for i, c in enumerate(QUATERNION)}
         trials.append(Trial(f"{k}.csv", 2.0 * np.arange(len(T)), values, start=100.0 * k))
     day = Recording("continuum", "test", "hardware", np.zeros(3), (*PULLS, *QUATERNION), tuple(trials))

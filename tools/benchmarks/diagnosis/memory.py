@@ -1,7 +1,7 @@
 """Fits and what follows from them, kept in memory while one day is decided again and again.
 
-A fit is known again by its trials, its start, the derivatives given to it, and its stop rule; what is computed of a fit by that fit.
-While a memory is in force, the modules of `twin.diagnosis` that import one of the kept functions get it from there.
+A fit is known again by its trials, its start, the derivatives given to it, and its stop rule; what is computed of a fit by that
+fit. While a memory is in force, the modules of `twin.diagnosis` that import one of the kept functions get it from there.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ from twin.diagnosis.checks.fit_warnings import far_from_description, strained
 from twin.diagnosis.checks.mixed_robots import mixed_robots
 from twin.diagnosis.evidence.fast_error import fast_error
 from twin.diagnosis.evidence.left_out import proven
-from twin.diagnosis.evidence.scored_model import with_extended_law
+from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
+from twin.diagnosis.evidence.scored_model import ScoredModel, with_extended_law
 from twin.diagnosis.explain.error_location import misbent_segment
 from twin.diagnosis.explain.words import change
 from twin.diagnosis.fit_context import FitContext
@@ -55,6 +56,10 @@ def _function(function: Callable[..., Any], instead: Callable[..., Any]) -> Rule
     return Rule(function.__name__.lstrip("_"), functions={function: instead})
 
 
+def _small(context: FitContext, limits: AcceptanceLimits, best: ScoredModel, without: ScoredModel) -> bool:
+    return gate_stage.contribution(context, best, without) < limits.visible
+
+
 RULES: tuple[Rule, ...] = (
     _threshold("LEAST_EVIDENCE", ALWAYS),
     _threshold("LEAST_CONTRIBUTION", ALWAYS),
@@ -89,7 +94,7 @@ RULES: tuple[Rule, ...] = (
     _function(gate_stage._may_be_form, lambda context, limits, best, without, least: False),
     _function(gate_stage._harms, lambda context, limits, best, without: False),
     _function(gate_stage._ambiguity, lambda context, found, screening, best, without: None),
-    _function(gate_stage._immaterial, lambda context, limits, best, without: gate_stage.contribution(context, best, without) < limits.visible),
+    _function(gate_stage._immaterial, _small),
     _function(resolve_ties, lambda context, found, gated, limits: (found, gated)),
     _function(proven, lambda context, fitted, known: known),
     _function(mixed_robots, lambda prepared, trials, fitted: None),

@@ -47,8 +47,8 @@ def frame(case: Case) -> Iterator[Suspicion]:
 def orientations(case: Case) -> Iterator[Suspicion]:
     """Yield orientations that fit with the axes of their rotation vectors r exchanged or reversed.
 
-    In other axes, M of those declared, R becomes M R M' and r becomes det(M) M r, where M may be a mirror; of the inverse rotation r
-    becomes -r. What turns about two axes alone does not tell these causes apart.
+    In other axes, M of those declared, R becomes M R M' and r becomes det(M) M r, where M may be a mirror. Of the inverse rotation
+    r becomes -r. What turns about two axes alone does not tell these causes apart.
     """
     for body in dict.fromkeys(o.index for o in case.prepared.outputs if o.group == "turn") if case.predicted else ():
         columns = [j for j, o in enumerate(case.prepared.outputs) if o.group == "turn" and o.index == body]
@@ -62,8 +62,8 @@ def orientations(case: Case) -> Iterator[Suspicion]:
             name = case.prepared.outputs[columns[0]].channel.name.removesuffix("_turn")
             words = f"{name} turns about other axes than the robot as described would: {_axes(P)}"
             change = (
-                f"write the orientation of {name} in the right-handed base frame, as the rotation that turns the base's axes into its "
-                f"own (not the inverse): {_axes(P)} of its rotation vector"
+                f"write the orientation of {name} in the right-handed base frame, as the rotation that turns the base's axes into "
+                f"its own (not the inverse): {_axes(P)} of its rotation vector"
             )
             yield Suspicion("orientation", words, change, left, "turn")
 
