@@ -40,6 +40,7 @@ from twin.foundation.display_names import display_name
 from twin.foundation.errors import DataError
 from twin.foundation.threads import single_thread
 from twin.measurements import Recording
+from twin.prediction.damping import damped_as_measured, without_damping
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms
 from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import PreparedRecording, prepare
@@ -78,6 +79,7 @@ def diagnose(
         found, held_out = _held_out_diagnosis(recording, preview, twin, settings, progress)
         if every == 1:
             return found
+        whole = whole if any(i.damped for i in preview.prepared.inputs) else without_damping(whole)
         return replace(found, notices=(*found.notices, thinning_words(log, every, *held_out.in_all_rows(whole))))
 
 
@@ -278,8 +280,10 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     whole = prepare(log, twin.robot)
     part, every = thinned(log, whole, settings.budget)
     prepared = whole if every == 1 else prepare(part, twin.robot)
-    nominal = predicted(twin, prepared, list(range(len(prepared.inputs))))
+    as_described = predicted(twin, prepared, list(range(len(prepared.inputs))))
     fitted, held_out = split(prepared, settings.seed)
+    prepared, nominal = damped_as_measured(prepared, twin, as_described, fitted)
+    whole = whole if any(i.damped for i in prepared.inputs) else without_damping(whole)
     seen, alone = without_spikes(blind(prepared, held_out), nominal)
     start, objective, _ = objective_of(seen, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
