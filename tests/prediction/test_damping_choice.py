@@ -50,7 +50,7 @@ def left_out(late: float, n: int = 2) -> bool:
     chosen, predicted = damped_as_measured(prepared, twin, with_it, range(n))
     out = not any(i.damped for i in chosen.inputs)
     assert out == any("damping" in words for words in chosen.notices)
-    np.testing.assert_array_equal(predicted[0], [t.outputs(twin, chosen) for t in simulate(twin, chosen)][0])
+    np.testing.assert_array_equal(predicted[0], next(t.outputs(twin, chosen) for t in simulate(twin, chosen)))
     return out
 
 
