@@ -13,6 +13,7 @@ from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import prepare
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
+from twin.report.plots.variables import variables
 from twin.robots import Robot, load
 from twin.robots.robot import models_folder
 
@@ -136,3 +137,17 @@ def test_a_bound_that_another_number_contradicts_is_narrowed_and_said(tmp_path: 
     assert hole.high == pytest.approx(0.01, rel=1e-9)
     assert loose.find_conflicts({"tendons.radius": hole.high}) == []
     assert [n.split(";")[0] for n in loose.notices] == ["tendons.radius is fitted as far as 0.01 m"]
+
+
+def test_plots_go_by_a_motors_own_column(tmp_path: Path) -> None:
+    """In its unit, also of the tendon that it lets go; rates are those of that column."""
+    built = robot(tmp_path / "r")
+    angle = np.column_stack([np.linspace(0.0, 0.12, 7), np.zeros(7)])
+    day = turned(angle)
+    degrees = tuple(replace(c, unit="deg") if c.name == "motor_1_angle" else c for c in day.channels)
+    drawn = [v for kind, v in variables(prepare(replace(day, channels=degrees), built)) if kind in ("tension", "rate")]
+    for v in (drawn[0], drawn[4]):  # of the tendons 1 and 3
+        assert v.title == "motor_1_angle (deg)"
+        np.testing.assert_allclose(v.values[:7], np.degrees(angle[:, 0]), atol=1e-9)
+    assert drawn[1].title == "rate of motor_1_angle (deg/s)"
+    assert drawn[1].values[3] == pytest.approx(np.degrees(0.02) / 2.0, rel=1e-6)

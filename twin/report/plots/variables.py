@@ -30,12 +30,12 @@ class Variable:
 def variables(prepared: PreparedRecording) -> Iterator[tuple[str, Variable]]:
     """Yield each variable with its kind, as named in `Effect.plot_against`."""
     inputs, n = prepared.inputs, prepared.n_sample
-    factor = np.array([d.display_unit[1] for d in prepared.drives])
+    factor = np.array([_factor(prepared, t) for t in range(prepared.n_tendon)])
     pull = np.concatenate([i.command for i in inputs]) * factor
     slope = np.concatenate([_smoothed_rates(i.time, i.command) for i in inputs]) * factor
     still = REST_RATE_SHARE * np.median(np.abs(slope), axis=0)
     away = np.concatenate([i.pull for i in inputs])
-    strongest = np.argmax(away * factor if inputs[0].home is None else np.abs(away), axis=1)
+    strongest = np.argmax(away * np.abs(factor) if inputs[0].home is None else np.abs(away), axis=1)
     every, no = np.ones(n, bool), np.zeros(n)
     for t in range(prepared.n_tendon):
         side = np.where(np.abs(slope[:, t]) > still[t], np.sign(slope[:, t]), 0.0)
@@ -56,16 +56,29 @@ def variables(prepared: PreparedRecording) -> Iterator[tuple[str, Variable]]:
         yield kind, Variable(title, values, no, every)
 
 
+def _by_motor(prepared: PreparedRecording, t: int) -> bool:
+    """Return whether the column that drives a tendon is a motor's."""
+    return prepared.drives[t] is not Drive.CONTROL and prepared.pull[t] != 1.0
+
+
+def _factor(prepared: PreparedRecording, t: int) -> float:
+    """Return the factor from a tendon's command, SI, to what is shown: a motor's reading in the unit of its column."""
+    if not _by_motor(prepared, t):
+        return prepared.drives[t].display_unit[1]
+    scale = prepared.drivers[t].unit_scale.without_offset()
+    return float(scale.from_si(np.array([1.0 / prepared.pull[t]]))[0])
+
+
 def _pull_names(prepared: PreparedRecording, t: int) -> tuple[str, str, str]:
-    """Return the titles of a tendon's command and of its rate, and which samples are shown; a control goes by its column's name."""
+    """Return the titles of a tendon's command and of its rate, and which samples are shown.
+
+    A control or a motor goes by its column's name.
+    """
     what, unit = prepared.drives[t], prepared.drives[t].display_unit[0]
-    if what is Drive.CONTROL:
+    if what is Drive.CONTROL or _by_motor(prepared, t):
         driver = prepared.drivers[t]
-        return (
-            f"{driver.name} ({driver.si_unit})",
-            f"rate of {driver.name} ({driver.si_unit}/s)",
-            f"in which {driver.name} moves most",
-        )
+        shown = driver.si_unit if what is Drive.CONTROL else driver.unit
+        return f"{driver.name} ({shown})", f"rate of {driver.name} ({shown}/s)", f"in which {driver.name} moves most"
     return (
         f"{what} of tendon {t + 1} ({unit})",
         f"rate of tendon {t + 1}'s {what} ({unit}/s)",
