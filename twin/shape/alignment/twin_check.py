@@ -29,8 +29,8 @@ def is_aligned(twin: Twin) -> bool:
 
 def twin_notices(trials: Sequence[SensedTrial], estimator: Estimator) -> tuple[str, ...]:
     """Return a notice where the twin was never aligned, or where it does not fit the strains of trials in free motion."""
-    doubt = strain_doubt(trials, estimator)
-    doubted = doubt is not None and doubt > ACCEPTED_DOUBT
+    doubt = strain_doubt(trials, estimator) or 0.0
+    doubted = doubt > ACCEPTED_DOUBT
     size = f"strains of free motion put points {1e3 * doubt:.1f} mm off those of the tendons" if doubted else ""
     if not is_aligned(estimator.twin):
         return (
