@@ -4,6 +4,7 @@ nothing was trained on: `python -m tools.simulators.finger --shape --seed 22`, i
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -19,7 +20,7 @@ from twin.foundation.errors import DataError, TwinError
 from twin.measurements import Recording, read
 from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
-from twin.robots import load
+from twin.robots import load, sample
 from twin.shape.alignment.align import Alignment, align
 from twin.shape.alignment.drift_correction import correct_drift
 from twin.shape.alignment.report import alignment_lines, read_band_widening, write_alignment
@@ -44,7 +45,7 @@ def day() -> Recording:
 def aligned(day: Recording) -> Alignment:
     told: list[str] = []
     found = align(day, Twin.of(load("finger")), told.append)
-    steps = ("turning the finger onto its clouds", "sweep 1", "sweep 2", "bands under the hand")  # some seconds each
+    steps = ("turning the finger onto its clouds", "sweep 1", "sweep 2", "bands of this finger")  # some seconds each
     assert [s in t for s, t in zip(steps, told, strict=True)] == [True] * 4
     return found
 
@@ -98,6 +99,7 @@ def test_alignment_is_read_back(aligned: Alignment, tmp_path: Path) -> None:
     angle = aligned.fitted["mounting.angle"]
     assert text[1].split()[:4] == ["mounting.angle", f"{np.degrees(angle.value):.4g}", "+-", f"{np.degrees(angle.std or 0.0):.2g}"]
     assert (aligned.widening.factors.keys(), aligned.widening.known_contacts) == (estimators().keys(), ("hand, force unknown",))
+    assert aligned.widening.free_factors.keys() == estimators().keys()
 
 
 def test_alignment_without_clouds_or_without_free_motion_is_refused(day: Recording) -> None:
@@ -105,6 +107,36 @@ def test_alignment_without_clouds_or_without_free_motion_is_refused(day: Recordi
         align(only(day, "test_1"), Twin.of(load("finger")))
     with pytest.raises(DataError, match="free motion"):
         align(only(day, "align_2", "test_1"), Twin.of(load("finger")))
+
+
+# ---- a twin that is not of this finger ----------------------------------------------------------------------------------------
+
+
+def test_a_twin_of_this_finger_is_not_doubted(day: Recording, aligned: Alignment) -> None:
+    _, notices = predict_shapes(day, ModalEstimator(aligned.twin), aligned.widening)
+    assert not [n for n in notices if "align" in n or "unlike" in n]
+
+
+def test_a_twin_never_aligned_says_so(day: Recording) -> None:
+    notices = " ".join(predict_shapes(only(day, "test_1"), ModalEstimator(Twin.of(load("finger"))))[1])
+    assert "never aligned" in notices
+    assert "run twin align" in notices
+
+
+def test_a_twin_of_another_finger_says_how_far_off_it_is(aligned: Alignment) -> None:
+    """Monday is another finger of the independent bench: the strains of its free motion put points elsewhere by this twin."""
+    _, notices = predict_shapes(read(sample("monday")), ModalEstimator(aligned.twin), aligned.widening)
+    (notice,) = [n for n in notices if "another finger" in n]
+    doubt = float(re.findall(r"points ([\d.]+) mm off", notice)[0])
+    assert doubt > 0.2
+
+
+def test_frames_outside_the_training_are_counted_by_trial(day: Recording, aligned: Alignment) -> None:
+    """Undeclared, the hand of the second test makes strains that tendons alone do not."""
+    arrays, notices = predict_shapes(only(silent(day), "test_1", "test_2"), ModalEstimator(aligned.twin), aligned.widening)
+    (notice,) = [n for n in notices if "NAME_outside" in n]
+    flags = arrays["test_2_outside"]
+    assert notice.endswith(f": test_2 {flags.sum()} of {len(flags)}")
 
 
 # ---- every estimator ----------------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 """Estimate the shapes of a recording: named points of every trial, their uncertainty and the skin, in the base frame."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from twin.mechanics.silicone.skin import Skin
 from twin.mechanics.silicone.statics import rotation_about_z
 from twin.shape.alignment.band_widening import UNKNOWN_CONTACT_WIDENING, BandWidening, widen_band
 from twin.shape.alignment.drift_correction import correct_drift
+from twin.shape.alignment.twin_check import twin_notices
 from twin.shape.estimators.estimator import Estimator, SensorReadings, ShapeEstimates
 from twin.shape.sensing import SensedTrial, read_sensors
 
@@ -22,13 +24,16 @@ NO_WIDENING = BandWidening()
 def predict_shapes(
     recording: Recording, estimator: Estimator, bands: BandWidening = NO_WIDENING
 ) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Estimate the shapes of all trials and return them as arrays, with notices for the reader.
+    """Estimate the shapes of all trials and return them as arrays, with notices for the reader: also of frames outside the training
+    and of a twin that is not of this finger.
 
     Arrays of each trial: NAME_time (n,) s, NAME_vertices (n, P, 3) m, NAME_std (n, P) m, NAME_outside (n,) and NAME_cloud (n, M, 3)
     m. `bands` widens the bands where something may press.
     """
     sensed, notices = read_sensors(recording, estimator.twin)
     sensed, drift = correct_drift(sensed, [t.start for t in recording.trials], estimator.twin)
+    with single_thread():
+        doubts = twin_notices(sensed, estimator)
     arrays, skin = {}, SkinReconstruction(estimator)
     for trial in sensed:
         label = next(t.label for t in recording.trials if t.name == trial.name)
@@ -43,13 +48,23 @@ def predict_shapes(
             f"{label}_outside": shapes.outside,
             f"{label}_cloud": skin(shapes) @ turn,
         }
-    return arrays, (*notices, *drift)
+    return arrays, (*notices, *doubts, *_outside_notices(arrays), *drift)
+
+
+def _outside_notices(arrays: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """Return a notice of the frames that are outside, by trial."""
+    flags = {name.removesuffix("_outside"): of for name, of in arrays.items() if name.endswith("_outside")}
+    each = ", ".join(f"{name} {int(of.sum())} of {len(of)}" for name, of in flags.items() if of.any())
+    return (
+        (f"frames unlike all that the estimator was trained on, whose bands may not hold (NAME_outside): {each}",) if each else ()
+    )
 
 
 def apply_band_widening(shapes: ShapeEstimates, contact: str | None, estimator: Estimator, bands: BandWidening) -> ShapeEstimates:
     """Widen the band for the contact of the trial, and mark frames pressed by a contact unknown to the alignment as outside."""
     if contact is None:  # here `outside` marks frames in which the strains show a push
-        return widen_band(shapes, np.where(shapes.outside & bands.is_unknown(None), UNKNOWN_CONTACT_WIDENING, 1.0))
+        pressed = UNKNOWN_CONTACT_WIDENING if bands.is_unknown(None) else 1.0
+        return widen_band(shapes, np.where(shapes.outside, pressed, bands.free_factor(estimator)))
     unknown = bands.is_unknown(contact) & (True if shapes.pressed is None else shapes.pressed)
     return replace(widen_band(shapes, bands.factor(estimator, contact)), outside=shapes.outside | unknown)
 

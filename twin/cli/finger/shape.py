@@ -14,7 +14,8 @@ from twin.cli.terminal import out, printable, show_progress
 class Shape:
     """Estimate a soft finger's shape from its strain sensors and tendon displacements, with its standard deviation.
 
-    Writes NAME_time, NAME_vertices, NAME_std, NAME_outside and NAME_cloud of every trial, in metres.
+    Writes NAME_time, NAME_vertices, NAME_std, NAME_outside and NAME_cloud of every trial, in metres. Notes say how many frames are
+    outside the training, and whether the twin was never aligned or is of another finger.
     """
 
     twin: Annotated[str, arg(help="an aligned twin: its folder or twin.toml, or a robot's name")]

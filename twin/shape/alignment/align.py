@@ -4,8 +4,8 @@
 2. Shape under contact: coordinates of the twin's deformation modes, frame by frame (`cloud_fit.py`).
 3. Sensors: with both kinds of shapes the strains are known, and sqrt(R) = a + a kappa+ max(eps, 0) + a kappa- min(eps, 0), a =
    sqrt(R0), is linear in (a, a kappa+, a kappa-): least squares, robust, with the robot's priors.
-4. Bands: the distance of each estimate from the shapes behind the clouds sets the band width under this contact
-   (`band_widening.py`).
+4. Bands: the distance of each estimate from the shapes by tendons and behind the clouds sets the band width of this finger, in
+   free motion and under this contact (`band_widening.py`).
 
 Every step is smooth and small; `tools/benchmarks/shape/error.py` compares it with a black-box search over all numbers at once.
 """
@@ -31,7 +31,7 @@ from twin.prediction.prepared import prepare
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
 from twin.robots.named_points import named_points
-from twin.shape.alignment.band_widening import BandWidening, CloudReference, fit_widening
+from twin.shape.alignment.band_widening import BandWidening, ShapeReference, fit_free_widening, fit_widening
 from twin.shape.alignment.cloud_fit import CLOUD_NOISE, ROBUST_LIMIT, CloudFit
 from twin.shape.alignment.sensor_fit import CLOUD_STRAIN_ERROR, TENDON_STRAIN_ERROR, StrainSamples, fit_sensors
 from twin.shape.estimators.estimator import SensorReadings, estimators
@@ -102,9 +102,9 @@ def _align(recording: Recording, twin: Twin, progress: Callable[[str], None]) ->
             twin,
         )
         twin = replace(twin, values={**twin.values, **{name: f.value for name, f in fitted.items()}})
-    progress("bands under the hand")
+    progress("bands of this finger")
     bands = _fit_band_widening(
-        [s for s in trials if s.nodes is None and s.cloud_frames()],
+        [s for s in trials if s.cloud_frames()],
         CloudFit(skin, net, rotation_about_z(angle), trials[0].view_direction),
         net,
         twin,
@@ -186,15 +186,19 @@ def _strain_samples(
     return StrainSamples(*(np.concatenate(p) for p in zip(*parts, strict=True)))
 
 
-def _fit_band_widening(pushed: Sequence[CloudTrial], fit: CloudFit, net: ModalNetwork, twin: Twin) -> BandWidening:
-    """Return how far the bands are widened under the contact of the pushed trials."""
-    if not pushed:
-        return BandWidening()
-    references, factors = [_cloud_reference(trial, fit, net, twin) for trial in pushed], {}
-    for name, estimator in estimators().items():
+def _fit_band_widening(trials: Sequence[CloudTrial], fit: CloudFit, net: ModalNetwork, twin: Twin) -> BandWidening:
+    """Return how far the bands are widened in free motion, and under the contact of the pushed trials."""
+    free = [_tendon_reference(trial, twin) for trial in trials if trial.nodes is not None]
+    pushed, factors, free_factors = [t for t in trials if t.nodes is None], {}, {}
+    references = [_cloud_reference(trial, fit, net, twin) for trial in pushed]
+    for name, kind in estimators().items():
         with suppress(DataError):  # no weights for this robot: the estimator cannot be used either
-            factors[name] = fit_widening(estimator(twin), references)
-    return BandWidening(factors, tuple(sorted({trial.sensed.contact or "" for trial in pushed})))
+            estimator = kind(twin)
+            if free:
+                free_factors[name] = fit_free_widening(estimator, free)
+            if references:
+                factors[name] = fit_widening(estimator, references)
+    return BandWidening(factors, tuple(sorted({trial.sensed.contact or "" for trial in pushed})), free_factors)
 
 
 def fit_cloud_shapes(
@@ -215,7 +219,7 @@ def strain_at(statics: SoftStatics, net: ModalNetwork, z: np.ndarray, covariance
     return eps[0], slope @ covariance @ slope.T + CLOUD_STRAIN_ERROR**2 * np.eye(len(slope))
 
 
-def _cloud_reference(trial: CloudTrial, fit: CloudFit, net: ModalNetwork, twin: Twin) -> CloudReference:
+def _cloud_reference(trial: CloudTrial, fit: CloudFit, net: ModalNetwork, twin: Twin) -> ShapeReference:
     """Return the named points behind a pushed trial's clouds."""
     body = sensing_finger(twin)
     readings, coordinates, at = fit_cloud_shapes(trial, fit, net, body)
@@ -224,4 +228,14 @@ def _cloud_reference(trial: CloudTrial, fit: CloudFit, net: ModalNetwork, twin: 
     basis = np.einsum("pn,knc->kpc", weights, net.modes.basis.reshape(len(net.modes.basis), -1, 3))
     variance = [np.einsum("kpc,kl,lpc->p", basis, c, basis, optimize=True) for _, c in coordinates]
     time = trial.sensed.time[at]
-    return CloudReference(readings, float(time[-1] - time[0]), displacements, np.sqrt(np.stack(variance)))
+    return ShapeReference(readings, float(time[-1] - time[0]), displacements, np.sqrt(np.stack(variance)))
+
+
+def _tendon_reference(trial: CloudTrial, twin: Twin) -> ShapeReference:
+    """Return the named points of a free trial at its clouds, as its tendons make them."""
+    assert trial.nodes is not None
+    body, at = sensing_finger(twin), [i for i, _ in trial.cloud_frames()]
+    readings = SensorReadings(strain(trial.sensed.resistance[at], body.cords), trial.sensed.displacement[at], pushed=False)
+    displacements = np.einsum("pn,fnc->fpc", body.lattice.weights(named_points(twin.robot).rest), trial.nodes[at])
+    time = trial.sensed.time[at]
+    return ShapeReference(readings, float(time[-1] - time[0]), displacements, np.zeros(displacements.shape[:2]))

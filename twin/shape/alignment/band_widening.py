@@ -1,16 +1,26 @@
-"""Fit the band width of an estimator under the contact of the alignment trials, from their clouds, without labels.
+"""Fit the band width of an estimator to the finger of an alignment, from its clouds, without labels.
 
-Bands are made for the training pushes; an estimate's error depends on where, how wide and at how many places a hand presses, which
-strains do not show. The shape behind a cloud (`cloud_fit.py`) does. With a distance D between the two, a spread s beyond the twin's
-own error o, and the cloud's own uncertainty c, the band holds a point if it is widened by k or more,
+Bands are made for training fingers, whose numbers are drawn and less well known than those of an aligned one, and for training
+pushes. With a distance D between an estimate of spread s and a reference, a band holds a point if it is widened by r or more,
 
-    k = sqrt(max((D / 1.645)^2 - c^2 - o^2, 0)) / s,        widen = (90 % quantile of k)^w,    w = H^2 / (H^2 + ONE^2 / n)
+    free motion:  r = sqrt(D^2 + o^2) / (1.645 s)   the reference is the shape that tendons of known length make by the twin, which
+                                                    has an error o of its own
+    contact:      r = D / (1.645 sqrt(s^2 + c^2))   it is the shape behind a cloud (`cloud_fit.py`), itself uncertain by c
 
-w weighs the information of n pushes: log k scatters by ONE (PUSH_SCATTER) from push to push, and hands differ by H (HAND_SCATTER)
+Free motion: errors of frames half a second apart hardly correlate (0.16), so the band is conformal. Of n frames the quantile
+ceil(0.9 (n + 1)) / n of r holds 90 % of the points of a further frame.
+
+Contact: an error depends on where, how wide and at how many places a hand presses, which strains do not show. It stays for a whole
+push, and too few pushes are seen for a conformal band. Their quantile is weighed against the training pushes:
+
+    widen = (90 % quantile of r)^w,    w = H^2 / (H^2 + ONE^2 / n)
+
+w weighs the information of n pushes: log r scatters by ONE (PUSH_SCATTER) from push to push, and hands differ by H (HAND_SCATTER)
 from the training pushes. This holds for the contact of the alignment. A contact that its trial's `external_contact` names otherwise
 may hold the finger in ways that no training push does; its band is widened by UNKNOWN_CONTACT_WIDENING.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -18,18 +28,24 @@ import numpy as np
 
 from twin.shape.estimators.estimator import Z90, Estimator, SensorReadings, ShapeEstimates, twin_error
 
-PUSH_SCATTER = 0.75  # of log k of a single push: 0.37 of four pushes, measured on 70 training chains with `physics`
-HAND_SCATTER = 0.4  # of log k: a hand whose band should be half as wide again is an ordinary one; ours
+HELD = 0.9  # of the points
+PUSH_SCATTER = 0.75  # of log r of a single push: 0.37 of four pushes, measured on 70 training chains with `physics`
+HAND_SCATTER = 0.4  # of log r: a hand whose band should be half as wide again is an ordinary one; ours
 PUSH_DURATION = 3.0  # s, of one push
 UNKNOWN_CONTACT_WIDENING = 1.8  # 1.7 (`physics`; `modal` 1.8) holds 90 % of a slack finger between two edges up to 25 mm apart
 
 
 @dataclass(frozen=True)
 class BandWidening:
-    """Band factors of each estimator under the contacts of the alignment, which are named as in their trials."""
+    """Band factors of each estimator: in free motion, and under the contacts of the alignment, named as in their trials."""
 
     factors: Mapping[str, float] = field(default_factory=dict)
     known_contacts: tuple[str, ...] = ()
+    free_factors: Mapping[str, float] = field(default_factory=dict)
+
+    def free_factor(self, estimator: Estimator) -> float:
+        """Return the factor of an estimator's band in free motion."""
+        return self.free_factors.get(estimator.name(), 1.0)
 
     def factor(self, estimator: Estimator, contact: str) -> float:
         """Return the factor of an estimator's band under this contact."""
@@ -41,10 +57,11 @@ class BandWidening:
 
 
 @dataclass(frozen=True)
-class CloudReference:
-    """Readings at a trial's clouds, over how many seconds, and the true points behind each cloud.
+class ShapeReference:
+    """Readings of some frames of a trial, over how many seconds, and the points there from tendons or clouds.
 
-    `displacements` (f, P, 3) m of the points and their standard deviations `std` (f, P) m.
+    `displacements` (f, P, 3) m of the points, by clouds where something pushes and else by tendons, and the clouds' standard
+    deviations `std` (f, P) m.
     """
 
     readings: SensorReadings
@@ -53,31 +70,32 @@ class CloudReference:
     std: np.ndarray
 
 
-def fit_widening(estimator: Estimator, trials: Sequence[CloudReference]) -> float:
-    """Return the factor by which this estimator's spread is to be widened under this contact."""
-    unclamped = estimator.points.rest[:, 2] > estimator.body.cone.clamp
-    needed = np.concatenate([_required_widening(estimator, trial)[:, unclamped] for trial in trials])
+def fit_widening(estimator: Estimator, trials: Sequence[ShapeReference]) -> float:
+    """Return the factor of this estimator's band under the contact of these trials."""
+    needed = np.concatenate([_needed_widening(estimator, trial) for trial in trials])
     pushes = sum(trial.seconds for trial in trials) / PUSH_DURATION
     weight = HAND_SCATTER**2 / (HAND_SCATTER**2 + PUSH_SCATTER**2 / max(pushes, 1.0))
-    return float(max(np.quantile(needed, 0.9), 1e-3) ** weight)
+    return float(max(np.quantile(needed, HELD), 1e-3) ** weight)
 
 
-def _required_widening(estimator: Estimator, trial: CloudReference) -> np.ndarray:
-    """Return the factor (f, P) that each point needs."""
+def fit_free_widening(estimator: Estimator, trials: Sequence[ShapeReference]) -> float:
+    """Return the conformal factor of this estimator's band in free motion; 1 for fewer frames than can hold 90 %."""
+    needed = np.concatenate([_needed_widening(estimator, trial) for trial in trials])
+    n = len(needed)
+    rank = math.ceil(HELD * (n + 1))
+    return float(max(np.quantile(needed, rank / n), 1e-3)) if rank <= n else 1.0
+
+
+def _needed_widening(estimator: Estimator, trial: ShapeReference) -> np.ndarray:
+    """Return the factor (f, P) that each point needs, without clamped points, which have no error."""
     shapes = estimator.estimate(trial.readings)
-    distance = np.linalg.norm(shapes.displacements - trial.displacements, axis=2) / Z90
-    spread, own = _split_std(shapes)
-    return np.sqrt(np.maximum(distance**2 - trial.std**2 - own**2, 0.0)) / spread
+    distance = np.linalg.norm(shapes.displacements - trial.displacements, axis=2)
+    if not trial.readings.pushed:
+        distance = np.hypot(distance, twin_error(trial.displacements))
+    needed = distance / (Z90 * np.hypot(shapes.std, trial.std))
+    return needed[:, estimator.points.rest[:, 2] > estimator.body.cone.clamp]
 
 
 def widen_band(shapes: ShapeEstimates, factor: float | np.ndarray) -> ShapeEstimates:
-    """Widen the spread beyond the twin's own error, by one factor or (n,)."""
-    spread, own = _split_std(shapes)
-    factor = np.reshape(factor, (-1, 1))
-    return replace(shapes, std=np.hypot(factor * spread, own))
-
-
-def _split_std(shapes: ShapeEstimates) -> tuple[np.ndarray, np.ndarray]:
-    """Return the spread and the twin's own error, (n, P) m each."""
-    own = twin_error(shapes.displacements)
-    return np.sqrt(np.maximum(shapes.std**2 - own**2, 1e-14)), own
+    """Widen the band by one factor or (n,), to no less than the twin's own error, which a shape by tendons has too."""
+    return replace(shapes, std=np.maximum(np.reshape(factor, (-1, 1)) * shapes.std, twin_error(shapes.displacements)))

@@ -13,7 +13,8 @@ from twin.shape.alignment.align import Alignment
 from twin.shape.alignment.band_widening import BandWidening
 
 ALIGNMENT_TEXT, ALIGNMENT_JSON = "alignment.txt", "alignment.json"  # file names
-WIDENING_KEY, CONTACTS_KEY = "bands_widened_by", "bands_widened_under"  # keys of the JSON report
+# keys of the JSON report
+WIDENING_KEY, CONTACTS_KEY, FREE_KEY = "bands_widened_by", "bands_widened_under", "bands_widened_in_free_motion_by"
 
 
 def write_alignment(aligned: Alignment, folder: Path, provenance: Mapping[str, Any]) -> None:
@@ -35,8 +36,8 @@ def read_band_widening(source: str) -> BandWidening:
         return BandWidening()
     try:
         found = json.loads(path.read_text("utf-8"))
-        by, hands = found.get(WIDENING_KEY, {}), found.get(CONTACTS_KEY, [])
-        return BandWidening({str(name): float(value) for name, value in by.items()}, tuple(map(str, hands)))
+        by, free = ({str(n): float(v) for n, v in found.get(key, {}).items()} for key in (WIDENING_KEY, FREE_KEY))
+        return BandWidening(by, tuple(map(str, found.get(CONTACTS_KEY, []))), free)
     except (OSError, ValueError, AttributeError, TypeError) as fault:
         raise DataError(f"{path}: no report of an alignment ({type(fault).__name__}); run twin align again, or delete it") from None
 
@@ -47,6 +48,7 @@ def alignment_table(aligned: Alignment) -> dict[str, Any]:
         "parameters": {n: {"value": f.value, "std": f.std, "unit": f.unit} for n, f in aligned.fitted.items()},
         WIDENING_KEY: dict(aligned.widening.factors),
         CONTACTS_KEY: list(aligned.widening.known_contacts),
+        FREE_KEY: dict(aligned.widening.free_factors),
         "cloud_distance_before": aligned.distance_before,
         "cloud_distance_after": aligned.distance_after,
         "cloud_frames": aligned.cloud_count,
@@ -68,11 +70,11 @@ def alignment_lines(aligned: Alignment) -> list[str]:
         )
     before, after = 1e3 * aligned.distance_before, 1e3 * aligned.distance_after
     out.append(f"clouds without a hand lie {before:.3f} mm (root mean square) from the visible skin before, {after:.3f} mm after")
-    if aligned.widening.known_contacts:
-        each = ", ".join(f"{name} {by:.2f}" for name, by in aligned.widening.factors.items())
-        out.append(
-            f"bands under {' or '.join(map(repr, aligned.widening.known_contacts))} are widened, as the clouds have it: {each}"
-        )
+    contacts = " or ".join(map(repr, aligned.widening.known_contacts))
+    for where, factors in (("in free motion", aligned.widening.free_factors), (f"under {contacts}", aligned.widening.factors)):
+        if factors:
+            each = ", ".join(f"{name} {by:.2f}" for name, by in factors.items())
+            out.append(f"bands {where} are as many times as wide as for any finger: {each}")
     if aligned.undetermined:
         out.append(f"not fixed by the clouds, left as described: {', '.join(aligned.undetermined)}")
     return [*out, *(f"note: {n}" for n in aligned.notices)]
