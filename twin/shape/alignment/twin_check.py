@@ -17,7 +17,8 @@ from twin.shape.estimators.modal import ModalNetwork
 from twin.shape.sensing import SensedTrial
 
 TOLD_BY_STRAIN = 0.01  # of a trial's strains the largest must reach this
-ACCEPTED_DOUBT = 2e-4  # m: aligned twins show 0.11 mm at most (`physics` 0.13), those of other fingers 0.30 mm and more on seven days
+# m: aligned twins show 0.11 mm at most (`physics` 0.13), those of other fingers 0.30 mm and more on seven days
+ACCEPTED_DOUBT = 2e-4
 FRAME_COUNT = 40  # of a trial, evenly spread
 
 
