@@ -180,7 +180,7 @@ def fit(
         promised = step.to(FIRST_DAMPING)[1] if objective.bends else 0.0
         least, near_least = objective.smallest_fall(stop.tolerance, now)
         far = renewals and promised > FAR_SHARE * now
-        enough = max(least if far else near_least, stop.worth)
+        enough = max(least if far else near_least, stop.tolerance * now if kept else 0.0, stop.worth)
         better, damping, predicted = step.taken(now, damping, enough)
         fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
