@@ -33,7 +33,7 @@ def resolve_ties(context: FitContext, found: Search, gated: Gated, limits: Accep
             continue
         weighed = (*found.all, *(w for w in pair if all(w.effects != known.effects for known in found.all)))
         best = max(pair, key=lambda w: w.score)
-        without = {e: refit_without(context, base, best, e, found.all) for e in best.effects if e not in base.effects}
+        without = {e: refit_without(context, base, best, e) for e in best.effects if e not in base.effects}
         found = replace(found, all=tuple(sorted(weighed, key=lambda w: -w.score)))
         return found, replace(gated, best=best, without=without, doubts=gated.doubts[:n], settled=gated.doubts[n:])
     return found, gated
