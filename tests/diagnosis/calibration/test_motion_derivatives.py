@@ -11,9 +11,9 @@ import pytest
 
 from tests.mechanics.mjcf.models import robot
 from tests.servo import ARM, UNCERTAIN, day
-from twin.diagnosis.calibration.fit import fit
+from twin.diagnosis.calibration.fit import StopRule, fit
 from twin.diagnosis.calibration.model import Model
-from twin.diagnosis.calibration.objective import COARSE_ERROR, Objective
+from twin.diagnosis.calibration.objective import COARSE_ERROR, LARGEST_LAST_FALL, MISFIT_SHARE, TRIALS_PROBED, Objective
 from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
 from twin.foundation.errors import SolveError
@@ -91,3 +91,41 @@ def test_motion_that_is_lost_in_long_steps_alone_is_taken_by_short_ones(
     assert np.isfinite(fine).all()
     off = np.linalg.norm(coarse - fine, axis=0) / np.linalg.norm(fine, axis=0)
     assert 0.0 < off.max() < COARSE_ERROR
+
+
+def test_only_derivatives_that_changed_are_computed_again(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
+    objective, model = swung
+    at, which = objective.evaluate(model), list(range(len(model.free)))
+    right = objective.jacobian(at, which)
+    known = right.copy()
+    known[:, 0] *= 1.5
+    asked: list[tuple[int, int]] = []
+    of = Objective.jacobian
+
+    def counted(self: Objective, at: Any, which: Any) -> np.ndarray:
+        asked.append((len(self.trials), len(which)))
+        return of(self, at, which)
+
+    monkeypatch.setattr(Objective, "jacobian", counted)
+    np.testing.assert_allclose(objective.renewed(at, which, known), right, atol=1e-9)
+    assert asked == [(TRIALS_PROBED, len(which)), (len(objective.trials) - TRIALS_PROBED, 1)]
+
+
+def test_a_hopeless_fit_renews_nothing(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
+    objective, model = swung
+    J = objective.jacobian(objective.evaluate(model), range(len(model.free)))
+    renewed = []
+    monkeypatch.setattr(Objective, "renewed", lambda self, at, which, known: renewed.append(which) or known)
+    fit(objective, model, J=J)
+    assert renewed
+    renewed.clear()
+    fit(objective, model, J=J, stop=StopRule(beat=0.0))
+    assert renewed == []
+
+
+def test_fits_of_motion_end_near_a_minimum_that_leaves_much(swung: tuple[Objective, Model]) -> None:
+    objective, _ = swung
+    at_noise, far = objective.smallest_fall(1e-5, objective.n), objective.smallest_fall(1e-5, 100.0 * objective.n)
+    assert at_noise[0] == at_noise[1] <= LARGEST_LAST_FALL
+    assert far[0] <= LARGEST_LAST_FALL
+    np.testing.assert_allclose(far[1], max(far[0], MISFIT_SHARE * 99.0 * objective.n))

@@ -211,6 +211,16 @@ def test_less_one_effect_the_rest_is_fitted_again_from_what_it_was(monkeypatch: 
     np.testing.assert_array_equal(how["J"], best.fit.J[:, left])
 
 
+def test_less_one_effect_a_fit_of_motion_goes_on_from_that_of_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, best = weighed(calibrated()), weighed(calibrated("base_tilt", "tendon_friction"))
+    known, fits = weighed(calibrated("tendon_friction")), Fits(monkeypatch)
+    for bends, start in ((False, best.fit.model.without_effect("base_tilt")), (True, known.fit.model)):
+        told = study()
+        told.objective = SimpleNamespace(**vars(told.objective) | {"bends": bends})
+        refit_without(told, base, best, "base_tilt", (base, known))
+        assert fits.asked[-1][0] == start
+
+
 def test_without_equilibrium_it_is_fitted_from_the_calibrated_robot_and_at_last_is_that(monkeypatch: pytest.MonkeyPatch) -> None:
     base, best = weighed(calibrated()), weighed(calibrated("base_tilt", "tendon_friction"))
     name = base.fit.model.free[0].parameter.name

@@ -16,7 +16,7 @@ from twin.diagnosis.search.search import _material, search
 from twin.foundation.parameters import Parameter
 
 STUDY: Any = SimpleNamespace(
-    objective=SimpleNamespace(n=10_000),
+    objective=SimpleNamespace(n=10_000, bends=False),
     evidence=None,
     progress=lambda words: None,
     fall_by_group=lambda a, b: np.zeros(1),
@@ -129,7 +129,7 @@ def test_a_pattern_that_promises_a_quarter_of_what_counts_is_refitted(
 ) -> None:
     """A first-order pattern may tell half the size of what bends far, a quarter in square; whether it pays is the refit to say."""
     world = World(monkeypatch, {"asymmetry": 500.0})
-    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100)})  # so that evidence is the bar
+    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100, bends=False)})  # so that evidence is the bar
     monkeypatch.setattr(
         stage,
         "rank",
@@ -156,7 +156,7 @@ def test_patterns_are_taken_anew_of_what_promises_a_quarter_of_what_a_refit_asks
         gains = {"friction": 1e6, "creep": 1e6, "tilt": share * 0.25 * AcceptanceLimits().accept}
         return [SimpleNamespace(effect=e, start=None, gain=g) for e, g in gains.items() if e not in fit.effects]
 
-    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100)})  # so that evidence is the bar
+    few: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=100, bends=False)})  # so that evidence is the bar
     monkeypatch.setattr(stage, "rank", rank)
     world.found(few)
     assert world.anew[0] == anew
@@ -258,7 +258,9 @@ def test_a_candidate_must_promise_what_would_be_material() -> None:
     """|z|^2 of bar^2 n, or of 15 % (an amplitude) of what the set explains in the group in which it explains least."""
     fit = SimpleNamespace(fit=None)
     for fall, least in (([4e5, 9e5], 0.15**2 * 4e5), ([1e4, 9e5], 0.5**2 * 1e4), ([-5.0, 9e5], 0.5**2 * 1e4)):
-        study: Any = SimpleNamespace(objective=SimpleNamespace(n=10_000), fall_by_group=lambda a, b, fall=fall: np.array(fall))
+        study: Any = SimpleNamespace(
+            objective=SimpleNamespace(n=10_000, bends=False), fall_by_group=lambda a, b, fall=fall: np.array(fall)
+        )
         assert _material(study, fit, fit, 0.5) == pytest.approx(least)  # type: ignore[arg-type]
 
 

@@ -35,7 +35,7 @@ class World:
         self.harmful: set[str] = set()
         self.thrown: set[str] = set()  # of these: by a step to first order alone
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
-        monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
+        monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e, known: self.of(*(x for x in best.effects if x != e)))
         monkeypatch.setattr(stage, "left_out", lambda study, fit: self.left_out(fit.effects))
         monkeypatch.setattr(stage, "proven", lambda study, fit, known: self.left_out(tuple({*fit.effects} - self.thrown)))
         monkeypatch.setattr(stage, "with_effect_added", lambda study, rest, rival, start: self.of(*rest.effects, rival))

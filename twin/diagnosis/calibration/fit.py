@@ -14,15 +14,17 @@ from scipy.optimize import lsq_linear
 
 from twin.diagnosis.calibration.fisher_information import scatter, solve, unidentifiable
 from twin.diagnosis.calibration.model import Free, Model, prior_weight
-from twin.diagnosis.calibration.objective import LARGEST_LAST_FALL, PARAMETER_DIFFERENCE, Evaluation, Objective
+from twin.diagnosis.calibration.objective import PARAMETER_DIFFERENCE, Evaluation, Objective
 from twin.foundation.errors import SolveError
 from twin.foundation.parameters import FittedValue
 
+FAR_SHARE = 0.05  # of the cost: a fit whose derivatives promise a larger fall is far from its minimum
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
 SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came of motion, they are renewed
 MOST_MOTION_STEPS = 24  # at most, of a fit of motion
-MOST_RENEWALS = 3  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
+MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
 MOST_FIT_STEPS = 12  # at most, of a fit
+FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
 # `tools.benchmarks.diagnosis.attribution` it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
@@ -161,47 +163,83 @@ def fit(
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
     # Derivatives of the same model, of more trials than these, are near enough.
-    renewals = MOST_RENEWALS if objective.bends and (J is None or near is None or near.model is not model) else 0
-    fixed = [i for i, f in enumerate(model.free) if f.effect is None and (J is None or i >= J.shape[1])]
+    kept = not objective.bends or (J is not None and near is not None and near.model is model)
+    renewals = 0 if kept or np.isinf(stop.worth) else MOST_RENEWALS
+    own = [i for i, f in enumerate(model.free) if f.effect is None]
+    fixed = [i for i in own if J is None or i >= J.shape[1]]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
     if J is not None:
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
-    now, damping, own, moved = penalty.cost(at), 1e-4, [i for i, f in enumerate(model.free) if f.effect is None], J is not None
+    now, damping = penalty.cost(at), FIRST_DAMPING
     since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
     for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
-        x = at.model.vector()
-        H, g = penalty.normal_equations(x, columns, at.z)
-        better, whole, enough = None, damping, max(objective.smallest_fall(stop.tolerance * now), stop.worth)
-        while better is None and damping < 1e4:
-            d = _bounded_step(H + damping * np.diag(np.diag(H) + 1e-9), g, penalty.low - x, penalty.high - x)
-            predicted_fall = -float(2.0 * g @ d + d @ H @ d)
-            if damping > whole and predicted_fall < enough:  # a failed step is shortened while it still gains enough
-                break
-            better = _improved(objective, at, x + d, now - penalty.besides(x + d))
-            damping *= 1.0 if better else 10.0
+        step = _Step.of(penalty, at, columns)
+        promised = step.to(FIRST_DAMPING)[1] if objective.bends else 0.0
+        least, near_least = objective.smallest_fall(stop.tolerance, now)
+        far = renewals and promised > FAR_SHARE * now
+        enough = max(least if far else near_least, stop.tolerance * now if kept else 0.0, stop.worth)
+        better, damping, predicted = step.taken(now, damping, enough)
         fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
-            at, now, moved = better, penalty.cost(better), True
-            if fall > TRUSTED_FALL_SHARE * predicted_fall:
+            at, now = better, penalty.cost(better)
+            if fall > TRUSTED_FALL_SHARE * predicted:
                 damping = max(0.1 * damping, 1e-6)
             if now - left * fall > stop.beat:
                 break
-        slow = objective.bends and fall < SLOW_FALL_SHARE * predicted_fall
-        if better is None or fall < enough or slow:
-            if not (renewals and moved and left):
-                if slow and better is not None and fall >= enough:
-                    continue
-                break
-            columns[:, own], moved, renewals, damping = objective.jacobian(at, own), False, renewals - 1, 1e-4
+        slow = fall < SLOW_FALL_SHARE * promised
+        if better is not None and fall >= enough and not slow:
+            continue
+        if renewals and left and since - now >= enough and now <= stop.beat:
+            columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, FIRST_DAMPING
             since = now
+        elif fall < enough or now > stop.beat:
+            break
     if refresh:
-        stale = not objective.bends or since - now > LARGEST_LAST_FALL
+        stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]
         which = range(len(model.free)) if stale else moving
         columns[:, which] = objective.jacobian(at, which)
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A step from an evaluated model: half the Hessian (n_free, n_free) and half the gradient (n_free,) of the cost there."""
+
+    penalty: _Penalty
+    at: Evaluation
+    x: np.ndarray
+    H: np.ndarray
+    g: np.ndarray
+
+    @staticmethod
+    def of(penalty: _Penalty, at: Evaluation, columns: np.ndarray) -> _Step:
+        x = at.model.vector()
+        return _Step(penalty, at, x, *penalty.normal_equations(x, columns, at.z))
+
+    def to(self, damping: float) -> tuple[np.ndarray, float]:
+        """Return the step (n_free,) with a damping, within bounds, and the fall of the cost that derivatives predict."""
+        low, high = self.penalty.low - self.x, self.penalty.high - self.x
+        d = _bounded_step(self.H + damping * np.diag(np.diag(self.H) + 1e-9), self.g, low, high)
+        return d, -float(2.0 * self.g @ d + d @ self.H @ d)
+
+    def taken(self, now: float, damping: float, enough: float) -> tuple[Evaluation | None, float, float]:
+        """Return the evaluation that lowers the cost from `now`, if any, its damping, and the fall that was predicted.
+
+        A failed step is shortened while it still promises `enough`.
+        """
+        whole, predicted = damping, 0.0
+        while damping < 1e4:
+            d, predicted = self.to(damping)
+            if damping > whole and predicted < enough:
+                break
+            better = _improved(self.penalty.objective, self.at, self.x + d, now - self.penalty.besides(self.x + d))
+            if better is not None:
+                return better, damping, predicted
+            damping *= 10.0
+        return None, damping, predicted
 
 
 @dataclass(frozen=True)

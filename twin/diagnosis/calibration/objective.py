@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -30,7 +31,12 @@ PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, l
 MOTION_DIFFERENCE = 0.5
 # Of derivatives along a move of all parameters: with such an error each step still leaves a tenth of the last.
 COARSE_ERROR = 0.1
+TRIALS_PROBED = 2  # to see which derivatives have changed
 LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs have so many rows that a share of them is a lot
+# Of |z|^2 above the noise, by which a fit of motion may end where the model lacks an effect: errors (RMS) are then known to half a
+# per cent. Derivatives by long steps leave the gradient there as inexact.
+MISFIT_SHARE = 2e-3
+CHANGED_SHARE = 0.05  # of a derivative, by which it changed too much to be kept
 
 Unsolved = Literal["raise", "zeros"]
 
@@ -58,9 +64,15 @@ class Objective:
         """Whether derivatives for the robot's own parameters change so much with them that fits must renew them: of motion."""
         return Drive.CONTROL in getattr(self.prepared, "drives", ())
 
-    def smallest_fall(self, fall: float) -> float:
-        """Return the fall of |z|^2 at which a fit may end, for one that is a share of it."""
-        return min(fall, LARGEST_LAST_FALL) if self.bends else fall
+    def smallest_fall(self, share: float, square: float) -> tuple[float, float]:
+        """Return the falls of |z|^2 at which a fit that stands at `square` may end: at its minimum, and near it.
+
+        They are a share of it; of motion `LARGEST_LAST_FALL` at most, near the minimum `MISFIT_SHARE` of what exceeds the noise.
+        """
+        if not self.bends:
+            return share * square, share * square
+        least = min(share * square, LARGEST_LAST_FALL)
+        return least, max(least, MISFIT_SHARE * (square - self.n))
 
     def of(self, which: Sequence[int]) -> Objective:
         """Return the objective of some of its trials, given by their positions."""
@@ -186,6 +198,28 @@ class Objective:
             moved[i] += size
             neighbours.append((at.model.at(moved), size))
         return self.columns(at, neighbours, once=True)
+
+    def renewed(self, at: Evaluation, which: Sequence[int], known: np.ndarray) -> np.ndarray:
+        """Return dz/dx (n, len(which)) as `jacobian`, with columns of `known`, of the same shape, where these hardly changed.
+
+        That is seen on the `TRIALS_PROBED` trials with the largest residuals, whose rows are renewed in every column.
+        """
+        ends, wanted, out = np.cumsum([0, *(r.size for r in at.raw)]), np.asarray(which, int), known.copy()
+        order = np.argsort([-float(at.z[a:b] @ at.z[a:b]) for a, b in pairwise(ends)])
+        changed = np.arange(wanted.size)
+        for part in (np.sort(order[:TRIALS_PROBED]), np.sort(order[TRIALS_PROBED:])):
+            if not (part.size and changed.size):
+                break
+            rows = np.concatenate([np.arange(int(ends[k]), int(ends[k + 1])) for k in part])
+            trials = [self.trials[k] for k in part]
+            there = Evaluation(at.model, {k: at.traces[k] for k in trials}, [at.raw[k] for k in part], at.z[rows])
+            few = self.of(part.tolist())
+            few._coarse = self._coarse
+            found = few.jacobian(there, wanted[changed].tolist())
+            before = out[np.ix_(rows, changed)]
+            out[np.ix_(rows, changed)] = found
+            changed = changed[np.linalg.norm(found - before, axis=0) > CHANGED_SHARE * np.linalg.norm(found, axis=0)]
+        return out
 
 
 def _same_simulation(a: Twin, b: Twin) -> bool:

@@ -1,5 +1,6 @@
 """A fitted model, its evidence, and its refits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,13 +122,20 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
     return found
 
 
-def refit_without(context: FitContext, base: ScoredModel, best: ScoredModel, effect: str) -> ScoredModel:
+def refit_without(
+    context: FitContext, base: ScoredModel, best: ScoredModel, effect: str, known: Sequence[ScoredModel] = ()
+) -> ScoredModel:
     """Return the best set less one effect, with everything else fitted again.
 
     A robot fitted with the effect may have no equilibrium without it, where lengths are held. Then the fit starts from the base's
-    robot; where that has none under the other effects, return the base itself.
+    robot; where that has none under the other effects, return the base itself. A fit of motion, which is dear, goes on from that
+    of the same effects among the `known` ones.
     """
     context.progress(f"without {effect}")
+    rest = next((w.fit for w in known if context.objective.bends and w.forms == best.forms_without(effect)), None)
+    if rest is not None:
+        stop = StopRule(worth=REFIT_SCORE_TOLERANCE)
+        return score_model(context, fit(context.objective, rest.model, near=rest.evaluation, J=rest.J, stop=stop))
     keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
     model = best.fit.model.without_effect(effect)
     as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)

@@ -180,7 +180,8 @@ def _in_company(context: FitContext, member: ScoredModel, best: ScoredModel, eff
         context.progress(f"{effect} beside {' + '.join(member.effects)}")
         law = next(e for e in best.fit.model.twin.effects if e.id == effect)
         free = tuple(f.parameter.name for f in best.fit.model.free if f.effect == effect)
-        found = with_effect_added(context, member, effect, FitStart(law.values, free))
+        beat = HOPELESS_COST_RATIO * best.fit.cost if context.objective.bends else np.inf  # fits of motion are dear
+        found = with_effect_added(context, member, effect, FitStart(law.values, free), beat)
         if found is None:
             return None
         member = found

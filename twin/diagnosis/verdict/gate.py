@@ -59,7 +59,7 @@ def gate(context: FitContext, found: Search, screening: Screening) -> Gated:
     small: list[TooSmall] = []
     doubts: list[Ambiguity] = []
     while True:
-        without = {e: refit_without(context, found.base, best, e) for e in best.effects if e not in own}
+        without = {e: refit_without(context, found.base, best, e, found.all) for e in best.effects if e not in own}
         moved = {e: contribution(context, best, w) for e, w in without.items()}
         if not moved:
             return Gated(best, {}, tuple(small), tuple(doubts))
