@@ -30,7 +30,8 @@ def study(budget: Budget | None = None) -> Any:
     bench = SimpleNamespace(n_tendon=3, robot=ROBOT)
     evidence = SimpleNamespace(log_likelihood_gain=lambda z: (100.0 - float(z @ z), "smooth"))
     return SimpleNamespace(
-        objective=SimpleNamespace(n=N), evidence=evidence, prepared=bench, progress=lambda words: None, budget=budget or Budget(),
+        objective=SimpleNamespace(n=N, bends=False), evidence=evidence, prepared=bench, progress=lambda words: None,
+        budget=budget or Budget(),
         blocked_input_noise=lambda fit: 7.0,
     )  # fmt: skip
 
@@ -89,6 +90,24 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     assert how == {"near": HERE, "J": member.fit.J, "stop": StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, 7.0)}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
+
+
+def test_motion_whose_numbers_are_at_bounds_is_fitted_from_the_description(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With derivatives of its own; statics, and motion within its bounds, goes on from what was fitted."""
+    base = calibrated("base_tilt")
+    off = base.at(base.vector() * 1.01)
+    for bends, at_bound in ((True, True), (True, False), (False, True)):
+        fits, member, told = Fits(monkeypatch), weighed(off), study()
+        member.fit.at_bound = lambda at=at_bound: np.array([at, False])
+        told.objective.bends = bends
+        with_effect_added(told, member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",)))
+        ((model, how),) = fits.asked
+        anew = bends and at_bound
+        own = {f.parameter.name for f in base.free if f.effect is None}
+        assert model.twin.values == pytest.approx(
+            (base.twin.values | {n: ROBOT.value(n) for n in own}) if anew else off.twin.values
+        )
+        assert (how["J"] is None) == anew
 
 
 def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: pytest.MonkeyPatch) -> None:

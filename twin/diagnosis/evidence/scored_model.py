@@ -61,21 +61,30 @@ def with_effect_added(
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
-    and from a drift of the wrong sign the first step could reach any shape.
+    and from a drift of the wrong sign the first step could reach any shape. Motion whose numbers went to their bounds for want of
+    the effect is fitted from the numbers as described.
     """
-    n_tendon, model, near = context.prepared.n_tendon, member.fit.model, member.fit.evaluation
+    n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
+    if context.objective.bends and member.fit.at_bound().any():
+        model, near, J = _as_described(model), None, None
     values = dict(start.values)
     try:
         if signed := _signed(effect, start, n_tendon):
             amplitudes = model.with_effect(effect, values, signed, n_tendon)
-            begun = fit(context.objective, amplitudes, near=near, J=member.fit.J, stop=StopRule(worth=np.inf))
+            begun = fit(context.objective, amplitudes, near=near, J=J, stop=StopRule(worth=np.inf))
             values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
             model, near = begun.model.without_effect(effect), begun.evaluation
         model = model.with_effect(effect, values, start.free, n_tendon)
         stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
-        return score_model(context, fit(context.objective, model, near=near, J=member.fit.J, stop=stop))
+        return score_model(context, fit(context.objective, model, near=near, J=J, stop=stop))
     except SolveError:
         return None
+
+
+def _as_described(model: Model) -> Model:
+    """Return the model with the robot's own free parameters at their described values."""
+    x = [f.parameter.value / f.parameter.step if f.effect is None else v for f, v in zip(model.free, model.vector(), strict=True)]
+    return model.at(np.array(x))
 
 
 def _signed(effect: str, start: FitStart, n_tendon: int) -> tuple[str, ...]:
