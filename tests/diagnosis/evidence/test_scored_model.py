@@ -12,14 +12,7 @@ from twin.diagnosis.budget import Budget
 from twin.diagnosis.calibration.fit import StopRule
 from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.evidence import scored_model as stage
-from twin.diagnosis.evidence.scored_model import (
-    ScoredModel,
-    fitted_from_description,
-    refit_without,
-    score_model,
-    with_effect_added,
-    with_extended_law,
-)
+from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, score_model, with_effect_added, with_extended_law
 from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue, effect_class
 from twin.foundation.errors import SolveError
@@ -99,26 +92,22 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
 
 
-def test_motion_with_numbers_at_bounds_is_fitted_once_more_from_the_description(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The effect stays as it was found; the better of the two counts. Statics, and motion within its bounds, is left alone."""
-    off = calibrated("base_tilt").at(calibrated("base_tilt").vector() * 1.01)
-    own = {f.parameter.name for f in off.free if f.effect is None}
-    for bends, at_bound, cost in ((True, True, 1.0), (True, True, 9.0), (True, False, 9.0), (False, True, 9.0)):
+def test_motion_whose_numbers_are_at_bounds_is_fitted_from_the_description(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With derivatives of its own; statics, and motion within its bounds, goes on from what was fitted."""
+    base = calibrated("base_tilt")
+    off = base.at(base.vector() * 1.01)
+    for bends, at_bound in ((True, True), (True, False), (False, True)):
         fits, member, told = Fits(monkeypatch), weighed(off), study()
-
-        def again(objective: Any, model: Model, fits: Fits = fits, **how: Any) -> Any:
-            return SimpleNamespace(model=fits.fit(objective, model), cost=5.0)
-
-        monkeypatch.setattr(stage, "fit", again)
-        monkeypatch.setattr(stage, "score_model", lambda study, fit: fit)
-        member.fit.at_bound, member.fit.cost = (lambda at=at_bound: np.array([at, False])), cost
+        member.fit.at_bound = lambda at=at_bound: np.array([at, False])
         told.objective.bends = bends
-        found = fitted_from_description(told, member)
-        assert len(fits.asked) == (bends and at_bound)
-        assert (found is member) == (not fits.asked or cost < 5.0)
-        for model, _ in fits.asked:
-            assert model.twin.values == pytest.approx(off.twin.values | {n: ROBOT.value(n) for n in own})
-            assert model.twin.effects == off.twin.effects
+        with_effect_added(told, member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",)))
+        ((model, how),) = fits.asked
+        anew = bends and at_bound
+        own = {f.parameter.name for f in base.free if f.effect is None}
+        assert model.twin.values == pytest.approx(
+            (base.twin.values | {n: ROBOT.value(n) for n in own}) if anew else off.twin.values
+        )
+        assert (how["J"] is None) == anew
 
 
 def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: pytest.MonkeyPatch) -> None:

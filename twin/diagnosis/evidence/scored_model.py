@@ -61,9 +61,12 @@ def with_effect_added(
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
-    and from a drift of the wrong sign the first step could reach any shape.
+    and from a drift of the wrong sign the first step could reach any shape. Motion whose numbers went to their bounds for want of
+    the effect is fitted from the numbers as described.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
+    if context.objective.bends and member.fit.at_bound().any():
+        model, near, J = _as_described(model), None, None
     values = dict(start.values)
     try:
         if signed := _signed(effect, start, n_tendon):
@@ -78,22 +81,10 @@ def with_effect_added(
         return None
 
 
-def fitted_from_description(context: FitContext, found: ScoredModel) -> ScoredModel:
-    """Return the model, or the better one of a fit that starts from the robot as described.
-
-    That is tried of motion with numbers at their bounds: they went there for want of an effect, and derivatives at a bound seldom
-    lead back.
-    """
-    if not (context.objective.bends and found.fit.at_bound().any()):
-        return found
-    context.progress(f"{' + '.join(found.effects)} from the robot as described")
-    model = found.fit.model
+def _as_described(model: Model) -> Model:
+    """Return the model with the robot's own free parameters at their described values."""
     x = [f.parameter.value / f.parameter.step if f.effect is None else v for f, v in zip(model.free, model.vector(), strict=True)]
-    try:
-        again = fit(context.objective, model.at(np.array(x)), stop=StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE))
-    except SolveError:
-        return found
-    return score_model(context, again) if again.cost < found.fit.cost else found
+    return model.at(np.array(x))
 
 
 def _signed(effect: str, start: FitStart, n_tendon: int) -> tuple[str, ...]:

@@ -15,7 +15,6 @@ from twin.diagnosis.evidence.scored_model import (
     EffectForms,
     ScoredModel,
     better,
-    fitted_from_description,
     refit_without,
     with_effect_added,
     with_extended_law,
@@ -74,10 +73,7 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
                 fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(context, base, w) < half}
         leading = max((w.score for w in fresh.values()), default=0.0) - LARGEST_SCORE_GAP
         fresh = {
-            k: with_extended_law(context, fitted_from_description(context, w), limits.accept)
-            if w.score > max(best_before, leading)
-            else w
-            for k, w in fresh.items()
+            k: with_extended_law(context, w, limits.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()
         }
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
