@@ -2,10 +2,10 @@
 
     python -m tools.benchmarks.diagnosis.ablation --out results/ [--sets 60] [--seed 30000] [--jobs 2]
 
-The days are those of the attribution benchmark, and with `--second DIR` those of the second rod simulator. A day is diagnosed once;
-then, for each rule (`tools.benchmarks.diagnosis.rules`), everything from the search to the verdict is run again without the rule,
-on the calibrated robot. Fits that an earlier run of the day has made are not repeated. Rows go to results/ablation.jsonl as they
-come, so an interrupted run resumes. Days with an even seed are for developing, the others only for reporting.
+The days are those of the attribution benchmark, and with `--second DIR` those of the second rod simulator. A day is calibrated
+once. Then everything from the search to the verdict is run by all rules, and again without each of those in `rules.py`; fits that
+an earlier run of the day has made are not repeated. Rows go to results/ablation.jsonl as they come, so an interrupted run resumes.
+Days with an even seed are for developing, the others only for reporting.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from twin.diagnosis.verdict.judge import withdraw
 from twin.foundation.errors import TwinError
 from twin.foundation.parallel import run_parallel
 from twin.foundation.threads import single_thread
-from twin.measurements import read
+from twin.measurements import Recording, read
 from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import prepare
 from twin.prediction.twin import Twin
@@ -52,8 +52,7 @@ NO_WITHDRAWAL = "claims no better on held-out trials are withdrawn"
 class Day:
     """A day that is calibrated once and decided again and again."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
-        recording = read(folder)
+    def __init__(self, recording: Recording, seed: int) -> None:
         twin, self.settings = Twin.of_recording(recording), Settings(seed=seed, jobs=1)
         log = on_rows_of_outputs(recording)
         self.preview: DataPreview = preview_data(prepare(log, twin.robot), twin, self.settings)
@@ -132,7 +131,7 @@ def run_second(day: Path) -> Row:
 
 def _decided(folder: Path, seed: int) -> Row:
     with single_thread():
-        day = Day(folder, seed)
+        day = Day(read(folder), seed)
         answers = dict(day.answers(RULES))
     return {"floor": day.floor, "answers": answers}
 
