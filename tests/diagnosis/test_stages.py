@@ -31,6 +31,7 @@ from twin.effects import effect_class
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parameters import Parameter
 from twin.prediction.evaluate import OUTPUT_GROUPS
+from twin.prediction.damping import without_damping
 from twin.prediction.prepared import PreparedRecording
 
 
@@ -336,7 +337,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(
     monkeypatch.setattr(look, "unstable_starts", lambda bench, traces: [traces[1].true])
     monkeypatch.setattr(look, "suspicions", lambda bench, twin, s, nominal: sealed.append((list(s), nominal)) or ("odd",))
     for n, count in ((FEWEST_TRIALS_FOR_HELD_OUT - 1, 0), (FEWEST_TRIALS_FOR_HELD_OUT, 2)):
-        day = few(plan, n)
+        day = without_damping(few(plan, n))
         found = preview_data(day, SimpleNamespace(effects=()), Settings(), told.append)  # type: ignore[arg-type]
         assert len(found.held_out) == count
         assert sealed[-1] == (list(found.held_out), found.nominal)
@@ -461,7 +462,7 @@ def test_every_trial_is_shown_by_the_twin_that_had_to_predict_it(monkeypatch: py
 def test_a_calibration_is_judged_on_trials_it_has_not_seen(plan: PreparedRecording, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of the others opened, 2 mm off in x; its standard errors are those at the answer."""
     asked: dict[str, Any] = {}
-    day = replace(few(plan, 6), measured=tuple(y + 5e-3 for y in plan.measured[:6]))
+    day = replace(without_damping(few(plan, 6)), measured=tuple(y + 5e-3 for y in plan.measured[:6]))
     off = np.array([2e-3 if o.axis == 0 else 0.0 for o in day.outputs])
     fitted = SimpleNamespace(model=SimpleNamespace(twin="calibrated"))
 
