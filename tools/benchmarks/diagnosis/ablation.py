@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,7 @@ class Day:
             found = calibrate(p.prepared, twin, p.held_out, p.nominal, self.settings, silent)
         self.context: FitContext = found[0]
         self.base: ScoredModel = found[1]
+        self.floor: float | None = None  # m, of a marker on held-out trials
         self.seen: dict[str, tuple[bool, dict[str, float], dict[str, float]]] = {}
 
     def answers(self, rules: tuple[Rule, ...]) -> Iterator[tuple[str, Row]]:
@@ -142,7 +143,6 @@ def counts(rows: list[Row], rule: str) -> dict[str, tuple[int, int]]:
     of = {kind: [r for r in told if r["kind"] == kind] for kind in ("none", "one", "pair", "unknown")}
     known = [*of["one"], *of["pair"]]
     wrong = [r["verdict"] == "explained" and not all(right(r, c) for c in r["claims"]) for r in told]
-    ratios = [r["after"] for r in known if r.get("after") and r.get("floor")]
     counted = {
         "false": [false_positive(r) for r in of["none"]],
         "one first": [first(r) for r in of["one"]],
@@ -152,7 +152,7 @@ def counts(rows: list[Row], rule: str) -> dict[str, tuple[int, int]]:
         "flagged": [flagged(r) for r in of["unknown"]],
         "wrong, no flag": wrong,
         "explained": [r["verdict"] == "explained" for r in known],
-        "after/floor < 1.1": [r["after"] < 1.1 * r["floor"] for r in known if ratios and r.get("after")],
+        "after/floor < 1.1": [r["after"] < 1.1 * r["floor"] for r in known if r.get("after")],
         "worse": [r["after"] > 1.001 * r["calibrated"] for r in told if r.get("after")],
     }
     return {name: (sum(hits), len(hits)) for name, hits in counted.items()}
@@ -169,7 +169,7 @@ def table(rows: list[Row]) -> str:
         lines: list[list[object]] = [[AS_IT_IS, "", *(f"{a}/{n}" for a, n in base.values())]]
         for rule in (NO_WITHDRAWAL, *(r.name for r in RULES)):
             now = counts(half, rule)
-            moved = sum(_same(r, rule) is False for r in half)
+            moved = sum(not _same(r, rule) for r in half)
             lines.append([rule, moved, *(_change(now[k][0] - base[k][0]) for k in base)])
         out.append(f"Days for {name}: {len(half)}\n\n" + markdown(["without", "days it decides", *base], lines))
     return "\n\n".join(out)
@@ -195,7 +195,7 @@ def main(out: Path, sets: int = 60, seed: int = 30000, second: Path | None = Non
     out.mkdir(parents=True, exist_ok=True)
     log = out / "ablation.jsonl"
     done = {(r["seed"], r.get("day")) for r in read_rows(log)}
-    left: list[Any] = [delayed(run)(replace(case), out) for case in plan(sets, seed) if (case.seed, None) not in done]
+    left: list[Any] = [delayed(run)(case, out) for case in plan(sets, seed) if (case.seed, None) not in done]
     names = {day for _, day in done}
     left += [delayed(run_second)(p) for p in sorted((second / "sets").iterdir()) if p.name not in names] if second else []
     for row in run_parallel(left, jobs):

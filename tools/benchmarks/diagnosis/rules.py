@@ -151,7 +151,7 @@ def _set(values: dict[str, float]) -> Iterator[None]:
 def _forgotten(memory: Memory) -> Iterator[None]:
     """Let scores be computed anew, and not be kept."""
     known = memory.known
-    memory.known = {k: v for k, v in known.items() if k[0] not in ("score",)}
+    memory.known = {k: v for k, v in known.items() if k[0] != "score"}
     try:
         yield
     finally:
