@@ -20,8 +20,12 @@ from twin.robots import load
 SIGN = (-1.0, 1.0, 1.0)  # of roll, pitch, yaw: with this roll the tip goes round the way the commands do
 RATE, STEP = 10.0, 5  # rows a second, a guess; rows of the log for one that is kept
 NOISE = np.radians(1.0)  # the log is in whole degrees
-# Neither is published how the IMU sits on its disk nor what a motor winds: its angle here is that which the tendons should bend by.
+# Neither is published how the IMU sits on its disk nor what a motor winds, from which zero, and how tendons are held and give: a
+# motor's angle here is that which the tendons should bend by.
 UNKNOWN = """"motors.radius" = { value = [12.54, 12.54, 12.54], unit = "mm", std = 6, low = 2, high = 60, source = "unknown gain" }
+"motors.zero" = { value = [0.0, 0.0, 0.0], unit = "deg", std = 10, source = "unknown" }
+"tendons.stretch" = { value = 0.5, unit = "mm/N", std = 0.5, low = 0.02, high = 5, source = "unknown" }
+"tendons.pretension" = { value = 1.0, unit = "N", std = 1, low = 0, high = 10, source = "unknown" }
 """ + "\n".join(f'"markers.turn_{a}" = {{ value = 0.0, unit = "deg", std = 30, source = "unknown mount" }}' for a in "xyz")
 PULLS = tuple(Channel(f"motor_{k}_angle", "input", "deg", np.radians(0.05)) for k in (1, 2, 3))
 

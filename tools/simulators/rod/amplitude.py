@@ -27,7 +27,7 @@ def stack(logs: Sequence[Log], seen_in: str) -> np.ndarray:
 
 
 def _nuisances(rod: Rod) -> list[tuple[Rod, float]]:
-    """The built robot with one parameter moved at a time, and the move as a share of the parameter's prior deviation."""
+    """Return the built robot with one parameter moved at a time, and the move as a share of the parameter's prior deviation."""
     first = np.eye(len(rod.pitch))[0]
     return [
         (replace(rod, youngs_modulus=1.02 * rod.youngs_modulus), 0.02 / 0.06),
@@ -49,6 +49,8 @@ class Scale:
     rod: Rod
     day: Day
     noise: Noise
+    drives: tuple[Effect, ...] = ()  # how the built robot is driven, always in force
+    moved_drives: tuple[tuple[Effect, float], ...] = ()  # these with one number moved at a time, as `_nuisances`
     _moved: dict[str, np.ndarray] = field(default_factory=dict)
     _described: dict[bytes, list[Log]] = field(default_factory=dict)
 
@@ -63,8 +65,10 @@ class Scale:
         """Change (n, p) of the output, in sigmas, per prior deviation of each nuisance parameter."""
         if seen_in not in self._moved:
             day = self.thinned()
-            at = stack(run(self.rod, [], day), seen_in)
-            moved = [(stack(run(rod, [], day), seen_in) - at) / part for rod, part in _nuisances(self.rod)]
+            at = stack(run(self.rod, self.drives, day), seen_in)
+            built = [(rod, self.drives, part) for rod, part in _nuisances(self.rod)]
+            built += [(self.rod, (drive,), part) for drive, part in self.moved_drives]
+            moved = [(stack(run(rod, drives, day), seen_in) - at) / part for rod, drives, part in built]
             self._moved[seen_in] = np.stack(moved, axis=1) / self.sigma(seen_in)
         return self._moved[seen_in]
 
@@ -73,12 +77,12 @@ class Scale:
         day = self.thinned()
         inputs = b"".join(drive.tobytes() for drive in logged_inputs(logs, day))
         if inputs not in self._described:
-            self._described[inputs] = as_described(self.rod, logs, day)
+            self._described[inputs] = as_described(self.rod, self.drives, logs, day)
         return self._described[inputs]
 
     def amplitude(self, effects: Sequence[Effect], seen_in: str, moves: np.ndarray) -> float:
         """RMS residual over sigma after the linear refit."""
-        logs = run(self.rod, effects, self.thinned())
+        logs = run(self.rod, [*effects, *self.drives], self.thinned())
         residual = stack(logs, seen_in) - stack(self.described(logs), seen_in)
         residual /= self.sigma(seen_in)
         refit = lsq_linear(moves, residual, bounds=(-PLAUSIBLE, PLAUSIBLE)).x

@@ -173,8 +173,8 @@ def logged_inputs(logs: Sequence[Log], day: Day) -> list[np.ndarray]:
     ]
 
 
-def as_described(rod: Rod, logs: Sequence[Log], day: Day) -> list[Log]:
-    """What the same built robot would log without any effect, driven by the logged inputs."""
+def as_described(rod: Rod, drives: Sequence[Effect], logs: Sequence[Log], day: Day) -> list[Log]:
+    """What the same built robot, with its drives, would log without any effect, driven by the logged inputs."""
     inputs = zip(logs, logged_inputs(logs, day), strict=True)
     trials = tuple(replace(log.trial, fine=log.trial.time, command=c) for log, c in inputs)
-    return run(rod, [], replace(day, trials=trials))
+    return run(rod, drives, replace(day, trials=trials))

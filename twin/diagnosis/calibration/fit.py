@@ -6,7 +6,8 @@ Gauss-Newton steps on finite-difference derivatives.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,10 +21,10 @@ from twin.foundation.parameters import FittedValue
 
 FAR_SHARE = 0.05  # of the cost: a fit whose derivatives promise a larger fall is far from its minimum
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
-SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came of motion, they are renewed
-MOST_MOTION_STEPS = 24  # at most, of a fit of motion
-MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit of motion, where they bend
-MOST_FIT_STEPS = 12  # at most, of a fit
+SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came, they are renewed
+MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit
+MOST_FIT_STEPS = 24  # at most, of a fit that may renew them
+MOST_STEPS_WITH_KEPT = 12  # at most, of one that keeps those of a neighbouring fit
 FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
@@ -156,14 +157,15 @@ def fit(
 ) -> Fit:  # fmt: skip
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
-    Derivatives for the robot's own parameters, nearly linear, are computed once, or given as `J`, the whitened columns (n, m) of
-    the first m free parameters from a neighbouring fit. Those for effects are computed at every step. `refresh` computes all again
-    at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
+    Derivatives for the robot's own parameters, nearly linear where these are known well, are renewed where the cost falls less than
+    they say, and at the end; or they are given as `J`, the whitened columns (n, m) of the first m free parameters from a
+    neighbouring fit, and kept, but of motion. Those for effects are computed at every step. `refresh` computes all again at the
+    solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
     # Derivatives of the same model, of more trials than these, are near enough.
-    kept = not objective.bends or (J is not None and near is not None and near.model is model)
+    kept = J is not None and (not objective.bends or (near is not None and near.model is model))
     renewals = 0 if kept or np.isinf(stop.worth) else MOST_RENEWALS
     own = [i for i, f in enumerate(model.free) if f.effect is None]
     fixed = [i for i in own if J is None or i >= J.shape[1]]
@@ -174,14 +176,16 @@ def fit(
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping = penalty.cost(at), FIRST_DAMPING
     since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
-    for left in range((MOST_MOTION_STEPS if objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
+    for left in range((MOST_STEPS_WITH_KEPT if kept and not objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
         columns[:, moving] = objective.jacobian(at, moving)
         step = _Step.of(penalty, at, columns)
-        promised = step.to(FIRST_DAMPING)[1] if objective.bends else 0.0
+        promised = step.to(FIRST_DAMPING)[1] if renewals or objective.bends else 0.0
         least, near_least = objective.smallest_fall(stop.tolerance, now)
         far = renewals and promised > FAR_SHARE * now
         enough = max(least if far else near_least, stop.tolerance * now if kept else 0.0, stop.worth)
         better, damping, predicted = step.taken(now, damping, enough)
+        if better is None and own and moving:  # an effect may have a kink here; the robot need not
+            better, damping, predicted = step.holding(moving).taken(now, FIRST_DAMPING, enough)
         fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
             at, now = better, penalty.cost(better)
@@ -198,7 +202,8 @@ def fit(
         elif fall < enough or now > stop.beat:
             break
     if refresh:
-        stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]
+        last = objective.smallest_fall(1.0 if objective.bends else stop.tolerance, now)[1]
+        stale = since - now > last
         which = range(len(model.free)) if stale else moving
         columns[:, which] = objective.jacobian(at, which)
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))
@@ -213,15 +218,21 @@ class _Step:
     x: np.ndarray
     H: np.ndarray
     g: np.ndarray
+    held: tuple[int, ...] = ()  # free parameters that do not move
 
     @staticmethod
     def of(penalty: _Penalty, at: Evaluation, columns: np.ndarray) -> _Step:
         x = at.model.vector()
         return _Step(penalty, at, x, *penalty.normal_equations(x, columns, at.z))
 
+    def holding(self, which: Sequence[int]) -> _Step:
+        """Return the step in which these free parameters do not move."""
+        return replace(self, held=tuple(which))
+
     def to(self, damping: float) -> tuple[np.ndarray, float]:
         """Return the step (n_free,) with a damping, within bounds, and the fall of the cost that derivatives predict."""
         low, high = self.penalty.low - self.x, self.penalty.high - self.x
+        low[list(self.held)] = high[list(self.held)] = 0.0
         d = _bounded_step(self.H + damping * np.diag(np.diag(self.H) + 1e-9), self.g, low, high)
         return d, -float(2.0 * self.g @ d + d @ self.H @ d)
 

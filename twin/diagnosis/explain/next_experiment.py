@@ -49,41 +49,37 @@ class Experiment:
 def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     """Return trials that this robot could run, within the commands already used.
 
-    The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
-    are commanded, the tendons that do not pull are let out, so that they are slack. Controls of an MJCF go from where they rest,
-    for as long as the longest trial. Springs heated by currents cool within a minute and would not respond to a fast pull.
+    The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Controls of an MJCF
+    go from where they rest, for as long as the longest trial. Springs heated by currents cool within a minute and would not respond
+    to a fast pull.
     """
     n, like = prepared.n_tendon, prepared.inputs[0]
     slow = SLOW_TRIAL
     if Drive.CONTROL in prepared.drives:
         slow = min(slow, max(float(np.ptp(i.time)) for i in prepared.inputs))
-    held = prepared.driven_by(Drive.DISPLACEMENT)
     home, top = _from_and_to(prepared)
-    words = [_worded(prepared, i, x) for i, x in enumerate(top)]
     shapes: list[tuple[str, np.ndarray, np.ndarray]] = []
 
-    def add(label: str, duration: float, *shares: np.ndarray) -> None:
-        pull = np.stack(shares, axis=1)
-        command = home + (top - home) * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
-        shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
+    def add(label: str, duration: float, command: np.ndarray) -> None:
+        shapes.append((label, np.linspace(0.0, duration, len(command)), home + command))
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])
     up_half_up_down = np.interp(np.arange(120), [0, 40, 60, 80, 119], [0.0, 1.0, 0.5, 1.0, 0.0])
     hold = np.concatenate([[0.0], np.full(60, HELD_COMMAND_SHARE)])
-    for i in np.flatnonzero(top - home if like.home is not None else top > 0.0):  # what was never commanded has no range
-        alone = np.eye(n)[i]
-        what, pull, fast = _deed(prepared, int(i))
-        fast = min(fast, 0.1 * slow) if like.home is not None else fast
-        add(f"{pull} to {words[i]} and release it, slowly ({slow:.0f} s)", slow, *np.outer(alone, up_down))
-        add(f"{pull} to {words[i]} and release it, fast ({fast:.2g} s)", fast, *np.outer(alone, up_down))
-        again = f"{pull} to {words[i]}, release it to half, pull it again and release it, slowly ({2.0 * slow:.0f} s)"
-        add(again, 2.0 * slow, *np.outer(alone, up_half_up_down))
-        add(f"step {what} to three quarters of {words[i]} and hold for {slow:.0f} s", slow, *np.outer(alone, hold))
+    for move in _motor_moves(prepared) or _moves(prepared, home, top):
+        fast = min(move.fast, 0.1 * slow) if like.home is not None else move.fast
+        to, whole = f"{move.words} to {move.to}", move.command
+        add(f"{to} and release it, slowly ({slow:.0f} s)", slow, np.outer(up_down, whole))
+        add(f"{to} and release it, fast ({fast:.2g} s)", fast, np.outer(up_down, whole))
+        again = f"{to}, release it to half, pull it again and release it, slowly ({2.0 * slow:.0f} s)"
+        add(again, 2.0 * slow, np.outer(up_half_up_down, whole))
+        add(f"step {move.what} to three quarters of {move.to} and hold for {slow:.0f} s", slow, np.outer(hold, whole))
     turns = np.linspace(0, 4 * np.pi, 80)
     circle = [0.6 * np.maximum(0.0, 0.5 + 0.5 * np.cos(turns - 2 * np.pi * j / n)) for j in range(n)]
-    if not held.any() and top.all() and like.home is None:
-        add(f"two circles with all tendons up to 0.6 of {words[0]} ({4.0 / 3.0 * slow:.0f} s)", 4.0 / 3.0 * slow, *circle)
-    add(f"rest unloaded for {0.5 * slow:.0f} s", 0.5 * slow, *np.zeros((n, 30)))
+    if not prepared.driven_by(Drive.DISPLACEMENT).any() and top.all() and like.home is None:
+        all_to = f"two circles with all tendons up to 0.6 of {_worded(prepared, 0, top[0])} ({4.0 / 3.0 * slow:.0f} s)"
+        add(all_to, 4.0 / 3.0 * slow, top * np.stack(circle, axis=1))
+    add(f"rest unloaded for {0.5 * slow:.0f} s", 0.5 * slow, np.zeros((30, n)))
     last = max(float(i.clock[-1]) for i in prepared.inputs) + 60.0
     out = []
     for load, loads in _loads(prepared):
@@ -91,6 +87,52 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
             warm = np.full(len(time), like.temperature[0])
             own = {"time": time, "clock": last + time, "command": command, "temperature": warm, "loads": loads, "clouds": None}
             out.append((f"{motion}, {load}", replace(like, name=f"{motion}, {load}", **own)))
+    return out
+
+
+@dataclass(frozen=True)
+class _Move:
+    """A move of one drive: in words, how far, how long a fast one takes (s), and its change of all commands (n_drive,)."""
+
+    what: str
+    words: str
+    to: str
+    fast: float
+    command: np.ndarray
+
+
+def _moves(prepared: PreparedRecording, home: np.ndarray, top: np.ndarray) -> list[_Move]:
+    """Return the moves of each drive. Where displacements are commanded, the other tendons are let out, so that they are slack."""
+    held, out = prepared.driven_by(Drive.DISPLACEMENT), []
+    for i in np.flatnonzero(top - home):  # what was never commanded has no range
+        alone = np.arange(prepared.n_tendon) == i
+        command = (top - home) * np.where(held & ~alone, -1.0, alone)
+        out.append(_Move(*_deed(prepared, int(i)), command))
+    return out
+
+
+def _motor_moves(prepared: PreparedRecording) -> list[_Move]:
+    """Return the moves of each motor whose angle drives, to the farthest angle commanded; none where others drive too.
+
+    Other motors stay at zero if they wind antagonists, and let out a tendon that they wind alone.
+    """
+    names = [c.name for c in prepared.drivers]
+    if not (prepared.driven_by(Drive.DISPLACEMENT) & (prepared.pull != 1.0)).all():
+        return []
+    out, every = [], np.concatenate([i.command for i in prepared.inputs])
+    single = np.array([names.count(n) == 1 for n in names])
+    for name in dict.fromkeys(names):
+        t, own = names.index(name), np.array([n == name for n in names])
+        angle = every[:, t] / prepared.pull[t]
+        farthest = (
+            float(angle[np.abs(angle).argmax()]) if own.sum() > 1 else float(np.max(every[:, t], initial=0.0) / prepared.pull[t])
+        )
+        command = farthest * np.where(own, prepared.pull, 0.0)
+        out_by = np.max(np.abs(command))
+        unit = prepared.drivers[t].unit_scale.without_offset().from_si(np.array([farthest]))[0]
+        to = f"{_shown(abs(unit)) if unit >= 0 else '-' + _shown(abs(unit))} {prepared.drivers[t].unit}"
+        if farthest:
+            out.append(_Move(name, f"turn {name}", to, 4.0, np.where(single & ~own, -out_by, command)))
     return out
 
 
@@ -116,14 +158,15 @@ def _loads(prepared: PreparedRecording) -> list[tuple[str, Loads]]:
     return [(f"tip payload {1e3 * m:.0f} g", replace(bare, payload=m)) for m in payloads]
 
 
-def _deed(prepared: PreparedRecording, i: int) -> tuple[str, str, float]:
-    """Return what a trial moves, the words for moving it, and how long a fast move takes, s."""
+def _deed(prepared: PreparedRecording, i: int) -> tuple[str, str, str, float]:
+    """Return what a move is of, its words, how far it goes in words, and how long a fast one takes (s)."""
+    to = _worded(prepared, i, float(_from_and_to(prepared)[1][i]))
     if prepared.drives[i] is Drive.CURRENT:
-        return f"spring {i + 1}", f"heat spring {i + 1} with up", 40.0
+        return f"spring {i + 1}", f"heat spring {i + 1} with up", to, 40.0
     if prepared.drives[i] is Drive.CONTROL:
         name = prepared.drivers[i].name
-        return name, f"move {name}", 4.0
-    return f"tendon {i + 1}", f"pull tendon {i + 1}", 4.0
+        return name, f"move {name}", to, 4.0
+    return f"tendon {i + 1}", f"pull tendon {i + 1}", to, 4.0
 
 
 def _worded(prepared: PreparedRecording, i: int, command: float) -> str:
