@@ -1,11 +1,11 @@
 """Sizes effects: the level of an effect is what it leaves in the outputs, in noise sigmas, after the robot is fitted again.
 
 With e the outputs' change in sigmas and B their change for one tolerance of each uncertain number (differences of the simulator, at
-twice the usual step, which is the same on both sides):
+twice and four times the usual step, which is the same on both sides of a difference; B has neither friction nor stops):
 
     level = sqrt(mean((e - B a)^2)),    a = argmin |e - B a|,    |built + a| <= 2.5 standard deviations of the description
 
-B is reduced once, B = Q R, and each fit is one of R a = Q^T e. Measured on every third trial, which carries the day's mixture.
+B is reduced once, B = Q R, and each fit is one of R a = Q^T e. Measured on every fourth trial, which carries the day's mixture.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from scipy.optimize import lsq_linear
 from tools.simulators.articulated.bench import channels, observe
 from tools.simulators.articulated.dynamics import STEP
 from tools.simulators.articulated.effects import Effect
-from tools.simulators.articulated.robots import Robot, built, tolerances
+from tools.simulators.articulated.robots import Robot, built
 from tools.simulators.articulated.trials import Day
 
 WITHIN = 2.5  # standard deviations of the description that a fit may use
 CLOSE = 0.03  # relative error of a level that is good enough
-THIN = 3  # one trial in so many
+THIN = 4  # one trial in so many
 ROUNDS = 12
 
 
@@ -38,25 +38,24 @@ class Scale:
         self.names = [c.name for c in listed if not c.name.endswith("_y")]
         self.silent = sum(c.name.endswith("_y") for c in listed)  # outputs that never change count as well
         self.sigmas = np.array([described.instruments[c.instrument].sigma for c in listed if not c.name.endswith("_y")])
-        self.clean = self._outputs(self.robot, [])
-        moves = []
-        for i, tolerance in enumerate(tolerances(described)):
+        self.clean = self._outputs(self.robot, [], 2.0 * STEP)
+        coarse, moves = self._outputs(self.robot, [], 4.0 * STEP), []
+        for i in range(len(deviations)):
             up = 0.5 if deviations[i] < 0.0 else -0.5
             other = deviations.copy()
             other[i] += up
-            moves.append((self._outputs(built(described, other), []) - self.clean) / up)
-            assert tolerance.std > 0.0
+            moves.append((self._outputs(built(described, other), [], 4.0 * STEP) - coarse) / up)
         self.q, self.r = np.linalg.qr(np.column_stack(moves))
         self.bounds = (-WITHIN - deviations, WITHIN - deviations)
 
-    def _outputs(self, robot: Robot, effects: Sequence[Effect]) -> np.ndarray:
-        logs = [observe(robot, effects, trial, 2.0 * STEP) for trial in self.trials]
+    def _outputs(self, robot: Robot, effects: Sequence[Effect], step: float) -> np.ndarray:
+        logs = [observe(robot, effects, trial, step) for trial in self.trials]
         stacked = [np.column_stack([log[name] for name in self.names]) / self.sigmas for log in logs]
         return np.concatenate(stacked).ravel()
 
     def levels(self, effects: Sequence[Effect]) -> tuple[float, float]:
         """Return what effects change in sigmas before and after the fit."""
-        change = self._outputs(self.robot, effects) - self.clean
+        change = self._outputs(self.robot, effects, 2.0 * STEP) - self.clean
         target = self.q.T @ change
         fitted = lsq_linear(self.r, target, self.bounds).x
         left = np.sum((target - self.r @ fitted) ** 2) + max(np.sum(change**2) - np.sum(target**2), 0.0)

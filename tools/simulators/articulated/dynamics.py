@@ -45,7 +45,7 @@ def place(chain, q, frame):
     """Fill frame (n + 2, 4) with cosine, sine and origin x, z: of the base, of each link, and of the tip."""
     n = len(q)
     angle, x, z = 0.0, 0.0, 0.0
-    frame[0] = np.array([1.0, 0.0, 0.0, 0.0])
+    frame[0, 0], frame[0, 1], frame[0, 2], frame[0, 3] = 1.0, 0.0, 0.0, 0.0
     for k in range(n):
         angle += chain.sense * q[k]
         c, s = np.cos(angle), np.sin(angle)
@@ -310,7 +310,9 @@ def rest_state(plant: Plant, q: np.ndarray, command: np.ndarray) -> State:
     frame, drum = np.zeros((n + 2, 4)), np.zeros(tendons)
     place(plant.chain, q, frame)
     tip = np.array([frame[-1, 2], frame[-1, 3], 0.0, 0.0])
-    state = State(np.array(q, dtype=float), np.zeros(n), np.zeros(n), np.zeros(vias), np.zeros((vias, 4)), drum, command.copy(), tip)
+    state = State(
+        np.array(q, dtype=float), np.zeros(n), np.zeros(n), np.zeros(vias), np.zeros((vias, 4)), drum, command.copy(), tip
+    )
     for i in range(tendons):
         drum[i] = route(plant.tendons, i, frame, state)
         for m in range(plant.tendons.first[i + 1] - 2, plant.tendons.first[i], -1):

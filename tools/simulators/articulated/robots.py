@@ -205,7 +205,7 @@ def tendon_finger() -> Robot:
     back = [(BASE, -40, 9), (BASE, -2.5, 7), (0, 2.5, 7), (0, 43, 5.5), (1, 2, 5.5), (1, 28.5, 3.8), (2, 1.5, 3.8)]
     palm = [(BASE, -40, -9), (BASE, -10.5, -7), (0, 10.5, -7), (0, 36.5, -5.5), (1, 8.5, -5.5), (1, 23.5, -4.5), (2, 6.5, -4.5)]
     short = [(BASE, -40, -12), (BASE, -13, -9), (0, 13, -9)]
-    joints = [("mcp", 0.12, 15, 1.6e-3, 0.05, 62), ("pip", 0.08, 25, 7e-4, 0.03, 58), ("dip", 0.05, 20, 2.5e-4, 0.015, 70)]
+    joints = [("mcp", 0.12, 15, 1.6e-3, 0.05, 56), ("pip", 0.08, 25, 7e-4, 0.03, 58), ("dip", 0.05, 20, 2.5e-4, 0.015, 66)]
     return Robot(
         name="tendon_finger", title="Three-joint finger, three winch-driven tendons", sense=-1.0, gravity=(0.0, -9.81),
         links=(
@@ -216,13 +216,13 @@ def tendon_finger() -> Robot:
         joints=tuple(Joint(n, k, rad(r), d, 0.0, rad(-10), rad(100), rad(r), load, rad(far)) for n, k, r, d, load, far in joints),
         vias=_vias("flexor", tuple(palm)) + _vias("extensor", tuple(back)) + _vias("short_flexor", tuple(short)),
         drives=(
-            Winch("flexor_winch", "flexor", 2000.0, 6.0, 30.0, 0.113593, 6.0),
-            Winch("extensor_winch", "extensor", 1500.0, 5.0, 30.0, 0.120314, 5.0),
-            Winch("short_flexor_winch", "short_flexor", 2500.0, 8.0, 30.0, 0.049394, 3.0),
+            Winch("flexor_winch", "flexor", 2000.0, 6.0, 30.0, 0.113593, 6.5),
+            Winch("extensor_winch", "extensor", 1500.0, 5.0, 30.0, 0.120314, 9.0),
+            Winch("short_flexor_winch", "short_flexor", 2500.0, 8.0, 30.0, 0.049394, 5.0),
         ),
         stop=(15.0, 0.01), tip="fingertip",
         moves=(
-            Move("flex", (-0.0175, 0.0113, -0.0075), 0.0), Move("flexor", (-0.0065, 0.0, 0.0), 0.0),
+            Move("flex", (-0.0185, 0.0119, -0.0079), 0.0), Move("flexor", (-0.0065, 0.0, 0.0), 0.0),
             Move("extensor", (0.0, 0.003, 0.0), -1.0), Move("short", (-0.0042, 0.0027, -0.007), 0.0),
             Move("cocontraction", (-0.0035, -0.0025, -0.001), 0.0),
         ),
@@ -239,12 +239,12 @@ def servo_arm() -> Robot:
         links=(Link("upper_link", 0.25, 0.40, 0.12, 2.4e-3), Link("fore_link", 0.20, 0.25, 0.10, 9e-4)),
         joints=(
             Joint("shoulder", 0.0, 0.0, 0.10, 0.012, -end, end, -0.5, 1.5, np.deg2rad(15)),
-            Joint("elbow", 0.0, 0.0, 0.05, 0.005, -end, end, 0.7, 0.4, np.deg2rad(85)),
+            Joint("elbow", 0.0, 0.0, 0.05, 0.005, -end, end, 0.7, 0.4, np.deg2rad(98)),
         ),
         vias=(),
         drives=(
-            Servo("shoulder_servo", "shoulder", 40.0, 1.6, 5.0, -0.5, 3.0),
-            Servo("elbow_servo", "elbow", 15.0, 0.45, 2.5, 0.7, 0.8),
+            Servo("shoulder_servo", "shoulder", 40.0, 1.6, 5.0, -0.5, 5.0),
+            Servo("elbow_servo", "elbow", 15.0, 0.45, 2.5, 0.7, 2.5),
         ),
         stop=(400.0, 1.0), tip="fingertip",
         moves=(Move("shoulder", (0.8, 0.0), -1.0), Move("elbow", (0.0, 0.9), -1.0), Move("both", (0.55, 0.65), -1.0)),
@@ -262,18 +262,18 @@ def leg() -> Robot:
             Link("thigh", 0.20, 0.80, 0.09, 2.7e-3), Link("shank", 0.18, 0.40, 0.08, 1.1e-3), Link("foot", 0.15, 0.20, 0.06, 4e-4),
         ),
         joints=(
-            Joint("hip", 0.0, 0.0, 0.15, 0.02, rad(-80), rad(80), 0.1, 1.5, rad(40)),
-            Joint("knee", 1.2, rad(10), 0.05, 0.0, rad(-10), rad(120), rad(20), 0.8, rad(75)),
-            Joint("ankle", 1.0, rad(-10), 0.02, 0.0, rad(-60), rad(60), rad(-10), 0.15, rad(5)),
+            Joint("hip", 0.0, 0.0, 0.15, 0.02, rad(-80), rad(80), 0.1, 1.5, rad(33)),
+            Joint("knee", 1.2, rad(10), 0.12, 0.0, rad(-10), rad(120), rad(43), 0.8, rad(92)),
+            Joint("ankle", 1.0, rad(-10), 0.05, 0.0, rad(-90), rad(90), rad(-14), 0.15, rad(20)),
         ),
         vias=_vias("knee_tendon", ((BASE, -60, -15), (BASE, -20, -12), (0, 25, -14), (0, 165, -26), (1, 30, -24), (1, 60, -18))),
         drives=(
-            Servo("hip_servo", "hip", 60.0, 2.5, 12.0, 0.1, 4.0),
-            Winch("knee_winch", "knee_tendon", 8000.0, 120.0, 150.0, 0.2750, 60.0),
+            Servo("hip_servo", "hip", 60.0, 2.5, 12.0, 0.1, 12.0),
+            Winch("knee_winch", "knee_tendon", 8000.0, 400.0, 150.0, 0.2930, 150.0),
         ),
         stop=(400.0, 1.0), tip="toe",
         moves=(Move("hip", (0.5, 0.0), -1.0), Move("knee", (0.0, -0.030), 0.0), Move("step", (0.35, -0.022), 0.0)),
-        payloads=(0.150, 0.080, 0.120), encoders=("hip", "knee", "ankle"), instruments=_instruments((0.02, 0.01), 0.2, 0.05, 0.3),
+        payloads=(0.100, 0.050, 0.080), encoders=("hip", "knee", "ankle"), instruments=_instruments((0.02, 0.01), 0.2, 0.05, 0.3),
         rates=(100,), force="force",
     )  # fmt: skip
 

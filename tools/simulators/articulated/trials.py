@@ -43,11 +43,11 @@ def eased(t: np.ndarray, knots: np.ndarray, values: np.ndarray, ramp: float | No
 
 
 def _some(robot: Robot, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw amplitudes (count, moves) whose sizes sum to at most one, from home to home."""
+    """Draw amplitudes (count, moves) whose sizes sum to at most 1.2, from home to home."""
     low = np.array([m.low for m in robot.moves])
     drawn = low + (1.0 - low) * rng.uniform(size=(count, len(low)))
-    drawn /= np.maximum(1.0, np.abs(drawn).sum(axis=1, keepdims=True))
-    drawn[[0, -1]] = 0.0
+    drawn /= np.maximum(1.0, np.abs(drawn).sum(axis=1, keepdims=True) / 1.2)
+    drawn[[0, 1, -1]] = 0.0
     return drawn
 
 
@@ -61,9 +61,7 @@ def _knots(seconds: float, shortest: float, longest: float, rng: np.random.Gener
 def wander(robot: Robot, t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Go through drawn amplitudes, one every 0.25 to 0.9 s."""
     knots = _knots(t[-1], 0.25, 0.9, rng)
-    values = _some(robot, len(knots), rng)
-    values[1] = 0.0
-    return eased(t, knots, values)
+    return eased(t, knots, _some(robot, len(knots), rng))
 
 
 def stand(robot: Robot, t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
