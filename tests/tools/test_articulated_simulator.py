@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from tools.simulators.articulated.bench import Trial, observe
@@ -101,32 +100,31 @@ def test_pendulum_swings_with_the_period_of_the_elliptic_integral() -> None:
 
 
 def test_one_joint_rests_where_spring_weight_and_tendon_balance() -> None:
-    robot, command = one_joint(), 0.066
+    """The tendon pulls the link's via along the line to the base's: torque T |r x d| / |d| towards the winch side."""
+    command = 0.066
 
     def out_of_balance(q: float) -> float:
         c, s = np.cos(q), np.sin(q)
         x, z = 0.04 * c - 0.008 * s, 0.04 * s + 0.008 * c
-        length = np.hypot(x + 0.03, z - 0.01)
-        arm = (-0.03 * z - 0.01 * x) / length  # of the line through the base via about the hinge
-        tension = 1500.0 * max(length - command, 0.0)
-        return -0.2 * (q - 0.1) - 0.05 * 9.81 * 0.04 * c - tension * arm * -1.0 * -1.0
+        dx, dz = -0.03 - x, 0.01 - z
+        length = np.hypot(dx, dz)
+        pulled = 1500.0 * max(length - command, 0.0) * (x * dz - z * dx) / length
+        return -0.2 * (q - 0.1) - 0.05 * 9.81 * 0.04 * c + pulled
 
-    arm_sign = 1.0 if out_of_balance(-1.0) * out_of_balance(2.0) < 0.0 else np.nan
-    expected = brentq(out_of_balance, -1.0, 2.0) * arm_sign
-    rows = run(plant(robot, 0.0), np.array([0.1]), np.full((200, 1), command), 0.01)
-    assert rows[-1, 4] > 1.0  # the tendon pulls
-    assert abs(rows[-1, 0] - expected) < 1e-8
+    rows = run(plant(one_joint(), 0.0), np.array([0.1]), np.full((200, 1), command), 0.01)
+    q, tension = rows[-1, 0], rows[-1, 4]
+    assert tension > 1.0
+    assert out_of_balance(q - 1e-8) > 0.0 > out_of_balance(q + 1e-8)
 
 
 def test_a_sliding_tendon_loses_the_capstan_share_of_its_tension() -> None:
-    """A joint held at an angle by its servo feels mu = 0.3 in the torque of a tendon that is wound in, by e^{-mu theta}."""
+    """A stiff spring that a tendon winds up over one bend feels its tension less by e^{-mu theta}, mu = 0.3."""
     robot = one_joint(stiffness=0.0, rest=0.0)
     bend = (Via("t_1", "t", BASE, -0.03, 0.0), Via("t_2", "t", BASE, -0.01, 0.02), Via("t_3", "t", 0, 0.05, 0.01))
     robot = replace(robot, vias=bend, gravity=(0.0, 0.0))
     made = plant(robot, 0.0)
-    made = made._replace(tendons=made.tendons._replace(mu=np.array([0.3])))
-    stiff = made.chain._replace(stiffness=np.array([5.0]), damping=np.array([0.5]))
-    made = made._replace(chain=stiff)
+    tendons = made.tendons._replace(mu=np.array([0.3]), slip=2e-5)
+    made = made._replace(tendons=tendons, chain=made.chain._replace(stiffness=np.array([5.0]), damping=np.array([0.5])))
     base = np.hypot(0.02, 0.02) + np.hypot(0.06, 0.01)
     command = (base - np.linspace(0.0, 0.02, 201))[:, None]
     rows = run(made, np.array([0.0]), command, 0.02)
@@ -137,7 +135,7 @@ def test_a_sliding_tendon_loses_the_capstan_share_of_its_tension() -> None:
     arm = np.abs(end[:, 0] * last[:, 1] - end[:, 1] * last[:, 0]) / np.hypot(*last.T)
     felt = (5.0 * np.abs(q) + 0.5 * np.abs(np.gradient(q, 0.02))) / arm
     assert np.all(turn > 0.5)
-    np.testing.assert_allclose(tension / felt, np.exp(0.3 * turn), rtol=1e-3)
+    np.testing.assert_allclose(tension / felt, np.exp(0.3 * turn), rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -164,7 +162,7 @@ def test_an_effect_of_strength_nothing_changes_nothing_and_else_something(name: 
         if effect.fits(robot):
             drawn = effect.draw(robot, np.random.default_rng(3))
             off, on = (
-                observe(robot, [replace(drawn, strength=s)], trial, 2e-4) for s in (0.0, min(3 * drawn.strength, drawn.most))
+                observe(robot, [replace(drawn, strength=s)], trial, 2e-4) for s in (0.0, min(6 * drawn.strength, drawn.most))
             )
             assert all(np.allclose(off[c], clean[c], rtol=0, atol=1e-9) for c in clean), id
             assert any(not np.allclose(on[c], clean[c], rtol=0, atol=1e-4) for c in clean), id

@@ -68,7 +68,10 @@ def scaled(effect: Effect, wanted: float, scale: Scale) -> tuple[Effect, float]:
     low, high = 0.0, np.inf
     at_low, strength, best = 0.0, min(effect.strength, effect.most), (0.0, 0.0)
     for _ in range(ROUNDS):
-        found = scale.levels([replace(effect, strength=strength)])[1]
+        try:
+            found = scale.levels([replace(effect, strength=strength)])[1]
+        except ArithmeticError:  # too stiff for the step: less of it
+            found = np.inf
         if abs(found - wanted) < abs(best[1] - wanted):
             best = (strength, found)
         if abs(found - wanted) < CLOSE * wanted or (found < wanted and strength >= effect.most):

@@ -129,7 +129,7 @@ def _summary(found: Sequence[tuple[Effect, float]], asked: float, total: float, 
 
 
 def _floors(listed: Sequence[Channel], holdout: Written) -> dict[str, Any]:
-    """Return the root-mean-square of noise and rounding on the held-out trials, by channel and by kind (per point for positions)."""
+    """Return the RMS of noise and rounding on the held-out trials, by channel and by kind (per point for positions)."""
     by_channel = {}
     for c in listed:
         errors = [shown[c.name] - exact[c.name] for shown, exact in zip(holdout.readings, holdout.exact, strict=True)]

@@ -111,9 +111,9 @@ def _tendons(robot: Robot) -> Tendons:
     first = np.cumsum([0, *(sum(v.tendon == name for v in vias) for name in names)])
     link = np.array([v.link for v in vias], dtype=np.int64)
     x, z = np.array([v.x for v in vias], dtype=float), np.array([v.z for v in vias], dtype=float)
-    gains = (np.array([getattr(w, name) for w in robot.winches], dtype=float) for name in ("kp", "kv", "limit"))
+    kp, kv, limit = (np.array([getattr(w, name) for w in robot.winches], dtype=float) for name in ("kp", "kv", "limit"))
     slip = 2e-3 * max(link.length for link in robot.links)
-    return Tendons(first, link, x, z, *gains, np.ones(per), np.zeros(per), np.zeros(per), slip)
+    return Tendons(first, link, x, z, kp, kv, limit, np.ones(per), np.zeros(per), np.zeros(per), slip)
 
 
 def plant(robot: Robot, payload: float) -> Plant:
@@ -123,7 +123,7 @@ def plant(robot: Robot, payload: float) -> Plant:
     names = ("armature", "stiffness", "rest", "damping")
     joints = {name: np.array([getattr(j, name) for j in robot.joints]) for name in (*names, "low", "high")}
     chain = Chain(robot.sense, np.array(robot.gravity), *links, **joints, drag=np.zeros(n), stop=np.array(robot.stop))
-    servos = Servos(*(_per_servo(robot, name) for name in ("kp", "kv", "limit")), np.ones(n))
+    servos = Servos(_per_servo(robot, "kp"), _per_servo(robot, "kv"), _per_servo(robot, "limit"), np.ones(n))
     rubbing = Rubbing(
         np.zeros(n), np.zeros(n), np.zeros(n), 1.0, 1e-3, np.zeros(n), np.zeros(n), np.zeros(n), np.array([0.0, 0.0, 1.0]), 1e-3
     )

@@ -1,7 +1,7 @@
 """Describes planar robots: a chain of hinges in the vertical plane (x, z), springs, tendons, winches and servos.
 
-SI throughout: m, kg, s, N, rad. The base frame has its origin in the first joint and x along the straight robot. An angle counts from
-straight, each from the link before it; the world angle of link k is sense (q_1 + ... + q_k), counter-clockwise from x towards z.
+SI throughout: m, kg, s, N, rad. The base frame has its origin in the first joint and x along the straight robot. An angle counts
+from straight, each from the link before it; the world angle of link k is sense (q_1 + ... + q_k), from x towards z.
 A built robot is the described one with every uncertain number moved by its tolerance times a standard normal number, cut at two.
 """
 
@@ -131,7 +131,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """One uncertain number: `std` relative to the value or in m. `key` is its name in robot.toml, `axis` its component if it has one."""
+    """One uncertain number: `std` is relative or in m, `key` its name in robot.toml, `axis` its component if any."""
 
     key: str
     group: str

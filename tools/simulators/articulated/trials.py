@@ -1,6 +1,6 @@
 """Plans a session: the motions of every trial, in a drawn order on one clock. Each trial leaves from home and comes back to it.
 
-A motion is amplitudes a_k(t) of the robot's moves; command = home + sum_k a_k by_k. Between the values it runs through, an amplitude
+A motion is amplitudes a_k(t) of the robot's moves; command = home + sum_k a_k by_k. Between its values an amplitude
 eases as (1 - cos pi s) / 2.
 """
 
