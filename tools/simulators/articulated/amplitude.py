@@ -5,7 +5,8 @@ twice and four times the usual step, which is the same on both sides of a differ
 
     level = sqrt(mean((e - B a)^2)),    a = argmin |e - B a|,    |built + a| <= 2.5 standard deviations of the description
 
-B is reduced once, B = Q R, and each fit is one of R a = Q^T e. Measured on every fourth trial, which carries the day's mixture.
+B is reduced once, B = Q R, and each fit is one of R a = Q^T e. Measured on every fourth trial, which carries the
+day's mixture, at 50 Hz.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from tools.simulators.articulated.trials import Day
 WITHIN = 2.5  # standard deviations of the description that a fit may use
 CLOSE = 0.03  # relative error of a level that is good enough
 THIN = 4  # one trial in so many
+ROWS = 50  # a second
 ROUNDS = 12
 
 
@@ -49,8 +51,8 @@ class Scale:
         self.bounds = (-WITHIN - deviations, WITHIN - deviations)
 
     def _outputs(self, robot: Robot, effects: Sequence[Effect], step: float) -> np.ndarray:
-        logs = [observe(robot, effects, trial, step) for trial in self.trials]
-        stacked = [np.column_stack([log[name] for name in self.names]) / self.sigmas for log in logs]
+        logs = [(observe(robot, effects, trial, step), trial.rate // ROWS) for trial in self.trials]
+        stacked = [np.column_stack([log[name][::every] for name in self.names]) / self.sigmas for log, every in logs]
         return np.concatenate(stacked).ravel()
 
     def levels(self, effects: Sequence[Effect]) -> tuple[float, float]:

@@ -10,7 +10,9 @@ import numpy as np
 from tools.simulators.articulated.dynamics import SETTLE, STEP, march, rest_state
 from tools.simulators.articulated.effects import Columns, Effect
 from tools.simulators.articulated.plant import plant
-from tools.simulators.articulated.robots import Robot, Winch
+from tools.simulators.articulated.robots import Drive, Robot, Winch
+
+DECIMALS = 4  # of a logged command
 
 
 @dataclass(frozen=True)
@@ -25,12 +27,13 @@ class Trial:
 
     @property
     def time(self) -> np.ndarray:
+        """Seconds from the log's start."""
         return np.arange(len(self.command)) / self.rate
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One output column: what it is, which instrument reads it and how fingertips are grouped in the errors."""
+    """One output column: what it is, which instrument reads it and with what it shares a floor."""
 
     name: str
     quantity: str
@@ -52,9 +55,9 @@ def channels(robot: Robot, camera: bool) -> list[Channel]:
     return found
 
 
-def command_unit(robot: Robot, drive: int) -> tuple[str, float, int]:
-    """Return the unit in which a command is logged, how many make one SI unit, and its decimals."""
-    return ("mm", 1e3, 4) if isinstance(robot.drives[drive], Winch) else ("deg", 180.0 / np.pi, 4)
+def command_unit(drive: Drive) -> tuple[str, float]:
+    """Return the unit in which a command is logged and how many make one SI unit."""
+    return ("mm", 1e3) if isinstance(drive, Winch) else ("deg", 180.0 / np.pi)
 
 
 def observe(robot: Robot, effects: Sequence[Effect], trial: Trial, step: float = STEP) -> Columns:

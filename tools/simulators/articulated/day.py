@@ -12,7 +12,7 @@ import numpy as np
 from tyro.conf import UseAppendAction, arg
 
 from tools.simulators.articulated.amplitude import Scale, scaled
-from tools.simulators.articulated.bench import Channel, Trial, channels, command_unit, observe
+from tools.simulators.articulated.bench import DECIMALS, Channel, Trial, channels, command_unit, observe
 from tools.simulators.articulated.describe import write_robot
 from tools.simulators.articulated.drives import all_effects
 from tools.simulators.articulated.effects import Columns, Effect
@@ -89,9 +89,9 @@ def read(robot: Robot, listed: Sequence[Channel], log: Columns, rng: np.random.G
 def measurements_toml(robot: Robot, listed: Sequence[Channel], trials: Sequence[Trial], title: str) -> str:
     """Return the text of measurements.toml."""
     lines = ['format = "twin-measurements/1"', 'robot = "./robot"', f'title = "{title}"', 'source = "hardware: bench"']
-    for i, drive in enumerate(robot.drives):
+    for drive in robot.drives:
         lines += ["", "[[channel]]", f'name = "{drive.target}_command"', f'quantity = "actuator.{drive.name}.ctrl"']
-        lines += ['role = "input"', f'unit = "{command_unit(robot, i)[0]}"']
+        lines += ['role = "input"', f'unit = "{command_unit(drive)[0]}"']
     for channel in listed:
         instrument = robot.instruments[channel.instrument]
         lines += ["", "[[channel]]", f'name = "{channel.name}"', f'quantity = "{channel.quantity}"', 'role = "output"']
@@ -107,9 +107,8 @@ def csv_text(robot: Robot, listed: Sequence[Channel], trial: Trial, log: Columns
     """Return a trial's CSV: time, commands, outputs."""
     header = ["time", *(f"{d.target}_command" for d in robot.drives), *(c.name for c in listed)]
     cells = [[f"{t:.3f}" for t in trial.time]]
-    for i in range(len(robot.drives)):
-        _, scale, digits = command_unit(robot, i)
-        cells.append([f"{v:.{digits}f}" for v in trial.command[:, i] * scale])
+    for i, drive in enumerate(robot.drives):
+        cells.append([f"{v:.{DECIMALS}f}" for v in trial.command[:, i] * command_unit(drive)[1]])
     cells += [[f"{v:.3f}" for v in log[c.name]] for c in listed]
     return "\n".join(",".join(row) for row in [header, *zip(*cells, strict=True)]) + "\n"
 

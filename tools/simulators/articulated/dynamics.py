@@ -22,14 +22,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tools.simulators.articulated.plant import Plant
+from tools.simulators.articulated.plant import Chain, Commands, Plant, Rubbing, Tendons
 
 STEP = 1e-4  # s
 SETTLE = 2.0  # s at the first command before the log
 
 
 class State(NamedTuple):
-    """Everything that has a past. `seg` is work space: direction, length, and length before, of each piece after its via."""
+    """Everything that has a past. `seg` holds direction and length of each piece after its via, and from there to the end."""
 
     q: np.ndarray
     w: np.ndarray
@@ -41,8 +41,22 @@ class State(NamedTuple):
     tip: np.ndarray  # (4,) position before and the brush's bend
 
 
+class Work(NamedTuple):
+    """What a step fills anew: frames, equations M and A and f, a tendon's dl/dq, speeds at the half step, torques and tendons."""
+
+    frame: np.ndarray  # (n + 2, 4)
+    M: np.ndarray
+    A: np.ndarray
+    f: np.ndarray
+    grow: np.ndarray
+    felt: np.ndarray
+    w: np.ndarray
+    torque: np.ndarray
+    drives: np.ndarray  # (2, tendons): tension at the winch, length at the drum
+
+
 @njit(cache=True)
-def place(chain, q, frame):
+def place(chain: Chain, q: np.ndarray, frame: np.ndarray) -> None:
     """Fill frame (n + 2, 4) with cosine, sine and origin x, z: of the base, of each link, and of the tip."""
     n = len(q)
     angle, x, z = 0.0, 0.0, 0.0
@@ -57,7 +71,7 @@ def place(chain, q, frame):
 
 
 @njit(cache=True)
-def inertial(chain, frame, w, M, f):
+def inertial(chain: Chain, frame: np.ndarray, w: np.ndarray, M: np.ndarray, f: np.ndarray) -> None:
     """Fill the mass matrix and the torques of gravity and of centrifugal and Coriolis acceleration."""
     n = len(w)
     M[:] = 0.0
@@ -81,7 +95,7 @@ def inertial(chain, frame, w, M, f):
 
 
 @njit(cache=True)
-def via_point(tendons, frame, m):
+def via_point(tendons: Tendons, frame: np.ndarray, m: int) -> tuple[float, float]:
     """Return x, z of a via point."""
     k = tendons.link[m] + 1
     c, s = frame[k, 0], frame[k, 1]
@@ -89,7 +103,7 @@ def via_point(tendons, frame, m):
 
 
 @njit(cache=True)
-def route(tendons, i, frame, state):
+def route(tendons: Tendons, i: int, frame: np.ndarray, state: State) -> float:
     """Find directions and lengths of a tendon's pieces, and let it slide through its via points; return its length."""
     first, last = tendons.first[i], tendons.first[i + 1] - 1
     x, z = via_point(tendons, frame, first)
@@ -112,9 +126,10 @@ def route(tendons, i, frame, state):
 
 
 @njit(cache=True)
-def shares(chain, tendons, i, frame, state, grow, felt):
+def shares(chain: Chain, tendons: Tendons, i: int, state: State, work: Work) -> None:
     """Fill dl/dq of a tendon, and the same with each piece weighted by the share of the winch's tension that reaches it."""
     first, last = tendons.first[i], tendons.first[i + 1] - 1
+    frame, grow, felt = work.frame, work.grow, work.felt
     grow[:] = 0.0
     felt[:] = 0.0
     exponent = 0.0
@@ -132,7 +147,9 @@ def shares(chain, tendons, i, frame, state, grow, felt):
 
 
 @njit(cache=True)
-def tension(tendons, i, length, rate, command, drum, h):
+def tension(
+    tendons: Tendons, i: int, length: float, rate: float, command: float, drum: np.ndarray, h: float
+) -> tuple[float, float, bool]:
     """Return tension, length at the drum and whether the winch's damping acts on the joints; moves the drum behind a compliance."""
     kp, kv, c = tendons.kp[i], tendons.kv[i], tendons.compliance[i]
     if c == 0.0:
@@ -147,21 +164,20 @@ def tension(tendons, i, length, rate, command, drum, h):
 
 
 @njit(cache=True)
-def pull_tendons(plant, frame, state, w, h, f, A, work, out):
-    """Add the tendons' torques; out (2, tendons) takes tension at the winch and length at the drum."""
-    n = len(w)
-    grow, felt = work[0], work[1]
+def pull_tendons(plant: Plant, state: State, work: Work, h: float) -> None:
+    """Add the tendons' torques, and keep tension at the winch and length at the drum."""
+    n, grow, felt, f, A = len(work.w), work.grow, work.felt, work.f, work.A
     for a in range(len(plant.commands.tendon)):
         i = plant.commands.tendon[a]
         if i < 0:
             continue
-        length = route(plant.tendons, i, frame, state)
-        shares(plant.chain, plant.tendons, i, frame, state, grow, felt)
+        length = route(plant.tendons, i, work.frame, state)
+        shares(plant.chain, plant.tendons, i, state, work)
         rate = 0.0
         for j in range(n):
-            rate += grow[j] * w[j]
+            rate += grow[j] * work.w[j]
         pull, wound, damped = tension(plant.tendons, i, length, rate, state.heard[a], state.drum, h)
-        out[0, i], out[1, i] = pull, wound
+        work.drives[0, i], work.drives[1, i] = pull, wound
         for j in range(n):
             f[j] -= pull * felt[j]
             if damped:
@@ -170,22 +186,23 @@ def pull_tendons(plant, frame, state, w, h, f, A, work, out):
 
 
 @njit(cache=True)
-def turn_servos(plant, state, w, f, A, torque):
+def turn_servos(plant: Plant, state: State, work: Work) -> None:
     """Add the servos' torques."""
-    servos = plant.servos
+    servos, w, torque = plant.servos, work.w, work.torque
     for a in range(len(plant.commands.joint)):
         j = plant.commands.joint[a]
         if j >= 0:
             asked = servos.kp[j] * (state.heard[a] - state.q[j]) - servos.kv[j] * w[j]
             torque[j] = servos.gain[j] * min(max(asked, -servos.limit[j]), servos.limit[j])
-            f[j] += torque[j]
+            work.f[j] += torque[j]
             if abs(asked) < servos.limit[j]:
-                A[j, j] -= servos.gain[j] * servos.kv[j]
+                work.A[j, j] -= servos.gain[j] * servos.kv[j]
 
 
 @njit(cache=True)
-def hinge(chain, rubbing, state, w, h, torque, f, A):
+def hinge(chain: Chain, rubbing: Rubbing, state: State, work: Work, h: float) -> None:
     """Add springs, damping, stops, detents and friction of the joints."""
+    w, f, A = work.w, work.f, work.A
     for j in range(len(w)):
         q = state.q[j]
         f[j] -= chain.stiffness[j] * (q - chain.rest[j]) + (chain.damping[j] + chain.drag[j] * abs(w[j])) * w[j]
@@ -197,7 +214,7 @@ def hinge(chain, rubbing, state, w, h, torque, f, A):
                 f[j] -= side * push
                 A[j, j] -= chain.stop[1]
         f[j] -= rubbing.detent[j] * np.sin(rubbing.teeth[j] * q + rubbing.phase[j])
-        level = rubbing.coulomb[j] + rubbing.load[j] * abs(torque[j])
+        level = rubbing.coulomb[j] + rubbing.load[j] * abs(work.torque[j])
         if level > 0.0:
             travel = h * state.w[j]
             side = 1.0 if travel > 0.0 else -1.0
@@ -207,9 +224,9 @@ def hinge(chain, rubbing, state, w, h, torque, f, A):
 
 
 @njit(cache=True)
-def brush(chain, rubbing, frame, tip, f):
+def brush(chain: Chain, rubbing: Rubbing, tip: np.ndarray, work: Work) -> None:
     """Add the drag of a brush on the tip, full below its edge, against the direction of travel."""
-    n = len(f)
+    n, frame, f = len(work.f), work.frame, work.f
     x, z = frame[n + 1, 2], frame[n + 1, 3]
     dx, dz = x - tip[0], z - tip[1]
     far = np.sqrt(dx * dx + dz * dz)
@@ -224,7 +241,7 @@ def brush(chain, rubbing, frame, tip, f):
 
 
 @njit(cache=True)
-def solve(M, b):
+def solve(M: np.ndarray, b: np.ndarray) -> None:
     """Solve M x = b in place, small and diagonally dominant enough for no pivoting; b becomes x."""
     n = len(b)
     for i in range(n):
@@ -240,7 +257,7 @@ def solve(M, b):
 
 
 @njit(cache=True)
-def listen(commands, asked, h, state):
+def listen(commands: Commands, asked: np.ndarray, h: float, state: State) -> None:
     """Let the drives hear their commands: shifted by a zero, through play, after a lag."""
     for a in range(len(asked)):
         wanted, half = asked[a] + commands.zero[a], 0.5 * commands.play[a]
@@ -251,18 +268,17 @@ def listen(commands, asked, h, state):
 
 
 @njit(cache=True)
-def advance(plant, state, frame, w, h, work, drives, torque):
-    """Move on by one step from angles at the half step; `w` goes in and comes out extrapolated to the half step."""
-    n = len(w)
-    M, A, f = work[:n], work[n : 2 * n], work[2 * n]
-    place(plant.chain, state.q, frame)
-    inertial(plant.chain, frame, w, M, f)
+def advance(plant: Plant, state: State, work: Work, h: float) -> None:
+    """Move the speeds on by one step from the angles at its middle; `work.w` goes in and comes out extrapolated to the middle."""
+    n, M, A, f, w = len(state.q), work.M, work.A, work.f, work.w
+    place(plant.chain, state.q, work.frame)
+    inertial(plant.chain, work.frame, w, M, f)
     A[:] = 0.0
-    pull_tendons(plant, frame, state, w, h, f, A, work[2 * n + 1 :], drives)
-    turn_servos(plant, state, w, f, A, torque)
-    hinge(plant.chain, plant.rubbing, state, w, h, torque, f, A)
+    pull_tendons(plant, state, work, h)
+    turn_servos(plant, state, work)
+    hinge(plant.chain, plant.rubbing, state, work, h)
     if plant.rubbing.brush[0] > 0.0:
-        brush(plant.chain, plant.rubbing, frame, state.tip, f)
+        brush(plant.chain, plant.rubbing, state.tip, work)
     for j in range(n):
         for k in range(n):
             f[j] += A[j, k] * (state.w[k] - w[k])
@@ -277,14 +293,14 @@ def advance(plant, state, frame, w, h, work, drives, torque):
 
 
 @njit(cache=True)
-def march(plant, state, command, every, settle, h):
+def march(plant: Plant, state: State, command: np.ndarray, every: float, settle: float, h: float) -> np.ndarray:
     """Integrate through a log; rows (logs, 2 n + 2 + 2 tendons): angles, servo torques, tip x, z, tensions, lengths at the drum."""
     n, t, logs = len(state.q), len(plant.tendons.kp), len(command)
-    frame, work = np.zeros((n + 2, 4)), np.zeros((2 * n + 3, n))
-    drives, torque, w, asked = np.zeros((2, t)), np.zeros(n), state.w.copy(), command[0].copy()
-    rows, now = np.zeros((logs, 2 * n + 2 + 2 * t)), np.zeros(2 * n + 2 + 2 * t)
-    before = now.copy()
-    done = 0
+    square, line = np.zeros((2, n, n)), np.zeros((4, n))
+    frame, drives = np.zeros((n + 2, 4)), np.zeros((2, t))
+    work = Work(frame, square[0], square[1], line[0], line[1], line[2], state.w.copy(), line[3], drives)
+    rows, now, asked = np.zeros((logs, 2 * n + 2 + 2 * t)), np.zeros(2 * n + 2 + 2 * t), command[0].copy()
+    before, done = now.copy(), 0
     for step in range(int((settle + (logs + 1) * every) / h)):
         time = (step + 0.5) * h - settle
         for j in range(n):
@@ -294,9 +310,9 @@ def march(plant, state, command, every, settle, h):
         for a in range(len(asked)):
             asked[a] = command[row, a] + (at - row) * (command[row + 1, a] - command[row, a])
         listen(plant.commands, asked, h, state)
-        advance(plant, state, frame, w, h, work, drives, torque)
+        advance(plant, state, work, h)
         before[:] = now
-        now[:n], now[n : 2 * n], now[2 * n : 2 * n + 2] = state.q, torque, frame[n + 1, 2:]
+        now[:n], now[n : 2 * n], now[2 * n : 2 * n + 2] = state.q, work.torque, frame[n + 1, 2:]
         now[2 * n + 2 : 2 * n + 2 + t], now[2 * n + 2 + t :] = drives[0], drives[1]
         if step == 0:
             before[:] = now

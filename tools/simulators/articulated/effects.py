@@ -50,6 +50,7 @@ class Effect:
 
 
 def has_tendons(robot: Robot) -> bool:
+    """Return whether a robot is pulled by tendons."""
     return bool(robot.winches)
 
 

@@ -118,10 +118,12 @@ class Robot:
 
     @property
     def winches(self) -> tuple[Drive, ...]:
+        """The drives that pull tendons."""
         return tuple(d for d in self.drives if isinstance(d, Winch))
 
     @property
     def servos(self) -> tuple[Drive, ...]:
+        """The drives that turn joints."""
         return tuple(d for d in self.drives if isinstance(d, Servo))
 
     def joint(self, name: str) -> int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.simulators.articulated.bench import Trial, command_unit
+from tools.simulators.articulated.bench import DECIMALS, Trial, command_unit
 from tools.simulators.articulated.robots import Robot
 
 LEAD = 0.3  # s at home before and after the motion
@@ -26,10 +26,12 @@ class Day:
 
     @property
     def measured(self) -> list[Trial]:
+        """The trials that are not held out."""
         return [t for t in self.trials if t.name not in self.held]
 
     @property
     def holdout(self) -> list[Trial]:
+        """The trials held out."""
         return [t for t in self.trials if t.name in self.held]
 
 
@@ -133,11 +135,10 @@ def session(robot: Robot, rng: np.random.Generator, camera: bool | None = None) 
     rate = int(rng.choice(robot.rates))
     filmed = bool(rng.uniform() > 0.2)
     home, by = np.array([d.home for d in robot.drives]), np.array([m.by for m in robot.moves])
-    units = [command_unit(robot, i) for i in range(len(home))]
-    scale, digits = np.array([u[1] for u in units]), [u[2] for u in units]
+    scale = np.array([command_unit(drive)[1] for drive in robot.drives])
     planned = []
     for name, amplitudes, payload in _motions(robot, rate, rng):
-        shown = np.column_stack([np.round(c, d) for c, d in zip(((home + amplitudes @ by) * scale).T, digits, strict=True)])
+        shown = np.round((home + amplitudes @ by) * scale, DECIMALS)
         planned.append(Trial(name, shown / scale, rate, payload))
     trials, now = [], 0.0
     for i in rng.permutation(len(planned)):
