@@ -50,7 +50,8 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
     """Return trials that this robot could run, within the commands already used.
 
     The payload is up to three times as large, at most 30 g; the load torque of a jaw from none to the largest. Where displacements
-    are commanded, the tendons that do not pull are let out, so that they are slack. Controls of an MJCF go from where they rest,
+    are commanded, the tendons that do not pull are let out, so that they are slack; rods by as much
+    together as the one that pulls is drawn in. Controls of an MJCF go from where they rest,
     for as long as the longest trial. Springs heated by currents cool within a minute and would not respond to a fast pull.
     """
     n, like = prepared.n_tendon, prepared.inputs[0]
@@ -64,7 +65,8 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
 
     def add(label: str, duration: float, *shares: np.ndarray) -> None:
         pull = np.stack(shares, axis=1)
-        command = home + (top - home) * np.where(held & (pull <= 0.0), -np.max(pull, axis=1, keepdims=True), pull)
+        let_out = -np.max(pull, axis=1, keepdims=True) / (max(n - 1, 1) if prepared.pushes else 1)
+        command = home + (top - home) * np.where(held & (pull <= 0.0), let_out, pull)
         shapes.append((label, np.linspace(0.0, duration, len(pull)), command))
 
     up_down = np.concatenate([np.linspace(0, 1, 30), np.linspace(1, 0, 30)])

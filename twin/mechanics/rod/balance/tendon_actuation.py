@@ -55,6 +55,13 @@ class Actuation(NamedTuple):
     crossing_travel: np.ndarray  # (n_tendon,) m
     backlash_state: np.ndarray  # (n_tendon,) z when the springs were last at rest
     path: np.ndarray  # (n_tendon,) m, path lengths then
+    pushes: bool  # whether the tendons are rods, which push as well
+
+
+@jit_internal
+def is_taut(actuation, t, tension):
+    """Return whether tendon t is held and bears a tension (N): rods always do."""
+    return actuation.held[t] and (tension > 0.0 or actuation.pushes)
 
 
 @jit_internal
