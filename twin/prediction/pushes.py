@@ -25,7 +25,7 @@ def check_pushes(recording: Recording, robot: Robot, body: Body) -> list[str]:
             continue
         for trial in recording.trials:
             _refuse_push(recording, trial, channel, robot)
-        lowest = min(float(np.nanmin(t.values[channel.name], initial=0.0)) for t in recording.trials)
+        lowest = min(float(np.nan_to_num(t.values[channel.name]).min()) for t in recording.trials)
         if lowest < -MAX_SLACK_SIGMAS * (channel.noise or USUAL_NOISE):
             notices.append(f"input {channel.name} falls to {lowest:.3g} N, below what its noise explains: a zero offset?")
     return notices
@@ -34,7 +34,7 @@ def check_pushes(recording: Recording, robot: Robot, body: Body) -> list[str]:
 def _refuse_push(recording: Recording, trial: Trial, channel: Channel, robot: Robot) -> None:
     """Raise DataError where a tendon that cannot push does."""
     tension = trial.values[channel.name]
-    slack = max(MAX_SLACK_SIGMAS * (channel.noise or 0.0), ZERO_OFFSET, ZERO_OFFSET_SHARE * np.nanmax(tension, initial=0.0))
+    slack = max(MAX_SLACK_SIGMAS * (channel.noise or 0.0), ZERO_OFFSET, ZERO_OFFSET_SHARE * np.nan_to_num(tension).max())
     below = np.flatnonzero(tension < -slack)
     if not len(below):
         return
@@ -42,10 +42,10 @@ def _refuse_push(recording: Recording, trial: Trial, channel: Channel, robot: Ro
     file = recording.folder / trial.name if recording.folder else trial.name
     row = at + (1 if str(file).lower().endswith(".parquet") else 2)  # a CSV's header is its first
     read = float(f"{channel.scale.from_si(tension[at : at + 1])[0]:.12g}")  # as written: units change the last digits
-    ways = ["correct the sign", "declare it `missing`"]
+    ways, robot_file = ["correct the sign", "declare it `missing`"], robot.folder / "robot.toml"
     if RODS_KEY in load_family(robot.family).SCHEMA.structure.model_fields:
-        ways.append(f"where the tendons are rods, which push, write {RODS_KEY} = true in [structure] of {robot.folder / 'robot.toml'}")
+        ways.append(f"where the tendons are rods, which push, write {RODS_KEY} = true in [structure] of {robot_file}")
     raise DataError(
-        f"{file}, row {row}, column {channel.name}: {read!r} {channel.unit}, a tendon cannot push (down to {-slack:.3g} N passes as "
-        f"noise or zero offset); {', or '.join(ways)}"
+        f"{file}, row {row}, column {channel.name}: {read!r} {channel.unit}, a tendon cannot push (down to {-slack:.3g} N passes "
+        f"as noise or zero offset); {', or '.join(ways)}"
     )

@@ -7,9 +7,9 @@ gives:
     free = straight path - displacement + BACKBONE_COMPLIANCE S,    S' = (sum T - S) / lag
 
 MuJoCo's implicit integration takes that spring, so that its 1e6 N/m does not bound the step. A tendon with T < 0 is slack from the
-next step on, until its path is longer than free; a rod never is. Bowing of the backbone and its compression by the total tension S follow from step
-to step. Friction's loss along the tendon goes to its segments' motors with the tension of the step before. An SMA spring's force
-law is linearised at every step, on its present piece, at its present temperature.
+next step on, until its path is longer than free; a rod never is. Bowing of the backbone and its compression by the total tension S
+follow from step to step. Friction's loss along the tendon goes to its segments' motors with the tension of the step before. An SMA
+spring's force law is linearised at every step, on its present piece, at its present temperature.
 """
 
 from typing import NamedTuple

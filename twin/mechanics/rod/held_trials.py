@@ -8,7 +8,7 @@ advance once a sample, under the current and at the elongation of the sample bef
 from twin.foundation.compiled import assign, jit, jit_inline
 from twin.mechanics.rod.balance.lengths import commit_present_slip, held_tangent, interpolate_target, reach_target, single_held_step
 from twin.mechanics.rod.balance.newton import Factors
-from twin.mechanics.rod.balance.tendon_actuation import commit_springs, is_taut
+from twin.mechanics.rod.balance.tendon_actuation import commit_springs
 from twin.mechanics.rod.trial_steps import (
     START_STEPS,
     any_true,
@@ -130,7 +130,7 @@ def guess_tensions(trial, neighbour, i):
     for t in range(trial.state.T.size):
         if neighbour.q.size and trial.actuation.held[t]:
             trial.state.T[t] = trial.actuation.softness[0] * neighbour.T[i, t]
-            trial.factors.held_tendons[t] = is_taut(trial.actuation, t, trial.state.T[t])
+            trial.factors.held_tendons[t] = trial.state.T[t] > 0.0 or trial.actuation.pushes
 
 
 @jit_inline
@@ -165,7 +165,8 @@ def solve_sample(trial, neighbour, mode, i):
 @jit_inline
 def keep_tangent(trial, LU, tension_response):
     """Store the factors of the present tangent and its tension response; those last used where it has none."""
-    if not held_tangent(trial.system, trial.state, trial.actuation, LU, trial.factors.held_tendons, tension_response):
+    held, pushes = trial.actuation.held, trial.actuation.pushes
+    if not held_tangent(trial.system, trial.state, held, pushes, LU, trial.factors.held_tendons, tension_response):
         for k in range(trial.last_shape.size):
             assign(LU[k], trial.factors.LU[k])
         for t in range(trial.state.T.size):

@@ -113,9 +113,9 @@ def controls_from_set(twin: Twin, recording: Recording) -> Recording:
 class Drawing:
     """How controls are drawn: from slack, eased moves of 0.3 to 1.5 s from bend to bend, drawn uniformly from a disk.
 
-    Each tendon takes the part of a bend along its own direction, up to `pull`. Displacements pay out on the far side; tensions are
-    zero there, except for a common pull of up to `CO_CONTRACTION` of the largest; rods push there. Controls of an MJCF move from rest to values
-    drawn uniformly from their ranges, within `pull` of where they rest.
+    Each tendon takes the part of a bend along its own direction, up to `pull`. On the far side displacements pay out, rods push,
+    and other tendons have no tension, except for a common pull of up to `CO_CONTRACTION` of the largest. Controls of an MJCF move
+    from rest to values drawn uniformly from their ranges, within `pull` of where they rest.
     """
 
     seconds: float = 10.0

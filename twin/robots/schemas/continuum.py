@@ -37,9 +37,7 @@ class Continuum(Motorised):
     )
     disks: Disk = Field(description="how many disks (of a cast body: places where the tendons' channels are followed)")
     tendons: Annotated[int, Field(ge=1, le=24)] = Field(description="how many tendons")
-    rods: bool = Field(
-        False, description="true: the tendons are rods, which push as well as pull (push rods, further backbones); none is ever slack"
-    )
+    rods: bool = Field(False, description="true: the tendons are rods, which push as well as pull (push rods, further backbones)")
     tendons_end: Disk | list[Disk] | None = Field(
         None, description="the disk at which all tendons end, or a list of one a tendon (segments); left out: the last"
     )

@@ -27,7 +27,6 @@ from twin.mechanics.rod.balance.tendon_actuation import (
     LENGTH_STIFFNESS,
     STALL_COMPLIANCE,
     backlash_at,
-    is_taut,
     length_gap,
     linearise_tendons,
     tendon_compliance,
@@ -66,15 +65,15 @@ def tension_gradients(system, tension, z, path_gradient, pull):
 
 
 @jit_internal
-def solve_taut_set(C, gap, T, actuation, dT):
+def solve_taut_set(C, gap, T, by_length, pushes, dT):
     """Solve C dT = gap for the tendons that end up taut. T + dT = 0 for those that end up slack, 0 where the tension is given.
 
     Returns False where the matrix of a taut set has no factors.
     """
-    nt, by_length = T.size, actuation.held
+    nt = T.size
     taut, M = np.empty(nt, np.bool_), np.empty((nt, nt))
     for t in range(nt):
-        taut[t] = by_length[t] and (T[t] > 0.0 or gap[t] > 0.0 or actuation.pushes)
+        taut[t] = by_length[t] and (T[t] > 0.0 or gap[t] > 0.0 or pushes)
     for _ in range(2 * nt + 2):
         for i in range(nt):
             dT[i] = gap[i] if taut[i] else (-T[i] if by_length[i] else 0.0)
@@ -87,7 +86,7 @@ def solve_taut_set(C, gap, T, actuation, dT):
         substitute(M, dT)
         worst, change = 1e-12, -1
         for i in range(nt):
-            if not by_length[i] or actuation.pushes:
+            if not by_length[i] or pushes:
                 continue
             if taut[i]:
                 violation = -(T[i] + dT[i])  # pushes
@@ -105,8 +104,8 @@ def solve_taut_set(C, gap, T, actuation, dT):
 
 
 @jit_internal
-def held_tangent(system, state, actuation, LU, held_tendons, tension_response):
-    """Factorise P = J + LENGTH_STIFFNESS sum B_i A_i', the sum over the taut held tendons. Return whether P is positive.
+def held_tangent(system, state, by_length, pushes, LU, held_tendons, tension_response):
+    """Factorise P = J + LENGTH_STIFFNESS sum B_i A_i', the sum over the taut tendons of `by_length`. Return whether P is positive.
 
     Fills LU with the factors, `held_tendons` (n_tendon,) with the taut tendons, and `tension_response` (n_tendon, nv) rad/N with
     P^-1 B. J alone need not be positive: a shape that is unstable under constant tension may be held by the lengths.
@@ -118,7 +117,7 @@ def held_tangent(system, state, actuation, LU, held_tendons, tension_response):
     force_balance(system, state, z, s, r, LU)
     tension_gradients(system, state.T, z, A, B)
     for t in range(nt):
-        held_tendons[t] = is_taut(actuation, t, state.T[t])
+        held_tendons[t] = by_length[t] and (state.T[t] > 0.0 or pushes)
         if held_tendons[t]:
             for i in range(nv):
                 for j in range(nv):
@@ -228,7 +227,7 @@ def apply_coupled_step(system, state, factors, actuation, A, s, turn):
                     D[j, k] -= share * tension_response[i, k]
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + tendon_compliance(actuation, i, j)
-    if not solve_taut_set(C, gap, tension, actuation, dT):
+    if not solve_taut_set(C, gap, tension, actuation.held, actuation.pushes, dT):
         return -1.0
     longest = 0.0
     for i in range(nv):
@@ -259,7 +258,7 @@ def coupled_residual(system, state, actuation, s, r):
                 gap /= STALL_COMPLIANCE * LENGTH_STIFFNESS
             elif actuation.by_spring[t]:  # (Y - T) / slope, on either side of an end of the backlash
                 gap *= backlash_at(actuation, t, s[t, 0])[1]
-            size = max(size, (abs(gap) if is_taut(actuation, t, state.T[t]) else gap) / GAP_PER_ANGLE)
+            size = max(size, (abs(gap) if state.T[t] > 0.0 or actuation.pushes else gap) / GAP_PER_ANGLE)
     return size
 
 
@@ -303,7 +302,8 @@ def solve_held(system, state, factors, actuation, tol):
             continue
         chord = usable[0] and size <= CHORD_CONTRACTION * before
         if not chord:
-            usable[0] = held_tangent(system, state, actuation, factors.LU, factors.held_tendons, factors.tension_response)
+            held, response = actuation.held, factors.tension_response
+            usable[0] = held_tangent(system, state, held, actuation.pushes, factors.LU, factors.held_tendons, response)
             if not usable[0]:
                 return 0
         before, step = size, 1.0

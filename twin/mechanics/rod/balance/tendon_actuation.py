@@ -59,12 +59,6 @@ class Actuation(NamedTuple):
 
 
 @jit_internal
-def is_taut(actuation, t, tension):
-    """Return whether tendon t is held and bears a tension (N): rods always do."""
-    return actuation.held[t] and (tension > 0.0 or actuation.pushes)
-
-
-@jit_internal
 def backlash_at(actuation, t, path):
     """Return the backlash offset (m) of tendon t at a path length (m), and the share of path changes beyond it."""
     if actuation.backlash[t] == 0.0:

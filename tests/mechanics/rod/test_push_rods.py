@@ -1,0 +1,221 @@
+"""Rods, which push as well as pull: closed forms of a planar rod, mirrored tendons, friction's loss, motion, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.other_continua import EI, LENGTH, NOWHERE, SIDEWAYS, disks, off, robot
+from twin.body import Drive, Loads, Problem, Route, Solution
+from twin.effects import effect_class
+from twin.effects.base.chain import EffectChain
+from twin.foundation.errors import DataError
+from twin.mechanics.rod import Equilibrium
+from twin.mechanics.rod.balance.tendon_actuation import BACKBONE_COMPLIANCE, LEAST_STRETCH
+from twin.mechanics.rod.dynamics import Dynamics
+from twin.prediction.kinematics import LoadedRobot
+from twin.prediction.rollout import draw_controls
+from twin.prediction.twin import Twin
+from twin.robots import Robot
+
+R, N_DISK = 8e-3, 8
+PITCH = LENGTH / N_DISK
+OPPOSITE = ([0.0, 180.0], "deg")
+PULLED = np.linspace(0.0, 1.5, 16)  # N
+BY_LENGTH = (Drive.DISPLACEMENT,) * 2
+
+
+def pair(folder: Path, n_disk: int = N_DISK, rods: bool = True) -> Robot:
+    """Two rods (or tendons) at 0 and 180 degrees, of a robot with `n_disk` disks."""
+    even = ([1e3 * LENGTH / n_disk] * n_disk, "mm")
+    return robot(
+        folder, {"tendons": 2, "disks": n_disk, "rods": rods}, ("markers.axial_offset",), tendons__angle=OPPOSITE, disks__pitch=even
+    )
+
+
+@pytest.fixture(scope="module")
+def rods(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return pair(tmp_path_factory.mktemp("rods"))
+
+
+@pytest.fixture(scope="module")
+def solver(rods: Robot) -> Equilibrium:
+    return Equilibrium(rods.build())
+
+
+def solved(solver: Equilibrium, command: np.ndarray, drives: tuple[Drive, ...] = (), **route: float) -> Solution:
+    path = solver.solve(Problem(np.arange(float(len(command))), command, Loads(NOWHERE), Route(**route), drives))
+    assert path.status.all()
+    return path
+
+
+def circle(turn: np.ndarray, n_disk: int = N_DISK) -> np.ndarray:
+    """Disk centres (n, n_disk, 3) m of arcs that turn by `turn` (n,) rad, above zero, over the length."""
+    s = np.arange(1, n_disk + 1) / n_disk
+    angle = turn[:, None] * s
+    return (LENGTH / turn)[:, None, None] * np.stack([1.0 - np.cos(angle), 0.0 * angle, np.sin(angle)], axis=2)
+
+
+def test_a_pure_couple_bends_to_a_circle(solver: Equilibrium) -> None:
+    """A pull T and a push T at +-r, straight from disk to disk: in an interval that turns by theta both have the lever
+    r cos(theta / 2), and no net force is left, so that theta = 2 r T h / EI cos(theta / 2) in all of them. 0.1 um: 1e-7 rad."""
+    T = PULLED[1:]
+    theta = np.zeros_like(T)
+    for _ in range(60):
+        theta = 2.0 * R * T * PITCH / EI * np.cos(0.5 * theta)
+    found = solved(solver, np.outer(T, [1.0, -1.0])).markers[:, :N_DISK]
+    assert np.abs(found - circle(N_DISK * theta)).max() < 1e-7
+    assert np.degrees(N_DISK * theta[-1]) > 100.0
+
+
+def test_with_more_disks_rods_follow_the_backbone_and_theta_is_2rTL_over_EI(tmp_path: Path) -> None:
+    """The levers' loss, theta^2 / 8, falls with the square of the number of disks: ninefold from 8 to 24, of 0.23 rad an interval."""
+    T, error = np.array([1.5]), []
+    for n in (8, 24):
+        (folder := tmp_path / str(n)).mkdir()
+        tip = solved(Equilibrium(pair(folder, n).build()), np.outer(T, [1.0, -1.0])).markers[0, n - 1]
+        error.append(float(np.linalg.norm(tip - circle(2.0 * R * T * LENGTH / EI, n)[0, -1])))
+    assert error[0] == pytest.approx(9.0 * error[1], rel=0.02)
+    assert error[1] < 0.1e-3
+
+
+def test_a_push_of_one_rod_is_the_mirrored_pull_of_the_other_but_for_the_axial_force(solver: Equilibrium) -> None:
+    """Pull 2 is push 1 and a force of T along the robot on its tip, which follows it: to first order in T alike, to second order the
+    axial force counts, P L^2 / EI of the shape. Of 0.02 N that is 18 %, of a tenth of it a tenth as much."""
+    differ = []
+    for T in (0.02, 0.002):
+        push, pull = (solved(solver, np.array([c])).markers[0, N_DISK - 1, 0] for c in ([-T, 0.0], [0.0, T]))
+        assert push < 0.0
+        assert pull < 0.0
+        differ.append(abs(push / pull - 1.0))
+    assert differ[0] == pytest.approx(10.0 * differ[1], rel=0.02)
+    assert differ[0] < 0.02 * LENGTH**2 / EI
+    both = np.array([[-0.3, 0.8], [0.8, -0.3]])
+    one, other = solved(solver, both).markers[:, :N_DISK]
+    np.testing.assert_allclose(one * [-1.0, 1.0, 1.0], other, atol=1e-7)  # 1e-7 rad of every hinge
+
+
+@pytest.mark.parametrize("stretch", [0.0, 1e-4])
+def test_a_rod_pushed_by_a_length_gives_way_by_its_compliance(solver: Equilibrium, stretch: float) -> None:
+    """Rod 1 is let out by d, rod 2 bears nothing: d = |T| c, c = r^2 L / EI + stretch + compression, for small bends. At 0.02 mm the
+    bend is 2.5 mrad, and |T| L^2 / EI, which counts beside 1, 5 %, a third of which bends: P L^2 / (3 EI)."""
+    d = 2e-5
+    path = solved(solver, np.array([[-d, 0.0]]), (Drive.DISPLACEMENT, Drive.TENSION), stretch=stretch)
+    c = R**2 * LENGTH / EI + max(stretch, LEAST_STRETCH) + BACKBONE_COMPLIANCE
+    T = path.tension[0, 0]
+    assert pytest.approx(-d / c, rel=T**2 + abs(T) * LENGTH**2 / EI / 3.0) == T
+    assert solver.straight_path[0] - path.path[0, 0] + max(stretch, LEAST_STRETCH) * T + BACKBONE_COMPLIANCE * T == pytest.approx(
+        -d, abs=2e-8
+    )
+
+
+def test_held_rods_have_the_tensions_that_hold_the_same_shape(solver: Equilibrium) -> None:
+    """Lengths taken from shapes under tensions of either sign give these tensions back, with tendons' friction too."""
+    t = np.linspace(0.0, 2.0 * np.pi, 60)
+    T = np.column_stack([0.8 * np.sin(t), -0.5 * np.sin(1.3 * t)])
+    for mu in (0.0, 0.2):
+        given = solved(solver, T, mu=mu, stretch=1e-4)
+        u = solver.straight_path - given.path + 1e-4 * given.tension + BACKBONE_COMPLIANCE * given.tension.sum(axis=1)[:, None]
+        held = solved(solver, u, BY_LENGTH, mu=mu, stretch=1e-4)
+        # The first lengths are approached from zero alike. 2e-8 m of a gap are 2e-4 N for each 1e-4 m/N that rods give.
+        np.testing.assert_allclose(held.tension, T, atol=5e-4)
+        assert off(held.markers, given.markers) < 5e-6
+        assert held.tension.min() < -0.3
+
+
+def test_rods_hold_a_robot_that_gravity_would_buckle(solver: Equilibrium, tmp_path: Path) -> None:
+    """Upright under a payload past buckling, P L^2 / EI > pi^2 / 4: between tendons paid out no straight shape is stable; rods at
+    zero hold it, and it is not called unstable."""
+    loads = Loads(np.array([0.0, 0.0, -9.81]), 0.035)
+    at_zero = Problem(np.arange(2.0), np.zeros((2, 2)), loads, Route(stretch=4e-6), BY_LENGTH)
+    held = solver.solve(at_zero)
+    assert held.status.all()
+    assert not held.unstable_start
+    assert off(held.markers[-1, :N_DISK], circle(np.array([1e-9]))[0]) < 1e-6
+    bare = solver.solve(Problem(np.zeros(1), np.zeros((1, 2)), loads))
+    assert bare.unstable_start
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_friction_along_a_rod_takes_work_whether_it_pulls_or_pushes(solver: Equilibrium, sign: float) -> None:
+    """Pulled or pushed to 0.7 N and back: the loop of tension over shortening encloses the work that friction takes. Without friction
+    it has no area. The loss at each of seven holes is mu |T| theta times its travel, to first order of the loop without friction:
+    2 mu int |T| sum_d theta_d |dtravel_d| is a fifth off at mu 0.2."""
+    T = sign * 0.7 * np.concatenate([np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)])
+    area = []
+    for mu in (0.0, 0.1, 0.2):
+        path = solved(solver, np.column_stack([T, 0.0 * T]), mu=mu, presliding=2e-5)
+        area.append(float(np.trapezoid(path.tension[:, 0], -path.path[:, 0])))
+    assert abs(area[0]) < 1e-3 * area[1]
+    assert 0.0 < 1.7 * area[1] < area[2] < 2.0 * area[1]
+    theta = R * 0.7 * PITCH / EI  # of an interval at the end
+    travel = R * theta * np.arange(N_DISK - 1, 0, -1)  # of the rod past each hole
+    assert area[1] == pytest.approx(2.0 * 0.1 * 0.7 * theta * travel.sum() / 3.0, rel=0.25)  # int T theta dtravel = T theta x / 3
+
+
+def test_tangent_of_friction_under_push_is_the_derivative(solver: Equilibrium) -> None:
+    """Newton's method finds pushed shapes with friction in few steps only with the right tangent: shapes at finer steps agree."""
+    T = np.column_stack([-np.linspace(0.0, 1.0, 6), np.linspace(0.0, 1.0, 6)])
+    coarse = solver.solve(Problem(np.arange(6.0), T, Loads(SIDEWAYS, 0.01), Route(0.2)))
+    assert (coarse.status == 1).all()
+
+
+def test_motion_of_rods_comes_to_the_statics(rods: Robot, solver: Equilibrium) -> None:
+    """Stepped for 3 s towards lengths, and tensions, that are then held: at rest as by statics, with pushes in both."""
+    t = np.linspace(0.0, 3.0, 31)
+    ramp = np.minimum(t, 1.0)[:, None]
+    dynamics = Dynamics(rods.build())
+    for command, drives in ((ramp * [-1e-3, 1e-3], BY_LENGTH), (ramp * [-0.5, 0.2], ())):
+        problem = Problem(t, command, Loads(NOWHERE), Route(stretch=2e-5), drives)
+        moved, still = dynamics.solve(problem), solver.solve(problem)
+        assert moved.status.all()
+        assert off(moved.markers[-1], still.markers[-1]) < 0.1e-3
+        np.testing.assert_allclose(moved.tension[-1], still.tension[-1], atol=5e-3)
+        assert still.tension[-1].min() < -0.05
+
+
+def test_tendons_of_the_same_robot_are_slack_where_rods_push(tmp_path: Path) -> None:
+    tendons = Equilibrium(pair(tmp_path, rods=False).build())
+    np.testing.assert_allclose(disks(tendons, [-1.0, 0.5]), disks(tendons, [0.0, 0.5]), atol=0)
+    held = solved(tendons, np.array([[-1e-3, 0.5e-3]]), BY_LENGTH)
+    assert held.tension[0, 0] == 0.0
+    assert held.tension[0, 1] > 0.0
+
+
+def test_what_needs_rope_or_slack_is_not_for_rods(rods: Robot, tmp_path: Path) -> None:
+    body, tendons = rods.build(), pair(tmp_path, rods=False).build()
+    assert body.pushes
+    assert not tendons.pushes
+    play = effect_class("tendon_backlash")
+    assert play.needs <= body.features
+    assert not play.extended_needs <= body.features
+    assert play.extended_needs <= tendons.features
+    for effect in (effect_class("tendon_elasticity")(toe=1e-4), effect_class("actuator_saturation")(stall=1.0, n_tendon=2)):
+        EffectChain((effect,)).check_body(tendons, "tendons")
+        with pytest.raises(DataError, match="leave `(toe|stall)` out"):
+            EffectChain((effect,)).check_body(body, "rods")
+
+
+def test_a_drive_saturates_under_push_as_under_pull(rods: Robot) -> None:
+    T = np.array([[2.0, -2.0], [0.5, -0.5]])
+    stall = effect_class("actuator_saturation")(loss=1.0, limit=1.0, corner=1e-4, n_tendon=2)
+    signals = Twin(rods).effect_chain  # an empty chain
+    assert not signals.effects
+    from twin.body import Signals
+
+    z = np.zeros
+    s = Signals(z(2), z(2), T, z((2, 2)), z((2, 0, 3)), z(2), (Drive.TENSION,) * 2)
+    np.testing.assert_allclose(stall.drive(s).tension, [[1.0, -1.0], [0.5, -0.5]], atol=1e-6)
+
+
+def test_kinematics_and_drawn_controls_push(rods: Robot) -> None:
+    twin = Twin(rods)
+    moved = LoadedRobot(twin, Loads(NOWHERE))
+    assert moved.pull(np.array([-0.5, 0.5])).tip[0] < -5e-3
+    np.testing.assert_allclose(moved.tension, [-0.5, 0.5])
+    (drawn,) = draw_controls(twin, 1, seed=3).trials
+    first, second = (drawn.values[f"tendon_{i}_tension"] for i in (1, 2))
+    np.testing.assert_allclose(first, -second, atol=1e-9)  # of a bend each takes its part
+    assert first.min() < 0.0
