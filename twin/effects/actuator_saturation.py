@@ -28,10 +28,10 @@ def _soft_excess(command: np.ndarray, limit: float, corner: float) -> np.ndarray
 class ActuatorSaturation(Effect):
     """Delivered = c - loss r(c - limit), r(x) = (x + sqrt(x^2 + corner^2)) / 2: below the limit c, above it the share 1 - loss.
 
-    Tensions: one `loss` for all drives above `limit`, pulled or pushed, with a corner of width `corner` (N). Currents: the same `loss` above
-    `ceiling`, with a corner of width `knee` (A). Lengths: drive i has its own `loss_i` above `stroke`, with a corner of width
-    `give` (m), both common to the drives, which are alike. A motor that holds a length gives way where its tendon would pull more
-    than `stall`, and returns where it would not.
+    Tensions, and thrusts of rods: one `loss` for all drives above `limit`, with a corner of width `corner` (N). Currents: the same
+    `loss` above `ceiling`, with a corner of width `knee` (A). Lengths: drive i has its own `loss_i` above `stroke`, with a corner
+    of width `give` (m), both common to the drives, which are alike. A motor that holds a length gives way where its tendon would
+    pull more than `stall`, and returns where it would not.
 
     A drive that stalls or stands on its end stop has a loss of 1, one that stalls on a spring less. It acts on commands: the log of
     a drive that reports its position does not show it.
