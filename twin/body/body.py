@@ -118,6 +118,13 @@ class Body:
         """Return of given tensions (N) what its tendons can bear: none below zero, unless they are rods."""
         return tension if self.pushes else np.maximum(tension, 0.0)
 
+    def bending(self, pull: np.ndarray) -> np.ndarray:
+        """Return tensions (N) for a bend of which each tendon has a part `pull`, below zero on the far side.
+
+        Tendons on that side have none. Rods there push, so that all need but half.
+        """
+        return 0.5 * pull if self.pushes else np.maximum(pull, 0.0)
+
     @property
     def size(self) -> Size:
         """Its size relative to the reference robot, for which effects' numbers are written; 1 for a body without a rod."""

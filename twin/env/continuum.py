@@ -212,7 +212,7 @@ class ContinuumReach(TwinEnv):
         robot = self.described.robot
         pulls = (bend[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])) @ self.pull.towards.T
         solver = robot.solver(robot.build(self.described.values))
-        tension = np.vstack([np.zeros(self.n), self.plant.body.borne(pulls) * self.pull.tension])
+        tension = np.vstack([np.zeros(self.n), self.plant.body.bending(pulls) * self.pull.tension])
         path = solver.solve(Problem(np.arange(float(len(tension))), tension, Loads(robot.gravity)))
         if not path.status.all():
             raise SolveError("the described robot has no equilibrium under a goal's tensions")

@@ -23,7 +23,10 @@ REPEAT_DIFFERENCE = 0.03
 
 
 def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
-    """Return pairs of trials that repeat each other: same loads, same sample times, same commands but for noise."""
+    """Return pairs of trials that repeat each other: same loads, same sample times, same commands but for noise.
+
+    The same readings again, noise included, are a copy and no repeat.
+    """
     pairs = []
     for a in range(len(prepared.inputs)):
         for b in range(a + 1, len(prepared.inputs)):
@@ -34,7 +37,8 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
                 and A.loads.payloads == B.loads.payloads
                 and np.allclose(A.loads.force, B.loads.force)
             )
-            if not same_loads or len(A.time) != len(B.time):
+            copied = np.array_equal(prepared.measured[a], prepared.measured[b], equal_nan=True)
+            if not same_loads or copied or len(A.time) != len(B.time):
                 continue
             if np.abs((A.time - A.time[0]) - (B.time - B.time[0])).max() > REPEAT_DIFFERENCE * np.ptp(A.time):
                 continue  # the same path at another rate

@@ -138,7 +138,7 @@ def draw_controls(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = N
         raise DataError(f"{n} rollouts asked for; at least one is needed")
     if ports := _ports(twin.robot, Drive.CONTROL):
         return _drawn_in_ranges(twin, n, seed, drawing, ports)
-    by_length, pull, pushes = drawing.drive is Drive.DISPLACEMENT, full_pull(twin), twin.robot.build().pushes
+    by_length, pull, body = drawing.drive is Drive.DISPLACEMENT, full_pull(twin), twin.robot.build()
     full = drawing.pull or (pull.displacement if by_length else pull.tension)
     time = np.arange(round(drawing.seconds * drawing.rate) + 1) / drawing.rate
     names = _input_names(twin.robot, drawing.drive)
@@ -148,8 +148,8 @@ def draw_controls(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = N
         knots = _knots(rng, time)
         radius, angle = np.sqrt(rng.uniform(size=len(knots))), rng.uniform(0.0, 2.0 * np.pi, len(knots))
         pulls = full * (radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])) @ pull.towards.T
-        if not by_length and not pushes:
-            pulls = np.maximum(pulls, 0.0) + full * CO_CONTRACTION * rng.uniform(size=(len(knots), 1))
+        if not by_length:
+            pulls = body.bending(pulls) + (not body.pushes) * full * CO_CONTRACTION * rng.uniform(size=(len(knots), 1))
         pulls[0] = 0.0
         trials.append(Trial(f"rollout_{k + 1}", time, dict(zip(names, _eased(time, knots, pulls), strict=True))))
     return _controls_recording(twin, trials, drawing.drive, f"{n} drawn rollouts, seed {seed}")

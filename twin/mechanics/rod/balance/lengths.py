@@ -14,6 +14,7 @@ import numpy as np
 from twin.effects.tendon_friction import rounded_turn_angle
 from twin.foundation.compiled import assign, dot, jit, jit_internal
 from twin.mechanics.rod.balance.chain import commit_slip, copy_state, force_balance, friction_of, point_velocity
+from twin.mechanics.rod.balance.elastic import add_arc_gradients
 from twin.mechanics.rod.balance.linear import factorise, substitute
 from twin.mechanics.rod.balance.newton import (
     CHORD_CONTRACTION,
@@ -62,6 +63,8 @@ def tension_gradients(system, tension, z, path_gradient, pull):
                 pull[t, i] = share * path_gradient[t, i]
         for i in range(chain.first_joint[nd], path_gradient.shape[1]):
             path_gradient[t, i] = pull[t, i] = 0.0
+    if chain.arc.size:
+        add_arc_gradients(chain, path_gradient, pull)
 
 
 @jit_internal

@@ -47,7 +47,7 @@ def couples(seed: int) -> Recording:
 
 
 def test_a_closed_form_of_push_rods_leaves_noise_and_the_refusal_names_the_key(tmp_path: Path) -> None:
-    """Straight from disk to disk, rods have 0.7 % less lever at most than in the closed form, which E takes up."""
+    """The verdict is noise: rods follow the backbone, as in the closed form."""
     day = couples(1)
     with pytest.raises(DataError, match=r"tendon_\d_tension: .* a tendon cannot push .* write rods = true in \[structure\]"):
         diagnose(day, Twin.of(planar(tmp_path / "tendons", rods=False)), Settings(jobs=2))
