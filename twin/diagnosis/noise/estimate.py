@@ -23,10 +23,7 @@ REPEAT_DIFFERENCE = 0.03
 
 
 def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
-    """Return pairs of trials that repeat each other: same loads, same sample times, same commands but for noise.
-
-    The same readings again, noise included, are a copy and no repeat.
-    """
+    """Return pairs of trials that repeat each other: same loads, same sample times, same commands but for noise."""
     pairs = []
     for a in range(len(prepared.inputs)):
         for b in range(a + 1, len(prepared.inputs)):
@@ -37,8 +34,7 @@ def repeats(prepared: PreparedRecording) -> list[tuple[int, int]]:
                 and A.loads.payloads == B.loads.payloads
                 and np.allclose(A.loads.force, B.loads.force)
             )
-            copied = np.array_equal(prepared.measured[a], prepared.measured[b], equal_nan=True)
-            if not same_loads or copied or len(A.time) != len(B.time):
+            if not same_loads or len(A.time) != len(B.time):
                 continue
             if np.abs((A.time - A.time[0]) - (B.time - B.time[0])).max() > REPEAT_DIFFERENCE * np.ptp(A.time):
                 continue  # the same path at another rate
@@ -62,6 +58,8 @@ def estimate_noise(
     """
     place = {k: i for i, k in enumerate(trials)}
     pairs = [(place[a], place[b]) for a, b in repeats(prepared) if a in place and b in place]
+    # The same readings again, noise included, are a copy and no repeat.
+    pairs = [(a, b) for a, b in pairs if np.nan_to_num(residual[a] - residual[b]).any()]
     declared = np.array([o.channel.noise or np.nan for o in prepared.outputs])
     cells = np.array([c.noise or np.nan for c in prepared.drivers]) * np.abs(prepared.pull)
     cells = np.where(prepared.driven_by(Drive.CONTROL), 0.0, cells)  # known exactly
