@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from tests.other_continua import EI, LENGTH, robot
 from twin.diagnosis import Settings, diagnose
 from twin.diagnosis.calibration.first_calibration import _taut_share, _unslackened
+from twin.diagnosis.noise.estimate import estimate_noise
 from twin.foundation.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import prepare
@@ -62,3 +64,17 @@ def test_no_reading_of_a_rod_is_silenced_near_zero(tmp_path: Path) -> None:
     assert (bench.inputs[0].command < -1.0).any()
     np.testing.assert_array_equal(_taut_share(bench, 0), 1.0)
     np.testing.assert_array_equal(_unslackened(bench).inputs[0].command, bench.inputs[0].command)
+
+
+def test_a_copied_trial_says_nothing_of_noise(tmp_path: Path) -> None:
+    """The same readings again are no repeat: noise is as declared, not zero."""
+    day = couples(3)
+    copies = replace(day, trials=tuple(replace(day.trials[0], name=t.name, start=t.start) for t in day.trials))
+    bench = prepare(copies, planar(tmp_path / "rods", rods=True))
+    rows = CAMERA * np.random.default_rng(0).standard_normal(bench.measured[0].shape)
+    felt = [np.zeros((*rows.shape, 2))] * 4
+    noise, notes = estimate_noise(bench, [0, 1, 2, 3], [rows] * 4, felt)
+    assert noise.declared
+    assert any("no repeated trials" in words for words in notes)
+    apart = [rows, *(rows + CAMERA * np.random.default_rng(k).standard_normal(rows.shape) for k in (1, 2, 3))]
+    assert not estimate_noise(bench, [0, 1, 2, 3], apart, felt)[0].declared
