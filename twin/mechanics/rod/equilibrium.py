@@ -49,7 +49,7 @@ class Equilibrium:
             self.spring,
         )  # fmt: skip
         # All of the chain except MuJoCo's views at its head and the markers at its end.
-        self._body = np.frombuffer(array_hash(*moves, *map(np.asarray, chain[5:-1])), np.uint8)
+        self._body = np.frombuffer(array_hash(*moves, *(np.asarray(a) for a in chain[5:-1] if a is not None)), np.uint8)
 
     @property
     def n_delayed(self) -> int:

@@ -49,8 +49,8 @@ class Chain(NamedTuple):
     first_joint: np.ndarray  # (n_hole,) joints that move each hole: piece d is on joints first_joint[d] to first_joint[d + 1]
     disk: np.ndarray  # (n_disk,) sites
     disk_joints: np.ndarray  # (n_disk,) how many joints move each disk
-    arc: np.ndarray  # (n_bend, 4) of rods: a bending hinge, its set, the piece that it bends and the axis (0, 1); else empty
-    arc_length: np.ndarray  # (n_tendon, n_piece) m, of rods' pieces on the straight body; 0 beyond their ends; else empty
+    arc: np.ndarray | None  # (n_bend, 4) of rods: a bending hinge, its set, the piece that it bends and the axis, 0 or 1
+    arc_length: np.ndarray | None  # (n_tendon, n_piece) m, of rods' pieces on the straight body; 0 beyond their ends
     marker: np.ndarray  # (n_marker,) sites
 
 

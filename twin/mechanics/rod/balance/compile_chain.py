@@ -43,16 +43,15 @@ def compile_chain(body: HingeChain, model: mujoco.MjModel, data: mujoco.MjData) 
         first_joint=first_joint,
         disk=disk,
         disk_joints=n_hinge[model.site_bodyid[disk]],
-        arc=_arc_table(body, dof, first_joint) if arcs else np.zeros((0, 4), np.int64),
-        arc_length=np.zeros((len(hole) if arcs else 0, longest)),
+        arc=_arc_table(body, dof, first_joint) if arcs else None,
+        arc_length=np.zeros((len(hole), longest)) if arcs else None,
         marker=site(np.array(body.marker_sites)),
     )
     mujoco.mj_kinematics(model, data)
     if chain.channel_lever.size:
         _set_channel_lever(chain)
-    if arcs:
-        ends = chain.site[hole]
-        chain.arc_length[:] = np.linalg.norm(np.diff(ends, axis=1), axis=2)
+    if chain.arc_length is not None:
+        chain.arc_length[:] = np.linalg.norm(np.diff(chain.site[hole], axis=1), axis=2)
     return chain
 
 

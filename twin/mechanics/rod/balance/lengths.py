@@ -42,7 +42,7 @@ LENGTH_PART_NEAR_POST = 2e-4  # m; near a post, which may catch the robot, parts
 
 
 @jit_internal
-def tension_gradients(system, tension, z, path_gradient, pull):
+def chord_gradients(system, tension, z, path_gradient, pull):
     """Fill dpath/dq and dr/dT, (n_tendon, nv) each, at the geometry in MuJoCo's data, tensions (N) and committed slip states z."""
     chain, law = system.chain, system.law
     for t in range(chain.hole.shape[0]):
@@ -63,8 +63,13 @@ def tension_gradients(system, tension, z, path_gradient, pull):
                 pull[t, i] = share * path_gradient[t, i]
         for i in range(chain.first_joint[nd], path_gradient.shape[1]):
             path_gradient[t, i] = pull[t, i] = 0.0
-    if chain.arc.size:
-        add_arc_gradients(chain, path_gradient, pull)
+
+
+@jit_internal
+def tension_gradients(system, tension, z, path_gradient, pull):
+    """Fill the gradients as `chord_gradients`, with rods' arcs."""
+    chord_gradients(system, tension, z, path_gradient, pull)
+    add_arc_gradients(system.chain.arc, system.chain, path_gradient, pull)
 
 
 @jit_internal
