@@ -223,7 +223,7 @@ def test_a_law_that_lets_tendons_fall_slack_lacks_what_they_would_hear(
     heard = [np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[10.0, 20.0]])]
     noise = SimpleNamespace(drive=np.array([0.5, 0.2]))
     shares = {2: np.array([[1.0, 0.1], [0.5, 0.75]]), 0: np.array([[0.3, 0.9]])}
-    bench = SimpleNamespace(driven_by=lambda kind: np.full(2, kind is drive), inputs=shares)
+    bench = SimpleNamespace(driven_by=lambda kind: np.full(2, kind is drive), inputs=shares, pushes=False)
     monkeypatch.setattr(
         "twin.diagnosis.fit_context.transmitted_noise",
         lambda twin, share, noise, pair: share if (twin, len(noise)) == ("twin", 2) else 0.0,
@@ -235,6 +235,8 @@ def test_a_law_that_lets_tendons_fall_slack_lacks_what_they_would_hear(
     traces = {k: SimpleNamespace(true=SimpleNamespace(tension=t, antagonists=False)) for k, t in tension.items()}
     fit = SimpleNamespace(evaluation=SimpleNamespace(traces=traces), model=SimpleNamespace(twin="twin"))
     assert study.blocked_input_noise(fit) == pytest.approx(lacks)  # type: ignore[arg-type]
+    bench.pushes = True  # rods: none is slack, and each lacks what the law does not pass on
+    assert study.blocked_input_noise(fit) == pytest.approx(1.8 + 1.5 + 1.0 + 7.0 + 2.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("drive", [Drive.TENSION, Drive.CURRENT])

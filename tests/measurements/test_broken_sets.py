@@ -215,7 +215,6 @@ BROKEN: dict[str, tuple[Break, list[str]]] = {
     "cut utf-8": (put("a.csv", HEADER.encode() + b"\n0,1,2,3,\xc3"), ["a.csv", "row 2", "UTF-8"]),
     "long line": (put("a.csv", HEADER.encode() + b"\n" + b"0" * 3_000_000), ["a.csv", "row 2", "line longer than"]),
     "long header": (put("a.csv", b"x" * 1_500_000 + b"\n1"), ["a.csv", "row 1", "line longer than"]),
-    "pushing": (csv("0.1,100", "0.1,-100"), ["a.csv", "row 3", "column tendon_1_tension", "-100.0 gf", "cannot push"]),
     "too cold": (csv("0.1,100,1.2,23", "0.1,100,1.2,-9999"), ["a.csv", "row 3", "column ambient_temperature", "absolute zero"]),
     "no output value": (blank(2), ["measurements.toml", "0 usable trials"]),
     "never filled": (blank(3), ["measurements.toml", "channel ambient_temperature", "no value"]),

@@ -80,6 +80,7 @@ class Body:
 
         weight, elasticity (one stiffness for all of it), markers, load cells, strain sensors, antagonists
         rope          tendons may bed in, motors may stall    planes       `set_bending_anisotropy` works
+        slack         tendons only pull, and may be slack     rods         tendons push as well as pull
         length        `set_stiffness_gradient` works          rest shape   `set_rest_curvature` works
         holes         `move_tendon_holes` works               surface      may touch obstacles
         viscosity     may creep                               skin         compared with clouds (`Problem.seen`)
@@ -107,6 +108,22 @@ class Body:
     imu_sites: tuple[str, ...] = ()
     payload_places: frozenset[str] = frozenset()
     damping_time: float = 0.0  # s, damping over stiffness, where statics stands for motion
+
+    @property
+    def pushes(self) -> bool:
+        """Whether its tendons are rods, which push as well as pull."""
+        return "rods" in self.features
+
+    def borne(self, tension: np.ndarray) -> np.ndarray:
+        """Return of given tensions (N) what its tendons can bear: none below zero, unless they are rods."""
+        return tension if self.pushes else np.maximum(tension, 0.0)
+
+    def bending(self, pull: np.ndarray) -> np.ndarray:
+        """Return tensions (N) for a bend of which each tendon has a part `pull`, below zero on the far side.
+
+        Tendons on that side have none. Rods there push, so that all need but half.
+        """
+        return 0.5 * pull if self.pushes else np.maximum(pull, 0.0)
 
     @property
     def size(self) -> Size:

@@ -31,8 +31,8 @@ class HingeChain(Body):
     """A body of joint sets, two for each piece of backbone; a disk interval has one or more pieces.
 
     `disks` lists the sites of the disk centres, base to tip; payload and tip force act at `tip`. With `straight_tendons` the
-    tendons are straight between disks and the backbone bows away from them; else they run in channels of the body. `stiffening` of
-    a body that stretches goes from 0 (Hooke) to 1 (neo-Hookean).
+    tendons are straight between disks and the backbone bows away from them (rods follow it); else they run in channels of the body.
+    `stiffening` of a body that stretches goes from 0 (Hooke) to 1 (neo-Hookean).
     """
 
     joints: tuple[JointSet, ...]

@@ -47,7 +47,7 @@ class FitContext:
         """
         traces, whitener, prepared = fit.evaluation.traces, self.objective.whitener, self.prepared
         drive = whitener.noise.drive
-        near = np.where(prepared.driven_by(Drive.TENSION), SLACK_READING * drive, 0.0)
+        near = np.where(prepared.driven_by(Drive.TENSION), SLACK_READING * drive, 0.0) if not prepared.pushes else -np.inf
         blocked = 0.0
         for k, energy in zip(self.trials, whitener.input_noise_energy, strict=True):
             true = traces[k].true

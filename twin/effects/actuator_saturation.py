@@ -28,10 +28,10 @@ def _soft_excess(command: np.ndarray, limit: float, corner: float) -> np.ndarray
 class ActuatorSaturation(Effect):
     """Delivered = c - loss r(c - limit), r(x) = (x + sqrt(x^2 + corner^2)) / 2: below the limit c, above it the share 1 - loss.
 
-    Tensions: one `loss` for all drives above `limit`, with a corner of width `corner` (N). Currents: the same `loss` above
-    `ceiling`, with a corner of width `knee` (A). Lengths: drive i has its own `loss_i` above `stroke`, with a corner of width
-    `give` (m), both common to the drives, which are alike. A motor that holds a length gives way where its tendon would pull more
-    than `stall`, and returns where it would not.
+    Tensions, and thrusts of rods: one `loss` for all drives above `limit`, with a corner of width `corner` (N). Currents: the same
+    `loss` above `ceiling`, with a corner of width `knee` (A). Lengths: drive i has its own `loss_i` above `stroke`, with a corner
+    of width `give` (m), both common to the drives, which are alike. A motor that holds a length gives way where its tendon would
+    pull more than `stall`, and returns where it would not.
 
     A drive that stalls or stands on its end stop has a loss of 1, one that stalls on a spring less. It acts on commands: the log of
     a drive that reports its position does not show it.
@@ -95,7 +95,7 @@ class ActuatorSaturation(Effect):
                 if 0.02 < share * largest < 50.0:
                     yield FitStart({"loss": 0.3, "ceiling": share * largest}, ("loss", "ceiling", "knee"))
             return
-        largest = max(float(s.tension.max(initial=0.0)) for s in predicted)
+        largest = max(float(np.abs(s.tension).max(initial=0.0)) for s in predicted)
         for share in LIMIT_SHARES:
             if 0.1 < share * largest < 200.0:
                 yield FitStart({"loss": 0.3, "limit": share * largest}, ("loss", "limit", "corner"))
@@ -103,7 +103,8 @@ class ActuatorSaturation(Effect):
     def drive(self, command: Signals) -> Signals:
         tension, displacement, current = command.tension, command.displacement, command.current
         if self["loss"]:
-            tension = tension - self["loss"] * _soft_excess(tension, self["limit"], self["corner"])
+            over = _soft_excess(np.abs(tension), self["limit"], self["corner"])
+            tension = tension - self["loss"] * np.copysign(over, tension)
             current = current - self["loss"] * _soft_excess(current, self["ceiling"], self["knee"])
         if (loss := self.per_tendon_values("loss")).any():
             stopped = displacement - loss * _soft_excess(displacement, self["stroke"], self["give"])

@@ -30,7 +30,8 @@ class TendonBacklash(Effect):
 
     The gap of drive i is `gap`, common to all, plus its own gap_i. The side z changes over the travel `swap`. With swap = gap/2 the
     tendon is at rest while the motor crosses the gap (the play operator); with less the gap is spring-loaded. If the gaps differ,
-    swap is that of the mean gap, and each drive's is in proportion to its gap. `slack` is taken up before the tendon pulls.
+    swap is that of the mean gap, and each drive's is in proportion to its gap. `slack` is taken up before the tendon
+    pulls; rods, which push, have none.
 
     An SMA spring follows its tendon with that play: its elongation is the path's less gap/2 z, z = +1 after paying out. With
     swap = gap/2 it is at rest while the tendon crosses the gap (99 % of it: play alone would leave no stiffness). Slack does not
@@ -57,7 +58,7 @@ class TendonBacklash(Effect):
     per_tendon = (Parameter("gap", 0.0, "m", -2e-2, 2e-2, "one drive's, beside that of all; as gap", scale=5e-5),)
     inactive_when_off = ("swap",)
     extended_parameters = ("slack",)
-    extended_needs = frozenset({"elasticity"})
+    extended_needs = frozenset({"elasticity", "slack"})
     moves_with = "the direction of travel"
     plot_against = "loop"
     hidden_without = frozenset({DataNeed.REVERSALS, DataNeed.DISPLACEMENTS})

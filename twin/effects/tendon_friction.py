@@ -29,7 +29,7 @@ def rounded_turn_angle(theta):
 
 
 class TendonFriction(Effect):
-    """Capstan loss per hole with pre-sliding: T_d = T_0 exp(-mu sum_{j<=d} z_j theta_j).
+    """Capstan loss per hole with pre-sliding: T_d = T_0 exp(-mu sum_{j<=d} z_j theta_j); of a rod that pushes, T_0 < 0, with +mu.
 
     theta_j (rad) is the turn angle of the tendon at inner disk j, z_j in [-1, 1] the slip state there: +1 while the tendon slides
     towards the base (pulling: tension falls along it), -1 while it slides out (releasing: tension rises), in between sticking.

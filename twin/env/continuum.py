@@ -157,17 +157,22 @@ class ContinuumReach(TwinEnv):
         most, sensed = self._largest_command / self.full, PULL_RANGE * self.options.most
         parts = {
             "load_cells": PartBounds.within(self.n, sensed), "encoders": PartBounds.within(self.n, sensed),
-            "commands": PartBounds(k, -most if self.drive is Drive.DISPLACEMENT else 0.0, most),
+            "commands": PartBounds(k, -most if self._signed else 0.0, most),
             "tip": PartBounds.within(3, PLACE_RANGE), "goal": PartBounds.within(3, PLACE_RANGE),
             "angles": PartBounds.within(nv, np.pi), "speeds": PartBounds.within(nv, SPEED_RANGE),
         }  # fmt: skip
         return ObservationLayout({name: part for name, part in parts.items() if self._includes(name)})
 
+    @property
+    def _signed(self) -> bool:
+        """Whether commands go below zero: displacements, and tensions of rods."""
+        return self.drive is Drive.DISPLACEMENT or (self.drive is Drive.TENSION and self.plant.body.pushes)
+
     def _limit_command(self, command: np.ndarray) -> np.ndarray:
         """Return the nearest command (k,) within the limits."""
         if self.drive is Drive.DISPLACEMENT:
             return command * min(1.0, self._largest_command / max(float(np.linalg.norm(command)), 1e-12))
-        return np.clip(command, 0.0, self._largest_command)
+        return np.clip(command, -self._largest_command if self._signed else 0.0, self._largest_command)
 
     def _draw_plant(self) -> RodPlant:
         """Draw an episode's twin and payload, and build its robot. Raises SolveError where it has no equilibrium."""
@@ -207,7 +212,7 @@ class ContinuumReach(TwinEnv):
         robot = self.described.robot
         pulls = (bend[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])) @ self.pull.towards.T
         solver = robot.solver(robot.build(self.described.values))
-        tension = np.vstack([np.zeros(self.n), np.maximum(pulls, 0.0) * self.pull.tension])
+        tension = np.vstack([np.zeros(self.n), self.plant.body.bending(pulls) * self.pull.tension])
         path = solver.solve(Problem(np.arange(float(len(tension))), tension, Loads(robot.gravity)))
         if not path.status.all():
             raise SolveError("the described robot has no equilibrium under a goal's tensions")

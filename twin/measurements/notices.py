@@ -7,7 +7,6 @@ import numpy as np
 
 from twin.foundation.errors import short_repr
 from twin.measurements.channels import Channel
-from twin.measurements.parsing.plausible import MAX_SLACK_SIGMAS
 from twin.measurements.parsing.tables import Table
 from twin.measurements.recording import EXTERNAL_CONTACT, START_POSE, Trial
 
@@ -15,7 +14,7 @@ MAX_COLUMNS_NAMED = 5  # undeclared columns
 
 
 def collect_notices(channels: Sequence[Channel], trials: Sequence[Trial], tables: Sequence[Table]) -> list[str]:
-    """Return notices on undeclared columns, unknown conditions, inputs with gaps or below zero, and channels empty in a trial."""
+    """Return notices on undeclared columns, unknown conditions, inputs with gaps, and channels empty in a trial."""
     notices = []
     extra = _files_by_name((table.path.name, table.extra) for table in tables)
     if len(extra) > MAX_COLUMNS_NAMED:
@@ -36,9 +35,6 @@ def collect_notices(channels: Sequence[Channel], trials: Sequence[Trial], tables
         gaps = {trial.name: int(np.count_nonzero(np.isnan(trial.values[channel.name]))) for trial in trials}
         empty = [trial.name for trial in trials if gaps[trial.name] == len(trial.time)]
         some = tuple(name for name, count in gaps.items() if count and name not in empty)
-        lowest = min((float(np.nanmin(t.values[channel.name])) for t in trials if t.name not in empty), default=0.0)
-        if channel.role == "input" and channel.kind == "tendon_tension" and lowest < -MAX_SLACK_SIGMAS * (channel.noise or 0.01):
-            notices.append(f"input {channel.name} falls to {lowest:.3g} N, below what its noise explains: a zero offset?")
         if empty:
             notices.append(f"{channel.role} {channel.name} has no value in {_list_files(empty)}")
         if some and channel.role == "input":

@@ -15,6 +15,7 @@ from twin.measurements.conditions import PAYLOAD_AT
 from twin.measurements.patches import N_PATCHES, SHARED_NOISE_SHARE, Patches, camera_direction, cut_patches, point_scatter
 from twin.measurements.recording import EXTERNAL_CONTACT, START_POSE
 from twin.prediction.orientations import Orientation, measured_columns, orientations
+from twin.prediction.pushes import check_pushes
 from twin.robots import Robot
 
 FEWEST_SMOOTHED_ROWS = 20  # of a thermometer; cross-validation of fewer is unreliable
@@ -79,7 +80,7 @@ class PreparedRecording:
     """A recording prepared for a robot. `measured[k]` is (n_k, n_output), NaN where missing; trials are in order of their clock.
 
     `drives` is the kind of drive of each tendon, `drivers` its channel, and `pull` (n_tendon,) the tendon's command per unit of
-    that channel.
+    that channel. `pushes`: whether the tendons are rods, which are never slack.
     """
 
     recording: Recording
@@ -91,6 +92,7 @@ class PreparedRecording:
     drivers: tuple[Channel, ...]
     pull: np.ndarray
     orientations: tuple[Orientation, ...] = ()
+    pushes: bool = False
 
     @property
     def n_tendon(self) -> int:
@@ -105,6 +107,11 @@ class PreparedRecording:
     def driven_by(self, kind: Drive) -> np.ndarray:
         """Return (n_tendon,) whether a tendon has this kind of drive."""
         return drive_mask(self.drives, kind)
+
+    @property
+    def silenced_below_zero(self) -> np.ndarray:
+        """(n_tendon,) whether a tension drives a tendon that cannot push, so that readings below zero do not reach the body."""
+        return self.driven_by(Drive.TENSION) & (not self.pushes)
 
     @property
     def reading(self) -> np.ndarray:
@@ -129,14 +136,14 @@ class PreparedRecording:
 def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
     """Prepare a recording for a robot.
 
-    Raises DataError where the inputs do not determine the robot, or no output is predictable.
+    Raises DataError where the inputs do not determine the robot, tendons that only pull push, or no output is predictable.
     """
     recording, notices = _without_contact(recording)
     body = robot.build()
     _check_fingers(recording, robot, body)
     driven = _drives(recording, robot, body)
     names = [channel.name for channel, _ in driven]
-    notices += robot.notices
+    notices += [*check_pushes(recording, robot, body), *robot.notices]
     notices += [
         f"input {c.name} does not drive robot {robot.name!r} and is not used"
         for c in recording.inputs()
@@ -182,7 +189,8 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
     if any(_outrun_damping(i, body) for i in inputs):
         inputs = [replace(i, damped=True) for i in inputs]
     drivers, each = tuple(driven[k][0] for k in through), pull[through, np.arange(body.n_tendon)]
-    return PreparedRecording(recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices), drivers, each, turned)
+    known = (recording, robot, tuple(inputs), outputs, tuple(measured), tuple(notices))
+    return PreparedRecording(*known, drivers, each, turned, body.pushes)
 
 
 def _from_home(inputs: Sequence[Inputs]) -> list[Inputs]:

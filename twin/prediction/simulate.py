@@ -92,7 +92,7 @@ class TrialSimulator:
             excess = driven.displacement[bad] - (self.solver.straight_path - solution.path[bad])
             raise SolveError(f"{inputs.name}: {reason}" if reason else _describe_failure(inputs.name, problem, bad, excess), bad)
         # a load cell reads the tension itself, which the shape follows
-        tension = solution.tension + (np.maximum(driven.tension, 0.0) - np.maximum(felt.tension, 0.0))
+        tension = solution.tension + (self.body.borne(driven.tension) - self.body.borne(felt.tension))
         shortening = self.solver.straight_path - solution.path + problem.route.elongation(tension)
         travel = np.where(driven.driven_by_length, driven.displacement, shortening)
         markers = self.body.frame.to_marker_frame(solution.markers)

@@ -192,7 +192,7 @@ class TwinPanel(Panel):
 
     def _fit_colour_ranges(self, frames: Sequence[Frames], tension: float | None = None, warmest: float = 0.0) -> None:
         """Set colour ranges that hold `frames`, up to the given largest tension (N) and warmest spring (K)."""
-        figure, pulled = self.shown_twins[0].figure, max(float(f.tension.max(initial=0.0)) for f in frames)
+        figure, pulled = self.shown_twins[0].figure, max(float(np.abs(f.tension).max(initial=0.0)) for f in frames)
         most = tension if tension is not None and tension > pulled else max(float(np.ceil(10.0 * pulled) / 10.0), LEAST_TENSION)
         ranges = {shade: figure.colour_scale(shade, most) for shade in figure.colour_fields}
         if any(f.temperature.size for f in frames):

@@ -37,7 +37,7 @@ class HandControls:
     def __init__(self, gui: viser.GuiApi, twin: Twin, figure: Drawable, changed: Callable[[Any], None]) -> None:
         """Call `changed` with every handle that a user may move. Raises DataError for a robot that no pull bends sideways."""
         self._twin, self._gravity, self._figure, self.warmest_spring = twin, twin.robot.gravity, figure, 0.0
-        self.fingers = fingers(figure)
+        self.fingers, self.pushes = fingers(figure), twin.robot.build().pushes
         self.drives = _available_drives(twin)
         self.largest_tension: float | None = None
         if Drive.CONTROL in self.drives:
@@ -71,7 +71,8 @@ class HandControls:
         self.sliders = {}
         for d in self.drives:
             bends = d is Drive.DISPLACEMENT
-            (_, unit, hint, _), least = DRIVE_WORDS[d], -most[d] if bends else 0.0
+            signed = bends or (d is Drive.TENSION and self.pushes)
+            (_, unit, hint, _), least = DRIVE_WORDS[d], -most[d] if signed else 0.0
             self.sliders[d] = [
                 gui.add_slider(f"{part}, {unit}", least, most[d], 0.01, 0.0, hint=hint, visible=d is first)
                 for part in (self._bend_names() if bends else self._tendon_names(_driven_part(d), twin.robot.n_tendon))

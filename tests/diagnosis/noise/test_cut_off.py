@@ -66,7 +66,7 @@ class Bending(Objective):
         time = np.arange(float(N))
         inputs = Inputs("made", time, time, read, (Drive.TENSION,) * 3, np.full(N, 296.0), Loads(np.zeros(3), 0.0))
         measured = true @ S.T + SIGMA * rng.normal(size=(N, 3))
-        bench: Any = SimpleNamespace(measured=[measured], inputs=[inputs], driven_by=lambda kind: np.full(3, kind is Drive.TENSION))
+        bench: Any = SimpleNamespace(measured=[measured], inputs=[inputs], silenced_below_zero=np.ones(3, bool))
         super().__init__(bench, [0], whitener(), 1)
         self.feels = True
 

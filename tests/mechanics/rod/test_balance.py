@@ -123,13 +123,19 @@ def residual(e: Equilibrium, q, rest, T, loads: Loads, route: Route, z0=None, s0
     return r, J, z, s
 
 
-@pytest.mark.parametrize(("mu", "wall"), [(0.0, WALL), (0.3, WALL), (0.3, POST)], ids=["wall", "rubbing", "post"])
-def test_the_tangent_is_the_slope_of_the_residual(mu: float, wall: np.ndarray) -> None:
+@pytest.mark.parametrize(
+    ("mu", "wall", "sign"),
+    [(0.0, WALL, 1), (0.3, WALL, 1), (0.3, POST, 1), (0.3, WALL, -1)],
+    ids=["wall", "rubbing", "post", "pushing"],
+)
+def test_the_tangent_is_the_slope_of_the_residual(mu: float, wall: np.ndarray, sign: int) -> None:
+    """With `sign` -1 two of three tendons push, one that slides and one that sticks."""
     e = Equilibrium(edited(stiffness_asymmetry={"along": 0.2, "across": -0.3}))
     rng = np.random.default_rng(2)
     loads = Loads(np.array([3.0, -5.0, 7.0]), 0.02, np.array([0.02, 0.01, -0.03]), wall)
     for size in (0.03, 0.15):
         q, rest, T = rng.normal(0, size, 48), rng.normal(0, 0.02, 48), rng.uniform(0, 4, 3)
+        T = T * [sign, sign, 1]
         s0 = residual(e, q, rest, T, loads, Route())[3]
         z0 = rng.uniform(-0.9, 0.9, (3, 8))  # sticking holes: z moves with every angle; 1e-5 rad cannot slide them
         z0[0] = 1.0  # and a sliding tendon, released so far that it stays so

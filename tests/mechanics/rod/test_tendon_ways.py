@@ -191,7 +191,7 @@ def test_tendons_press_what_they_reach_only(tmp_path: Path) -> None:
 
 @jit
 def seen_pulls(at, z, path_gradient, pull):
-    tension_gradients(at, z, path_gradient, pull)
+    tension_gradients(at, np.ones(len(z)), z, path_gradient, pull)
 
 
 def test_no_joint_beyond_its_end_changes_a_tendon(tmp_path: Path) -> None:

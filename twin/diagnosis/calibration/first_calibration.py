@@ -41,7 +41,7 @@ def objective_of(
 
 def _unslackened(prepared: PreparedRecording) -> PreparedRecording:
     """Return the recording with no tension reading below zero, so that every tendon responds to more tension."""
-    pulled = prepared.driven_by(Drive.TENSION)
+    pulled = prepared.silenced_below_zero
     return replace(
         prepared, inputs=tuple(replace(i, command=np.where(pulled, np.maximum(i.command, 0.0), i.command)) for i in prepared.inputs)
     )
@@ -50,7 +50,7 @@ def _unslackened(prepared: PreparedRecording) -> PreparedRecording:
 def _taut_share(prepared: PreparedRecording, k: int) -> np.ndarray:
     """Return the share (n_k, n_tendon) of `sensitivity`'s step that makes a tendon pull; zero far below zero tension."""
     below = np.clip(1.0 + prepared.inputs[k].command / (READING_STEP * prepared.reading), 0.0, 1.0)
-    return np.where(prepared.driven_by(Drive.TENSION), below, 1.0)
+    return np.where(prepared.silenced_below_zero, below, 1.0)
 
 
 def noise_under(objective: Objective, found: Evaluation) -> Noise:

@@ -120,7 +120,7 @@ class Objective:
 
         Its square is `Whitener.clipped_input_noise`.
         """
-        pulled, cut = self.prepared.driven_by(Drive.TENSION), []
+        pulled, cut = self.prepared.silenced_below_zero, []
         for i, k in enumerate(self.trials):
             tension = np.where(pulled, twin.effect_chain.command(self.prepared.inputs[k].signals).tension, np.inf)
             cut.append(np.sqrt(self.whitener.clipped_input_noise(i, tension)).ravel())

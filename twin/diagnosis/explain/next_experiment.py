@@ -102,11 +102,16 @@ class _Move:
 
 
 def _moves(prepared: PreparedRecording, home: np.ndarray, top: np.ndarray) -> list[_Move]:
-    """Return the moves of each drive. Where displacements are commanded, the other tendons are let out, so that they are slack."""
-    held, out = prepared.driven_by(Drive.DISPLACEMENT), []
+    """Return the moves of each drive.
+
+    Where displacements are commanded, the other tendons are let out, so that they are slack; rods by as much together as the one
+    that pulls is drawn in.
+    """
+    held, out = prepared.driven_by(Drive.DISPLACEMENT), list[_Move]()
+    let_out = -1.0 / max(prepared.n_tendon - 1, 1) if prepared.pushes else -1.0
     for i in np.flatnonzero(top - home):  # what was never commanded has no range
         alone = np.arange(prepared.n_tendon) == i
-        command = (top - home) * np.where(held & ~alone, -1.0, alone)
+        command = (top - home) * np.where(held & ~alone, let_out, alone)
         out.append(_Move(*_deed(prepared, int(i)), command))
     return out
 

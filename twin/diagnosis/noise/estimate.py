@@ -58,6 +58,8 @@ def estimate_noise(
     """
     place = {k: i for i, k in enumerate(trials)}
     pairs = [(place[a], place[b]) for a, b in repeats(prepared) if a in place and b in place]
+    # The same readings again, noise included, are a copy and no repeat.
+    pairs = [(a, b) for a, b in pairs if np.nan_to_num(residual[a] - residual[b]).any()]
     declared = np.array([o.channel.noise or np.nan for o in prepared.outputs])
     cells = np.array([c.noise or np.nan for c in prepared.drivers]) * np.abs(prepared.pull)
     cells = np.where(prepared.driven_by(Drive.CONTROL), 0.0, cells)  # known exactly

@@ -46,6 +46,8 @@ class EffectChain:
                 )
             if np.isfinite(effect.route().stall_tension) and not body.features >= ROPE_FEATURES:
                 raise DataError(f"effect {effect.id}: motors that stall are not solved on robot {robot!r}: leave `stall` out")
+            if effect.route().bedding > 0.0 and body.pushes:
+                raise DataError(f"effect {effect.id}: rope beds in, and robot {robot!r} has rods: leave `toe` out")
 
     def command(self, reported: Signals) -> Signals:
         """Return the true inputs from the reported ones."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twin.body import Drive, Signals
+from twin.body import Body, Drive, Signals
 from twin.effects.base.chain import EffectChain
 from twin.prediction.prepared import ROOM_TEMPERATURE
 
@@ -20,8 +20,8 @@ class EffectIO:
     one command to the next; a current holds from when it is commanded.
     """
 
-    def __init__(self, effect_chain: EffectChain, drive: Drive, n_tendon: int) -> None:
-        self._chain, self.drives = effect_chain, (drive,) * n_tendon
+    def __init__(self, effect_chain: EffectChain, drive: Drive, body: Body) -> None:
+        self._chain, self._body, self.drives = effect_chain, body, (drive,) * body.n_tendon
         geared = effect_chain.train.acts
         self._acts = geared or any(e.acts_in("command", "drive") for e in effect_chain.effects)
         self._senses = geared or any(e.acts_in("sense") for e in effect_chain.effects)
@@ -42,7 +42,7 @@ class EffectIO:
         actuated = np.array(self._commands[-last:])
         if self._acts:
             actuated = self._chain.drive(self._chain.command(self._signals(self._commands, slice(0, None)))).command[-last:]
-        self.actuated[len(self.time) - last :] = np.maximum(actuated, 0.0) if self.drives[0] is Drive.TENSION else actuated
+        self.actuated[len(self.time) - last :] = self._body.borne(actuated) if self.drives[0] is Drive.TENSION else actuated
         return self.actuated[-1]
 
     def record_truth(

@@ -123,7 +123,7 @@ class RodPlant:
         )  # fmt: skip
         self.motion = (DynamicRod if dynamic else QuasiStaticRod)(dynamics, problem)
         self._straight, self._route = dynamics.straight_path, effect_chain.route
-        self._effect_io = EffectIO(effect_chain, drive, n)
+        self._effect_io = EffectIO(effect_chain, drive, self.body)
         actuated = self._effect_io.apply_to_command(0.0, np.zeros(n))
         seen, samples, lost = self.motion.run(np.zeros(1), actuated[None], room)
         if samples < 1:

@@ -48,7 +48,7 @@ class FingerPlant:
         """
         body = twin.robot.silicone(twin.body())
         effect_chain, n = twin.effect_chain, body.n_tendon
-        self.body, self._effect_io = body, EffectIO(effect_chain, Drive.DISPLACEMENT, n)
+        self.body, self._effect_io = body, EffectIO(effect_chain, Drive.DISPLACEMENT, body)
         stiffness = effect_chain.stiffness(np.full(1, ROOM_TEMPERATURE), np.zeros(1))
         loads, at = effect_chain.surround(Loads(twin.robot.gravity)), np.zeros((1, n))
         self._resting = RestingBody.of(

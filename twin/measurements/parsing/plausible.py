@@ -12,13 +12,10 @@ from twin.measurements.recording import Trial
 _MIN_SAMPLES = 3
 MIN_TIME_STEP, MAX_TRIAL_TIME = 1e-6, 1e7  # s: a microsecond, faster than any robot here is logged; four months
 EPOCH_SECONDS = 1e8  # s since 1970: every clock of today reads more; larger by a power of 1000 in milli-, micro- or nanoseconds
-# How far below zero an input tension may read: sigmas of its noise, an offset of a load cell (N), or a share of the trial's largest
-# reading; the widest of these counts. An offset is data that the diagnosis can name (load_cell_bias); a pushing tendon is an error.
-MAX_SLACK_SIGMAS, _ZERO_OFFSET, _ZERO_OFFSET_SHARE = 5.0, 0.3, 0.05  # -, N, -
 
 
 def check_table(table: Table, channels: Sequence[Channel]) -> None:
-    """Raise DataError, naming the cell, for an infinite value, bad time, a pushing tendon, or less than 0 K.
+    """Raise DataError, naming the cell, for an infinite value, bad time, or less than 0 K.
 
     Time is bad if it does not increase or cannot be in seconds.
     """
@@ -52,16 +49,7 @@ def check_table(table: Table, channels: Sequence[Channel]) -> None:
         column = channel.scale.to_si(table.columns[channel.name])
         _check_finite(table, channel.name, column)
         if channel.si_unit == "K":
-            _check_floor(table, channel, column, 0.0, "below absolute zero; leave the cell empty if it is missing")
-        elif channel.kind == "tendon_tension" and channel.role == "input":
-            slack = max(
-                MAX_SLACK_SIGMAS * (channel.noise or 0.0), _ZERO_OFFSET, _ZERO_OFFSET_SHARE * np.nanmax(column, initial=0.0)
-            )
-            advice = (
-                f"a tendon cannot push (down to {-slack:.3g} N passes as noise or zero offset); correct the sign, or declare it "
-                "`missing`"
-            )
-            _check_floor(table, channel, column, -slack, advice)
+            _check_absolute_zero(table, channel, column)
 
 
 def _check_finite(table: Table, name: str, column: np.ndarray) -> None:
@@ -69,10 +57,11 @@ def _check_finite(table: Table, name: str, column: np.ndarray) -> None:
         raise DataError(f"{table.cell(int(infinite[0]), name)}: infinite value; write a number, or nothing if it is missing")
 
 
-def _check_floor(table: Table, channel: Channel, column: np.ndarray, floor: float, advice: str) -> None:
-    if len(below := np.flatnonzero(column < floor)):
+def _check_absolute_zero(table: Table, channel: Channel, column: np.ndarray) -> None:
+    if len(below := np.flatnonzero(column < 0.0)):
         at = int(below[0])
         read = float(table.columns[channel.name][at])
+        advice = "below absolute zero; leave the cell empty if it is missing"
         raise DataError(f"{table.cell(at, channel.name)}: {read!r} {channel.unit}, {advice}")
 
 

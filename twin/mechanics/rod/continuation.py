@@ -98,7 +98,7 @@ def site_gradient(system, state, LU, site, below, gradient):
     A, B = np.empty((nt, nv)), np.empty((nt, nv))
     if not is_minimum(system, state, LU):
         return False
-    tension_gradients(system, state.z, A, B)
+    tension_gradients(system, state.T, state.z, A, B)
     for t in range(nt):
         substitute(LU, B[t])
         for k in range(site.size):

@@ -47,7 +47,7 @@ class ChainFigure:
             return ColourScale(
                 "temperature of the SMA springs", "degC", 1.0, 20.0, float(np.ceil((most - 273.15) / 20.0) * 20.0), 273.15
             )
-        return ColourScale("tension along the tendons", "N", 1.0, 0.0, most)
+        return ColourScale("tension along the tendons", "N", 1.0, -most if self._body.pushes else 0.0, most)
 
     def frames(self, path: Solution, loads: Loads, route: Route, heating: Heating | None = None) -> Frames:
         """Return the frames as `Drawable.frames`."""
@@ -81,7 +81,7 @@ class ChainFigure:
         data, chain = self._solver.data, self._solver.chain
         self._place(path.q[i])
         along = np.zeros_like(slip[0])
-        tension_along(chain, law, np.maximum(path.tension[i], 0.0), *slip, along)
+        tension_along(chain, law, self._body.borne(path.tension[i]), *slip, along)
         turn = np.empty((len(self.cylinders), 4))
         for g, matrix in enumerate(data.geom_xmat):
             mujoco.mju_mat2Quat(turn[g], matrix)

@@ -232,7 +232,7 @@ class ChainMotion:
         if not start.status.all():
             raise SolveError(f"no equilibrium to start from under {self._format_command(problem.command[0])}")
         body = loaded_body(dynamics.body, loads, scale)
-        self._by_tension = problem.drive_mask(Drive.TENSION)
+        self._by_tension, self._borne = problem.drive_mask(Drive.TENSION), dynamics.body.borne
         add_held_tendons(body.spec, body, ~self._by_tension)
         compiled = Equilibrium(body)
         self.model, self.data = model, data = compiled.model, compiled.data
@@ -271,7 +271,7 @@ class ChainMotion:
         samples = MotionSamples(
             np.full((n, self._n_marker, 3), np.nan), path, tension, temperature, np.full((n, self.model.nv), np.nan)
         )
-        command = np.ascontiguousarray(np.where(self._by_tension, np.maximum(command, 0.0), command))
+        command = np.ascontiguousarray(np.where(self._by_tension, self._borne(command), command))
         motion = self._motion._replace(
             time=np.array(time, float), command=command, ambient=np.zeros(n) if ambient is None else np.array(ambient, float)
         )

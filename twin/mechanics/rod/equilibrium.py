@@ -36,6 +36,7 @@ class Equilibrium:
 
     def __init__(self, body: HingeChain) -> None:
         self.model = model = body.spec.compile()
+        self.pushes, self.borne = body.pushes, body.borne
         self.data = data = mujoco.MjData(model)
         self.chain = chain = compile_chain(body, model, data)
         self.spring = model.qpos_spring.copy()
@@ -48,7 +49,7 @@ class Equilibrium:
             self.spring,
         )  # fmt: skip
         # All of the chain except MuJoCo's views at its head and the markers at its end.
-        self._body = np.frombuffer(array_hash(*moves, *map(np.asarray, chain[5:-1])), np.uint8)
+        self._body = np.frombuffer(array_hash(*moves, *(np.asarray(a) for a in chain[5:-1] if a is not None)), np.uint8)
 
     @property
     def n_delayed(self) -> int:
@@ -75,7 +76,7 @@ class Equilibrium:
         heating = problem.heating
         backlash, crossing_travel, _, _ = initial_backlash(problem.route, self.straight_path, by_spring)
         # Contiguous: for another memory layout the loop would be compiled again, which takes half a minute.
-        command = np.ascontiguousarray(np.where(by_length, problem.command, np.maximum(problem.command, 0.0)))
+        command = np.ascontiguousarray(np.where(by_length, problem.command, self.borne(problem.command)))
         return TrialDrive(
             time=np.array(problem.time, float),
             command=command,
@@ -92,6 +93,7 @@ class Equilibrium:
             stiffness=np.ones(n) if problem.stiffness is None else np.array(problem.stiffness, float),
             ambient=np.zeros(n) if heating is None else np.array(heating.ambient, float),
             spring=_no_spring_records(nt) if heating is None else heating.spring.records,
+            pushes=self.pushes,
         )
 
     @cached_property

@@ -3,13 +3,13 @@
 Each is a MuJoCo tendon along its whole path and, while taut, a spring of the compliance and free length that tendon_actuation.py
 gives:
 
-    T+ = max(0, (path+ - free+) / stretch),
+    T+ = max(0, (path+ - free+) / stretch),    of a rod   T+ = (path+ - free+) / stretch,
     free = straight path - displacement + BACKBONE_COMPLIANCE S,    S' = (sum T - S) / lag
 
 MuJoCo's implicit integration takes that spring, so that its 1e6 N/m does not bound the step. A tendon with T < 0 is slack from the
-next step on, until its path is longer than free. Bowing of the backbone and its compression by the total tension S follow from step
-to step. Friction's loss along the tendon goes to its segments' motors with the tension of the step before. An SMA spring's force
-law is linearised at every step, on its present piece, at its present temperature.
+next step on, until its path is longer than free; a rod never is. Bowing of the backbone and its compression by the total tension S
+follow from step to step. Friction's loss along the tendon goes to its segments' motors with the tension of the step before. An SMA
+spring's force law is linearised at every step, on its present piece, at its present temperature.
 """
 
 from typing import NamedTuple
@@ -38,7 +38,7 @@ class HeldTendons(NamedTuple):
     actuation: Actuation
     index: np.ndarray  # (n_tendon,) of its MuJoCo tendon, -1 where a tension is given
     stiffness: np.ndarray  # (ntendon, k) N/m, MuJoCo's
-    band: np.ndarray  # (ntendon, 2) m, MuJoCo's, between which a tendon does not pull
+    band: np.ndarray  # (ntendon, 2) m, MuJoCo's, between which a tendon does not pull; of rods the ends are one
     bowing: np.ndarray  # (n_tendon,) m, as last evaluated
     total_tension: np.ndarray  # (1,) N, S
     lag: float  # steps
@@ -69,7 +69,7 @@ def hold_tendons(problem: Problem, compiled: Equilibrium, start: ChainSolution, 
         motors | springs, springs, np.zeros(nt), np.full(nt, stretch), zero, float(problem.route.stretch),
         np.ones(1), records, start.others["temperature"][0].copy(), elongated, tension.copy(),
         float(problem.route.bedding), float(problem.route.bedding_tension), np.zeros(nt), float(problem.route.stall_tension),
-        *initial_backlash(problem.route, zero, springs),
+        *initial_backlash(problem.route, zero, springs), compiled.pushes,
     )  # fmt: skip
     index = np.array([model.tendon(tendon_name(t)).id if actuation.held[t] else -1 for t in range(nt)], np.int64)
     stiffness, band, bowing = model.tendon_stiffness.reshape(model.ntendon, -1), model.tendon_lengthspring, np.zeros(nt)
@@ -86,7 +86,8 @@ def hold_tendons(problem: Problem, compiled: Equilibrium, start: ChainSolution, 
 def held_tension(tendons, t, length):
     """Return the tension (N) of held tendon t at a length (m) between its holes."""
     k = tendons.index[t]
-    return tendons.stiffness[k, 0] * max(0.0, length - tendons.band[k, 1])
+    longer_by = length - tendons.band[k, 1]
+    return tendons.stiffness[k, 0] * (longer_by if tendons.actuation.pushes else max(0.0, longer_by))
 
 
 @jit_internal
@@ -106,7 +107,7 @@ def set_slack_band(tendons, state, t):
     free_length = actuation.free_length[t]
     if not actuation.by_spring[t]:
         free_length += actuation.bedding_offset[t] + BACKBONE_COMPLIANCE * tendons.total_tension[0]
-    taut = state.T[t] > 0.0 or path > free_length
+    taut = state.T[t] > 0.0 or path > free_length or actuation.pushes
     tendons.stiffness[k, 0] = 1.0 / actuation.stretch[t]
     tendons.band[k, 1] = free_length - tendons.bowing[t]
     tendons.band[k, 0] = tendons.band[k, 1] if taut else 0.0

@@ -1,6 +1,7 @@
 """A trial with tendons held by motors at given lengths or by SMA springs, sample by sample; tensions are unknowns.
 
-Springs pull from the beginning, cold: gravity and payload are applied in `START_STEPS` equal steps with them. Spring temperatures
+Springs pull from the beginning, cold, and rods are held at zero: gravity and payload are applied in `START_STEPS` equal steps with
+them. Spring temperatures
 advance once a sample, under the current and at the elongation of the sample before. Otherwise as tension_trials.py.
 """
 
@@ -46,8 +47,8 @@ def solve_start_step(trial, tol):
 
 
 @jit_inline
-def apply_loads_on_springs(trial, drive, tol):
-    """Apply gravity, payload and force in steps, with cold springs. Return the status of the start, 1 or 0."""
+def apply_loads_while_held(trial, drive, tol):
+    """Apply gravity, payload and force in steps, with cold springs or rods at zero. Return the status of the start, 1 or 0."""
     started = 1
     for k in range(1, START_STEPS + 1):
         apply_stiffness(trial, drive, 0, k / START_STEPS)
@@ -94,8 +95,10 @@ def start_trial(trial, drive, neighbour, tol):
     """
     springs, others, started = any_true(drive.by_spring), False, 1
     remembers = springs or trial.system.law.mu > 0.0 or neighbour.q.size == 0  # else the start does not influence the trial
-    if remembers and springs:
-        started = apply_loads_on_springs(trial, drive, tol)
+    if drive.pushes:
+        assign(trial.actuation.held, drive.driven_by_length)
+    if remembers and (springs or drive.pushes):
+        started = apply_loads_while_held(trial, drive, tol)
     elif remembers:
         started = apply_loads(trial, tol)
         trial.factors.usable[0] = False  # that tangent contains no held lengths
@@ -127,7 +130,7 @@ def guess_tensions(trial, neighbour, i):
     for t in range(trial.state.T.size):
         if neighbour.q.size and trial.actuation.held[t]:
             trial.state.T[t] = trial.actuation.softness[0] * neighbour.T[i, t]
-            trial.factors.held_tendons[t] = trial.state.T[t] > 0.0
+            trial.factors.held_tendons[t] = trial.state.T[t] > 0.0 or trial.actuation.pushes
 
 
 @jit_inline
@@ -162,7 +165,8 @@ def solve_sample(trial, neighbour, mode, i):
 @jit_inline
 def keep_tangent(trial, LU, tension_response):
     """Store the factors of the present tangent and its tension response; those last used where it has none."""
-    if not held_tangent(trial.system, trial.state, trial.actuation.held, LU, trial.factors.held_tendons, tension_response):
+    held, pushes = trial.actuation.held, trial.actuation.pushes
+    if not held_tangent(trial.system, trial.state, held, pushes, LU, trial.factors.held_tendons, tension_response):
         for k in range(trial.last_shape.size):
             assign(LU[k], trial.factors.LU[k])
         for t in range(trial.state.T.size):

@@ -33,6 +33,7 @@ class TrialDrive(NamedTuple):
     stiffness: np.ndarray  # (n,) of the body over that at its reference temperature
     ambient: np.ndarray  # (n,) K, around the springs
     spring: np.ndarray  # (n_tendon,) `Spring.records`
+    pushes: bool  # whether the tendons are rods, which push as well
 
 
 class CreepState(NamedTuple):
@@ -158,7 +159,7 @@ def unloaded_trial(described, drive, creep, state):
     actuation = Actuation(
         drive.by_spring.copy(), drive.by_spring, straight.copy(), np.empty(nt), straight, drive.stretch, np.ones(1), spring,
         warm.copy(), elongation, tension, drive.bedding, drive.bedding_tension, np.zeros(nt), drive.stall_tension,
-        drive.backlash, drive.crossing_travel, np.zeros(nt), straight.copy(),
+        drive.backlash, drive.crossing_travel, np.zeros(nt), straight.copy(), drive.pushes,
     )  # fmt: skip
     last_shape = np.empty(nv)
     trial = TrialState(

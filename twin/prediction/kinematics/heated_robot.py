@@ -61,7 +61,7 @@ class HeatedRobot(LoadedRobot):
             sprung.copy(), sprung, path.copy(), np.empty(nt), path, self.route.stretch,
             np.full(1, self.softness), spring.records, self.spring_temperature.copy(), spring.initial_elongation.copy(),
             spring.initial_tension.copy(), self.route.bedding, self.route.bedding_tension, np.zeros(nt), np.inf,
-            *initial_backlash(self.route, path, sprung),
+            *initial_backlash(self.route, path, sprung), False,
         )  # fmt: skip
         commit_springs(self.actuation, self.chain_state.s, self.chain_state.T)
 

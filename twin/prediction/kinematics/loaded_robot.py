@@ -83,7 +83,7 @@ class LoadedRobot:
 
         Raises SolveError where no equilibrium is found; the robot then stays where it was.
         """
-        goal = np.maximum(self.true_tension(np.asarray(tension, float)), 0.0) * self.softness
+        goal = self.solver.borne(self.true_tension(np.asarray(tension, float))) * self.softness
         moved = self.state()
         if not move_to_tensions(self.statics, moved, self.factors, goal, TENSION_PART, SOLVE_TOLERANCE):
             raise SolveError(f"no equilibrium on the way to tensions {np.round(tension, 3).tolist()} N; are they what was meant?")

@@ -38,7 +38,7 @@ def export_chain(twin: Twin, body: HingeChain, origins: Origins) -> WrittenModel
     for spring in filter(None, (spec.tendon(wall_spring(disk)) for disk in body.disks)):
         spring.rgba = [0, 0, 0, 0]
     for i, holes in enumerate(body.tendon_sites, 1):
-        _add_tendon(spec, f"tendon_{i}", holes)
+        _add_tendon(spec, f"tendon_{i}", holes, -TIGHTEST if body.pushes else 0.0)
     spec.modelname, spec.option.gravity = twin.robot.name, loads.gravity
     spec.stat.center, spec.stat.extent = [0, 0, 0.5 * body.length], 1.5 * body.length  # what a viewer shows: no distant post
     compiled = spec.compile()
@@ -76,10 +76,10 @@ def _remove_segments(spec: mujoco.MjSpec) -> None:
         spec.delete(segment)
 
 
-def _add_tendon(spec: mujoco.MjSpec, name: str, holes: tuple[str, ...]) -> None:
-    """Add a tendon through its holes, and a motor whose control is the tension in N."""
+def _add_tendon(spec: mujoco.MjSpec, name: str, holes: tuple[str, ...], least: float) -> None:
+    """Add a tendon through its holes, and a motor whose control is the tension in N, from `least`."""
     tendon = spec.add_tendon(name=name, width=2.5e-4, rgba=[0.85, 0.6, 0.15, 1])
     for hole in holes:
         tendon.wrap_site(hole)
     motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
-    motor.gear, motor.ctrllimited, motor.ctrlrange = [-1, 0, 0, 0, 0, 0], True, [0, TIGHTEST]
+    motor.gear, motor.ctrllimited, motor.ctrlrange = [-1, 0, 0, 0, 0, 0], True, [least, TIGHTEST]

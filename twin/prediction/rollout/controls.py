@@ -113,9 +113,9 @@ def controls_from_set(twin: Twin, recording: Recording) -> Recording:
 class Drawing:
     """How controls are drawn: from slack, eased moves of 0.3 to 1.5 s from bend to bend, drawn uniformly from a disk.
 
-    Each tendon takes the part of a bend along its own direction, up to `pull`. Displacements pay out on the far side; tensions are
-    zero there, except for a common pull of up to `CO_CONTRACTION` of the largest. Controls of an MJCF move from rest to values
-    drawn uniformly from their ranges, within `pull` of where they rest.
+    Each tendon takes the part of a bend along its own direction, up to `pull`. On the far side displacements pay out, rods push,
+    and other tendons have no tension, except for a common pull of up to `CO_CONTRACTION` of the largest. Controls of an MJCF move
+    from rest to values drawn uniformly from their ranges, within `pull` of where they rest.
     """
 
     seconds: float = 10.0
@@ -138,7 +138,7 @@ def draw_controls(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = N
         raise DataError(f"{n} rollouts asked for; at least one is needed")
     if ports := _ports(twin.robot, Drive.CONTROL):
         return _drawn_in_ranges(twin, n, seed, drawing, ports)
-    by_length, pull = drawing.drive is Drive.DISPLACEMENT, full_pull(twin)
+    by_length, pull, body = drawing.drive is Drive.DISPLACEMENT, full_pull(twin), twin.robot.build()
     full = drawing.pull or (pull.displacement if by_length else pull.tension)
     time = np.arange(round(drawing.seconds * drawing.rate) + 1) / drawing.rate
     names = _input_names(twin.robot, drawing.drive)
@@ -149,7 +149,7 @@ def draw_controls(twin: Twin, n: int, seed: int = 0, drawing: Drawing | None = N
         radius, angle = np.sqrt(rng.uniform(size=len(knots))), rng.uniform(0.0, 2.0 * np.pi, len(knots))
         pulls = full * (radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])) @ pull.towards.T
         if not by_length:
-            pulls = np.maximum(pulls, 0.0) + full * CO_CONTRACTION * rng.uniform(size=(len(knots), 1))
+            pulls = body.bending(pulls) + (not body.pushes) * full * CO_CONTRACTION * rng.uniform(size=(len(knots), 1))
         pulls[0] = 0.0
         trials.append(Trial(f"rollout_{k + 1}", time, dict(zip(names, _eased(time, knots, pulls), strict=True))))
     return _controls_recording(twin, trials, drawing.drive, f"{n} drawn rollouts, seed {seed}")

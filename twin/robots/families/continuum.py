@@ -35,9 +35,10 @@ CHAIN_TIMESTEP = 1e-3  # s
 MIN_INERTIA = 1e-14  # kg m^2: MuJoCo refuses less than 1e-15; a millionth of a small disk's
 MIN_DRAWN_THICKNESS = 1.5e-3  # m, of a drawn disk
 CONTINUUM_FEATURES = frozenset({
-    "weight", "elasticity", "rest shape", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity", "rope",
+    "weight", "elasticity", "rest shape", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity",
     "drive zeros",
 })  # fmt: skip
+PULLING, PUSHING = frozenset({"rope", "slack"}), frozenset({"rods"})  # features of its tendons
 
 
 def build(structure: Mapping[str, object], values: Mapping[str, float]) -> HingeChain:
@@ -94,7 +95,7 @@ def _assemble_body(
     return HingeChain(
         spec=spec,
         n_tendon=n_tendon,
-        features=CONTINUUM_FEATURES,
+        features=CONTINUUM_FEATURES | (PUSHING if shape.rods else PULLING),
         ports=_ports(shape, values),
         dynamic_drives=frozenset({Drive.TENSION, Drive.DISPLACEMENT, Drive.CURRENT}),
         senses=tendon_senses(n_tendon)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from twin.body.spring import SPRING_PREFIX
 from twin.foundation.parameters import parameter_array
 from twin.robots.schema import FULL_TURN, Row, Schema
 from twin.robots.schemas.motor_rows import MOTOR_ROWS, Motorised, motor_conflicts
@@ -36,6 +37,7 @@ class Continuum(Motorised):
     )
     disks: Disk = Field(description="how many disks (of a cast body: places where the tendons' channels are followed)")
     tendons: Annotated[int, Field(ge=1, le=24)] = Field(description="how many tendons")
+    rods: bool = Field(False, description="true: the tendons are rods, which push as well as pull (push rods, further backbones)")
     tendons_end: Disk | list[Disk] | None = Field(
         None, description="the disk at which all tendons end, or a list of one a tendon (segments); left out: the last"
     )
@@ -122,6 +124,8 @@ def find_conflicts(structure: Continuum, values: Mapping[str, float]) -> list[st
         out += _wire_conflicts(structure, values, used, pitch)
     else:
         out += _cast_conflicts(values, z, min(used)[0])
+    if structure.rods and any(name.startswith(SPRING_PREFIX) for name in values):
+        out.append("structure: rods is true and there are SMA springs, which only pull; leave out rods or the springs")
     return out + motor_conflicts(values) + spring_conflicts(values)
 
 

@@ -49,6 +49,8 @@ class Chain(NamedTuple):
     first_joint: np.ndarray  # (n_hole,) joints that move each hole: piece d is on joints first_joint[d] to first_joint[d + 1]
     disk: np.ndarray  # (n_disk,) sites
     disk_joints: np.ndarray  # (n_disk,) how many joints move each disk
+    arc: np.ndarray | None  # (n_bend, 4) of rods: a bending hinge, its set, the piece that it bends and the axis, 0 or 1
+    arc_length: np.ndarray | None  # (n_tendon, n_piece) m, of rods' pieces on the straight body; 0 beyond their ends
     marker: np.ndarray  # (n_marker,) sites
 
 
@@ -252,14 +254,25 @@ def trace_tendon(chain, t, tendon, distal):
 
 
 @jit_internal
+def friction_of(law, tension):
+    """Return mu with the sign of a base tension: T_d = T_0 exp(-mu sign(T_0) sum z theta).
+
+    Friction on a tendon that slides towards the base points to its tip. So its tension falls from the base on, whether it pulls,
+    and |T| falls, or pushes, and |T| rises.
+    """
+    return law.mu if tension >= 0.0 else -law.mu
+
+
+@jit_internal
 def apply_friction(tension, law, tendon, z0, s0, s, z):
     """Fill the pieces' tensions for a base tension, and slip states z at distal lengths s, after (z0, s0)."""
     T, theta = tendon.T, tendon.theta
     T[0], z[0], wrapped = tension, 0.0, 0.0
+    mu = friction_of(law, tension)
     for d in range(1, T.size):
         z[d] = slip_state(z0[d], s0[d] - s[d], law.presliding)
         wrapped += z[d] * rounded_turn_angle(theta[d])[0]
-        T[d] = tension * np.exp(-law.mu * wrapped)
+        T[d] = tension * np.exp(-mu * wrapped)
 
 
 @jit
@@ -303,7 +316,7 @@ def force_balance(system, state, z, s, r, J):
                         J[k, i] += h
                         if k > i:
                             J[i, k] += h
-        if tangent and law.mu > 0.0 and tension[t] > 0.0:
+        if tangent and law.mu > 0.0 and tension[t] != 0.0:
             add_friction_tangent(chain, law, tendon, z[t], X, dl, J)
     return bowing
 
@@ -330,6 +343,6 @@ def add_friction_tangent(chain, law, tendon, z, X, dl, J):
             for i in range(chain.first_joint[d], nv):
                 dlog[i] -= rounded / law.presliding * dl[i]
         for i in range(chain.first_joint[d], chain.first_joint[d + 1]):
-            f = -law.mu * tendon.T[d] * dl[i]
+            f = -law.mu * abs(tendon.T[d]) * dl[i]
             for j in range(nv):
                 J[i, j] += f * dlog[j]

@@ -17,6 +17,10 @@ is the factor on K.
 
 Where tendons run in channels of the body it cannot bow away from them. Neither term applies then, and sets may also stretch
 (hyperelastic.py).
+
+Rods that push follow the backbone from disk to disk. Where an interval bends by theta such an arc is longer than its chord by
+l theta^2/24, l = h + sum of lever and bend, and E has T times that more. Of a rod under P this takes back the second term, and the
+third does not apply.
 """
 
 import numpy as np
@@ -94,6 +98,84 @@ def joint_compression(chain, tension, P):
 
 
 @jit_internal
+def arc_excess(arc, chain, phi, excess, gradient):
+    """Fill by how much rods' arcs exceed their chords, excess (n_tendon,) m, and its derivative by phi, gradient (n_tendon, nv)."""
+    nt, nd = chain.arc_length.shape
+    theta, length = np.zeros((nd, 2)), chain.arc_length.copy()
+    for i, _, d, a in arc:
+        theta[d, a] += phi[i]
+        for t in range(nt):
+            length[t, d] += chain.channel_lever[t, i] * phi[i]
+    for t in range(nt):
+        excess[t] = 0.0
+        for d in range(nd):
+            if chain.arc_length[t, d] > 0.0:
+                excess[t] += length[t, d] * (theta[d, 0] ** 2 + theta[d, 1] ** 2) / 24.0
+        for i in range(phi.size):
+            gradient[t, i] = 0.0
+        for i, _, d, a in arc:
+            if chain.arc_length[t, d] > 0.0:
+                square = theta[d, 0] ** 2 + theta[d, 1] ** 2
+                gradient[t, i] = chain.channel_lever[t, i] * square / 24.0 + length[t, d] * theta[d, a] / 12.0
+
+
+@jit_internal
+def add_arc_moments(arc, chain, tension, bent, bowing):
+    """Add rods' arcs to the moments bent.m (nv,) and to bowing (n_tendon,) m."""
+    if arc is not None:  # tendons' type is None: none of this is compiled for them
+        excess, gradient = np.empty(tension.size), np.empty((tension.size, bent.phi.size))
+        arc_excess(arc, chain, bent.phi, excess, gradient)
+        for t in range(tension.size):
+            bowing[t] += excess[t]
+            for i in range(bent.phi.size):
+                bent.m[i] += tension[t] * gradient[t, i]
+
+
+@jit_internal
+def add_arc_stiffness(arc, chain, tension, bent, J):
+    """Add to J what the moments of rods' arcs change with phi."""
+    if arc is not None:  # tendons' type is None: none of this is compiled for them
+        phi, D, first = bent.phi, bent.D, chain.first_bend
+        nt, nd = chain.arc_length.shape
+        theta, pull = np.zeros((nd, 2)), np.zeros(nd)  # bends, and sum of T l
+        lever = np.zeros(phi.size)  # sum of T lever
+        for t in range(nt):
+            for d in range(nd):
+                pull[d] += tension[t] * chain.arc_length[t, d]
+            for i, _, d, _ in arc:
+                if chain.arc_length[t, d] > 0.0:
+                    pull[d] += tension[t] * chain.channel_lever[t, i] * phi[i]
+                    lever[i] += tension[t] * chain.channel_lever[t, i]
+        for i, _, d, a in arc:
+            theta[d, a] += phi[i]
+        for i, j, d, a in arc:
+            for k, n, e, b in arc:
+                if d == e:
+                    h = (lever[i] * theta[d, b] + lever[k] * theta[d, a] + (pull[d] if a == b else 0.0)) / 12.0
+                    for p in range(3):
+                        for q in range(3):
+                            J[first[j] + p, first[n] + q] += D[j, i - first[j], p] * h * D[n, k - first[n], q]
+
+
+@jit_internal
+def add_arc_gradients(arc, chain, path_gradient, pull):
+    """Add rods' arcs to dpath/dq and to dr/dT, (n_tendon, nv) each, at the angles in MuJoCo's data."""
+    if arc is not None:  # tendons' type is None: none of this is compiled for them
+        nt, nv = path_gradient.shape
+        phi, D = np.empty(nv), np.empty((chain.handedness.size, 3, 3))
+        excess, gradient = np.empty(nt), np.empty((nt, nv))
+        rotation_vectors(chain.qpos, chain, phi, D)
+        arc_excess(arc, chain, phi, excess, gradient)
+        for t in range(nt):
+            for i, j, _, _ in arc:
+                o = chain.first_bend[j]
+                for p in range(3):
+                    change = D[j, i - o, p] * gradient[t, i]
+                    path_gradient[t, o + p] += change
+                    pull[t, o + p] += change
+
+
+@jit_internal
 def elastic_forces(q, rest, chain, tension, bowing, r, J):
     """Write r = dE/dq (nv,) and, unless J is empty, J = d2E/dq2 (nv, nv).
 
@@ -119,6 +201,7 @@ def elastic_forces(q, rest, chain, tension, bowing, r, J):
         for i in range(nv):
             for k in range(nv):
                 J[i, k] = 0.0
+    add_arc_moments(chain.arc, chain, tension, bent, bowing)
     for j in range(hand.size):
         if chain.slide.size:
             add_stretch_forces(j, chain, tension, bent, bowing, r, J)
@@ -127,6 +210,7 @@ def elastic_forces(q, rest, chain, tension, bowing, r, J):
             r[o + b] = D[j, 0, b] * m[o] + D[j, 1, b] * m[o + 1] + D[j, 2, b] * m[o + 2]
     if J.size == 0:
         return
+    add_arc_stiffness(chain.arc, chain, tension, bent, J)
     phi1, D1, moved = np.empty(3), np.empty((3, 3)), np.empty(3)
     for j in range(hand.size):
         o = chain.first_bend[j]

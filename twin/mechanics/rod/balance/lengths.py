@@ -1,7 +1,7 @@
-"""Tensions that hold given tendon lengths, where motors command displacements. A tendon pulls or is slack; it never pushes.
+"""Tensions that hold given tendon lengths, where motors command displacements. A tendon pulls or is slack; only a rod pushes.
 
-For each such tendon   T >= 0,   gap <= 0,   T gap = 0,   with gap its excess length over that of its motor or spring
-(tendon_actuation.py).
+For each such tendon   T >= 0,   gap <= 0,   T gap = 0,   and of rods   gap = 0,   with gap its excess length over that of its
+motor or spring (tendon_actuation.py).
 
 Newton's method solves shape and tensions at once: dpath_i/dT_j = -A_i J^-1 B_j with A_i = dpath_i/dq, B_j = dr/dT_j and J the
 tangent of the force balance. Which tendons are taut is found on the linear problem.
@@ -13,7 +13,8 @@ import numpy as np
 
 from twin.effects.tendon_friction import rounded_turn_angle
 from twin.foundation.compiled import assign, dot, jit, jit_internal
-from twin.mechanics.rod.balance.chain import commit_slip, copy_state, force_balance, point_velocity
+from twin.mechanics.rod.balance.chain import commit_slip, copy_state, force_balance, friction_of, point_velocity
+from twin.mechanics.rod.balance.elastic import add_arc_gradients
 from twin.mechanics.rod.balance.linear import factorise, substitute
 from twin.mechanics.rod.balance.newton import (
     CHORD_CONTRACTION,
@@ -41,12 +42,12 @@ LENGTH_PART_NEAR_POST = 2e-4  # m; near a post, which may catch the robot, parts
 
 
 @jit_internal
-def tension_gradients(system, z, path_gradient, pull):
-    """Fill dpath/dq and dr/dT, (n_tendon, nv) each, at the geometry in MuJoCo's data and committed slip states z."""
+def chord_gradients(system, tension, z, path_gradient, pull):
+    """Fill dpath/dq and dr/dT, (n_tendon, nv) each, at the geometry in MuJoCo's data, tensions (N) and committed slip states z."""
     chain, law = system.chain, system.law
     for t in range(chain.hole.shape[0]):
         nd = chain.n_piece[t]
-        wrapped, share = 0.0, 1.0
+        wrapped, share, mu = 0.0, 1.0, friction_of(law, tension[t])
         before = (0.0, 0.0, 0.0)
         for d in range(nd):
             a, b = chain.site[chain.hole[t, d]], chain.site[chain.hole[t, d + 1]]
@@ -55,7 +56,7 @@ def tension_gradients(system, z, path_gradient, pull):
             u = (v[0] / length, v[1] / length, v[2] / length)
             if d > 0 and law.mu > 0.0:
                 wrapped += z[t, d] * rounded_turn_angle(np.arccos(min(1.0, dot(before, u))))[0]
-                share = np.exp(-law.mu * wrapped)
+                share = np.exp(-mu * wrapped)
             before = u
             for i in range(chain.first_joint[d], chain.first_joint[d + 1]):
                 path_gradient[t, i] = dot(u, point_velocity(chain, i, b))
@@ -65,7 +66,14 @@ def tension_gradients(system, z, path_gradient, pull):
 
 
 @jit_internal
-def solve_taut_set(C, gap, T, by_length, dT):
+def tension_gradients(system, tension, z, path_gradient, pull):
+    """Fill the gradients as `chord_gradients`, with rods' arcs."""
+    chord_gradients(system, tension, z, path_gradient, pull)
+    add_arc_gradients(system.chain.arc, system.chain, path_gradient, pull)
+
+
+@jit_internal
+def solve_taut_set(C, gap, T, by_length, pushes, dT):
     """Solve C dT = gap for the tendons that end up taut. T + dT = 0 for those that end up slack, 0 where the tension is given.
 
     Returns False where the matrix of a taut set has no factors.
@@ -73,7 +81,7 @@ def solve_taut_set(C, gap, T, by_length, dT):
     nt = T.size
     taut, M = np.empty(nt, np.bool_), np.empty((nt, nt))
     for t in range(nt):
-        taut[t] = by_length[t] and (T[t] > 0.0 or gap[t] > 0.0)
+        taut[t] = by_length[t] and (T[t] > 0.0 or gap[t] > 0.0 or pushes)
     for _ in range(2 * nt + 2):
         for i in range(nt):
             dT[i] = gap[i] if taut[i] else (-T[i] if by_length[i] else 0.0)
@@ -86,7 +94,7 @@ def solve_taut_set(C, gap, T, by_length, dT):
         substitute(M, dT)
         worst, change = 1e-12, -1
         for i in range(nt):
-            if not by_length[i]:
+            if not by_length[i] or pushes:
                 continue
             if taut[i]:
                 violation = -(T[i] + dT[i])  # pushes
@@ -104,7 +112,7 @@ def solve_taut_set(C, gap, T, by_length, dT):
 
 
 @jit_internal
-def held_tangent(system, state, by_length, LU, held_tendons, tension_response):
+def held_tangent(system, state, by_length, pushes, LU, held_tendons, tension_response):
     """Factorise P = J + LENGTH_STIFFNESS sum B_i A_i', the sum over the taut tendons of `by_length`. Return whether P is positive.
 
     Fills LU with the factors, `held_tendons` (n_tendon,) with the taut tendons, and `tension_response` (n_tendon, nv) rad/N with
@@ -115,9 +123,9 @@ def held_tangent(system, state, by_length, LU, held_tendons, tension_response):
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
     update_kinematics(system, state.q)
     force_balance(system, state, z, s, r, LU)
-    tension_gradients(system, z, A, B)
+    tension_gradients(system, state.T, z, A, B)
     for t in range(nt):
-        held_tendons[t] = by_length[t] and state.T[t] > 0.0
+        held_tendons[t] = by_length[t] and (state.T[t] > 0.0 or pushes)
         if held_tendons[t]:
             for i in range(nv):
                 for j in range(nv):
@@ -198,7 +206,7 @@ def coupled_step(system, state, factors, actuation, z, s, r):
     Returns the largest change of a hinge (rad), negative where the lengths have no solution.
     """
     A, B = np.empty(factors.tension_response.shape), np.empty(factors.tension_response.shape)
-    tension_gradients(system, z, A, B)
+    tension_gradients(system, state.T, z, A, B)
     substitute(factors.LU, r)
     return apply_coupled_step(system, state, factors, actuation, A, s, r)
 
@@ -227,7 +235,7 @@ def apply_coupled_step(system, state, factors, actuation, A, s, turn):
                     D[j, k] -= share * tension_response[i, k]
         for i in range(nt):
             C[i, j] = dot_n(A[i], D[j]) + tendon_compliance(actuation, i, j)
-    if not solve_taut_set(C, gap, tension, actuation.held, dT):
+    if not solve_taut_set(C, gap, tension, actuation.held, actuation.pushes, dT):
         return -1.0
     longest = 0.0
     for i in range(nv):
@@ -237,7 +245,9 @@ def apply_coupled_step(system, state, factors, actuation, A, s, turn):
         q[i] -= step
         longest = max(longest, abs(step) / system.chain.unit[i])
     for t in range(nt):
-        tension[t] = max(0.0, tension[t] + dT[t])
+        tension[t] += dT[t]
+        if not actuation.pushes:
+            tension[t] = max(0.0, tension[t])
     return longest
 
 
@@ -256,7 +266,7 @@ def coupled_residual(system, state, actuation, s, r):
                 gap /= STALL_COMPLIANCE * LENGTH_STIFFNESS
             elif actuation.by_spring[t]:  # (Y - T) / slope, on either side of an end of the backlash
                 gap *= backlash_at(actuation, t, s[t, 0])[1]
-            size = max(size, (abs(gap) if state.T[t] > 0.0 else gap) / GAP_PER_ANGLE)
+            size = max(size, (abs(gap) if state.T[t] > 0.0 or actuation.pushes else gap) / GAP_PER_ANGLE)
     return size
 
 
@@ -300,7 +310,8 @@ def solve_held(system, state, factors, actuation, tol):
             continue
         chord = usable[0] and size <= CHORD_CONTRACTION * before
         if not chord:
-            usable[0] = held_tangent(system, state, actuation.held, factors.LU, factors.held_tendons, factors.tension_response)
+            held, response = actuation.held, factors.tension_response
+            usable[0] = held_tangent(system, state, held, actuation.pushes, factors.LU, factors.held_tendons, response)
             if not usable[0]:
                 return 0
         before, step = size, 1.0
@@ -334,7 +345,7 @@ def single_held_step(system, state, factors, actuation):
     z, s = np.empty(state.z.shape), np.empty(state.s.shape)
     update_kinematics(system, state.q)
     bowing = force_balance(system, state, z, s, r, none)
-    tension_gradients(system, z, A, B)
+    tension_gradients(system, state.T, z, A, B)
     substitute(factors.LU, r)
     q0, T0, own = state.q.copy(), state.T.copy(), s.copy()
     linearise_tendons(actuation, s, state.T)

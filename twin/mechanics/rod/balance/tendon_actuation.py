@@ -55,6 +55,7 @@ class Actuation(NamedTuple):
     crossing_travel: np.ndarray  # (n_tendon,) m
     backlash_state: np.ndarray  # (n_tendon,) z when the springs were last at rest
     path: np.ndarray  # (n_tendon,) m, path lengths then
+    pushes: bool  # whether the tendons are rods, which push as well
 
 
 @jit_internal
