@@ -1,7 +1,8 @@
 """A check whether the trials come from one robot: two groups of trials with own values of the robot's parameters, against one.
 
 To first order a group G of trials with own parameters reduces its |z|^2 by fall(G) = g'(sum J_k'J_k + P)^-1 g, g = sum J_k'z_k.
-Trials change groups while the sum of both falls grows (a two-means search from several starts).
+Trials change groups while the sum of both falls grows (a two-means search from several starts). Groups count only where a robot
+could have been changed between them: one came after the other, or they differ in a condition.
 """
 
 from collections.abc import Sequence
@@ -30,7 +31,7 @@ class MixedRobots:
 
 
 def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit) -> MixedRobots | None:
-    """Return the two groups, the larger first; None where one robot fits.
+    """Return the two groups, the larger first; None where one robot fits, or where the groups alternate.
 
     `fitted`: the fit to the listed trials, with its residuals in their order.
     """
@@ -73,4 +74,17 @@ def mixed_robots(prepared: PreparedRecording, trials: Sequence[int], fitted: Fit
     if sides is None or worth < SECOND_ROBOT_GAIN**2 * n:
         return None
     one, other = (tuple(trials[int(k)] for k in np.flatnonzero(s)) for s in (sides, ~sides))
+    if not _separable(prepared, one, other):
+        return None
     return MixedRobots(one, other, worth) if len(one) >= len(other) else MixedRobots(other, one, worth)
+
+
+def _separable(prepared: PreparedRecording, one: Sequence[int], other: Sequence[int]) -> bool:
+    """Return whether all trials of one group came before the other's, or no payload or no gravity is common to both."""
+    clock = {k: float(prepared.inputs[k].clock[0]) for k in (*one, *other)}
+    sides = [k in one for k in sorted(clock, key=lambda k: clock[k])]
+    if sum(a != b for a, b in pairwise(sides)) == 1:
+        return True
+    loads = ({k: prepared.inputs[k].loads for k in group}.values() for group in (one, other))
+    a, b = (({x.payload for x in of}, {tuple(x.gravity) for x in of}) for of in loads)
+    return any(not mine & theirs for mine, theirs in zip(a, b, strict=True))
