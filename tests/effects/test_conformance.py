@@ -144,7 +144,7 @@ def two_trials(law: type[Effect]) -> Recording:
 
 def is_of_sensors(law: type[Effect]) -> bool:
     """Whether it needs strain-sensing cords, which a backbone has not."""
-    return "strain sensors" in law.needs
+    return bool(law.needs & {"strain sensors", "drifting sensors"})
 
 
 def is_of_antagonists(law: type[Effect]) -> bool:

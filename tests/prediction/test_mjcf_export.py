@@ -44,6 +44,7 @@ EFFECTS: dict[str, tuple[str, Mapping[str, float]]] = {
     "joint_stop": ("joint_stop", {"upper_hip": 0.1, "lower_knee": 0.2}),
     "load_dependent_friction": ("load_dependent_friction", {"share": 0.1}),
     "reflected_inertia": ("reflected_inertia", {"inertia_hip": 0.003}),
+    "sensor_drift": ("sensor_drift", {"angle_hip": 0.01, "position_2": 1e-3, "levelling": 0.02}),
     "tendon_friction": ("tendon_friction", {"mu_flexor": 0.2}),
     "time_delay": ("time_delay", {"delay": 0.0155}),
     "tip_payload": ("tip_payload", {"mass": 0.02}),

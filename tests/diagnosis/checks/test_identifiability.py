@@ -214,7 +214,8 @@ def test_every_effect_has_a_row_and_only_what_is_not_logged_is_never_seen(usual:
     backbone = {
         name
         for name, law in catalogue().items()
-        if not law.needs & {"strain sensors", "friction of joints", "load friction", "joints", "encoders", "stops"}
+        if not law.needs
+        & {"strain sensors", "drifting sensors", "friction of joints", "load friction", "joints", "encoders", "stops"}
     }
     of_lengths = {name for name in backbone if all_effects()[name].driven_by_length}  # tensions are commanded here
     of_springs = {name for name, law in catalogue().items() if law(n_tendon=3).acts_in("spring")}  # none pull here

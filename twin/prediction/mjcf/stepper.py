@@ -62,6 +62,7 @@ class Stepper(ABC):
                 self._laws.append(law)
                 first = first if effect.acts_in("drive") else law(first)
         self._motion = self._solver.begin(problem, self.step_length, first)
+        self._began = float(self._motion.data.time)
         self._scratch = mujoco.MjData(self._motion.model)
 
     def step(self, control: np.ndarray) -> None:
@@ -80,9 +81,9 @@ class Stepper(ABC):
             compute(model, now)
         angle = now.qpos[model.jnt_qposadr]
         columns = dict(zip(_POSITIONS, (angle, angle, now.actuator_length, now.actuator_length, now.ten_length), strict=False))
-        nu = np.zeros((1, model.nu))
+        nu, time = np.zeros((1, model.nu)), np.full(1, self._motion.data.time - self._began)
         true = Signals(
-            np.zeros(1), np.zeros(1), nu, nu, now.site_xpos[None].copy(), np.zeros(1),
+            time, time, nu, nu, now.site_xpos[None].copy(), np.zeros(1),
             others={name: column[None].copy() for name, column in columns.items()},
         )  # fmt: skip
         seen = self._chain.sense(true)

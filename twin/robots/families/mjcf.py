@@ -91,6 +91,7 @@ class _Known:
             "servos",
             "joints",
             "encoders",
+            "drifting sensors",
             "friction of joints",
             "load friction",
             "markers",
