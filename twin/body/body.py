@@ -169,6 +169,10 @@ class Body:
         """Multiply what each actuator (n_actuator,) delivers, by its share."""
         raise self._unchangeable("actuators")
 
+    def limit_actuators(self, most: np.ndarray) -> None:
+        """Limit the force or torque of each actuator to `most` (n_drive,) N or N m, either way."""
+        raise self._unchangeable("actuators")
+
     def _unchangeable(self, what: str) -> DataError:
         return DataError(f"a body of kind {type(self).__name__} has no {what} to change; remove the effect that changes it")
 

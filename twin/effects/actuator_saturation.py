@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
 
+import mujoco
 import numpy as np
 
-from twin.body import ROPE_FEATURES, Route, Signals
+from twin.body import ROPE_FEATURES, Body, Route, Signals
+from twin.body.counts import of_a_model
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 LIMIT_SHARES = (0.7, 0.85)  # of the largest command: limits from which fits start
 STALLED_SHARES = (0.25, 0.1)  # of the rows: with more tension than the stall tensions from which fits start
+NO_LIMIT = 1e4  # N or N m: more than any actuator of a robot gives
 NO_STALL = 1e3  # N: a stall tension that means that no motor stalls
 MIN_STROKE = 1e-4  # m of travel: shorter strokes do not show
 
@@ -31,7 +35,8 @@ class ActuatorSaturation(Effect):
     Tensions, and thrusts of rods: one `loss` for all drives above `limit`, with a corner of width `corner` (N). Currents: the same
     `loss` above `ceiling`, with a corner of width `knee` (A). Lengths: drive i has its own `loss_i` above `stroke`, with a corner
     of width `give` (m), both common to the drives, which are alike. A motor that holds a length gives way where its tendon would
-    pull more than `stall`, and returns where it would not.
+    pull more than `stall`, and returns where it would not. Actuators of an MJCF: the force (torque) of actuator i stays within
+    +-most_i.
 
     A drive that stalls or stands on its end stop has a loss of 1, one that stalls on a spring less. It acts on commands: the log of
     a drive that reports its position does not show it.
@@ -63,20 +68,43 @@ class ActuatorSaturation(Effect):
         Parameter("knee", 0.05, "A", 1e-4, 5.0, "softness of the ceiling; ours", scale=0.02),
         Parameter("stall", NO_STALL, "N", 0.1, NO_STALL, "a motor's largest current, a torque limit, a slipping clutch", scale=0.1),
     )
-    per_tendon = (Parameter("loss", 0.0, "1", 0.0, 1.0, "1: not a millimetre more than the stroke", scale=0.2),)
+    per_tendon = (
+        Parameter("loss", 0.0, "1", 0.0, 1.0, "1: not a millimetre more than the stroke", scale=0.2),
+        Parameter("most", NO_LIMIT, "1", 1e-3, NO_LIMIT, "N or N m: a current limit, a weak supply, a slipping clutch", scale=0.02),
+    )
     inactive_when_off = ("limit", "corner", "stroke", "give", "ceiling", "knee")
-    needs = frozenset({"load cells"})
+    needs = frozenset({"drives that saturate"})
     moves_with = "the pull near its upper end"
     plot_against = "tension"
     hidden_without = frozenset({DataNeed.REVERSALS})
 
     @classmethod
+    def all_parameters(cls, n_tendon: int) -> tuple[Parameter, ...]:
+        """Return the parameters of tendons' drives, or those of an MJCF's actuators."""
+        own = cls.per_tendon[1] if of_a_model(n_tendon) else cls.per_tendon[0]
+        each = tuple(replace(own, name=f"{own.name}_{i}") for i in range(1, n_tendon + 1))
+        return each if of_a_model(n_tendon) else (*cls.parameters, *each)
+
+    @classmethod
+    def _starts_of_model(cls, predicted: list[Signals]) -> Iterator[FitStart]:
+        """Yield limits below the largest force of each actuator, alone and all together."""
+        forces = [s.others["actuator force"] for s in predicted if "actuator force" in s.others]
+        largest = np.abs(np.concatenate(forces)).max(axis=0) if forces else np.zeros(0)
+        for share in LIMIT_SHARES:
+            starts = {f"most_{i}": share * float(f) for i, f in enumerate(largest, 1) if share * f > cls.per_tendon[1].low}
+            for values in (*({n: v} for n, v in starts.items()), *([starts] if len(starts) > 1 else [])):
+                yield FitStart(values, tuple(values))
+
+    @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
-        """Start at limits below the largest command of the session.
+        """Start at limits below the largest command of the session, or the largest force of an MJCF's actuators.
 
         Where lengths drive all tendons: at strokes below the largest length, for all drives that reach them at once, and at stall
         tensions that the tautest tendon of some rows exceeds.
         """
+        if of_a_model(n_tendon):
+            yield from cls._starts_of_model(predicted)
+            return
         lengths = [s.displacement for s in predicted if s.driven_by_length.all()]
         if len(lengths) == len(predicted):
             longest = np.concatenate(lengths).max(axis=0)
@@ -100,7 +128,24 @@ class ActuatorSaturation(Effect):
             if 0.1 < share * largest < 200.0:
                 yield FitStart({"loss": 0.3, "limit": share * largest}, ("loss", "limit", "corner"))
 
+    @classmethod
+    def form(cls, free: Collection[str]) -> str:
+        return "one" if len(free) == 1 and min(free).startswith("most") else ""
+
+    def edit(self, body: Body) -> None:
+        if of_a_model(self.n_tendon) and (most := self.per_tendon_values("most")).min() < NO_LIMIT:
+            body.limit_actuators(most)
+
+    def write(self, spec: mujoco.MjSpec) -> bool:
+        """Return whether all is said: forces' ranges are numbers of the model, which `edit` has changed."""
+        return of_a_model(self.n_tendon)
+
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+        return (lambda command: command) if of_a_model(self.n_tendon) else None
+
     def drive(self, command: Signals) -> Signals:
+        if of_a_model(self.n_tendon):
+            return command
         tension, displacement, current = command.tension, command.displacement, command.current
         if self["loss"]:
             over = _soft_excess(np.abs(tension), self["limit"], self["corner"])
@@ -112,4 +157,5 @@ class ActuatorSaturation(Effect):
         return command.with_changes(tension=tension, displacement=displacement, current=current)
 
     def route(self) -> Route:
-        return Route(stall_tension=self["stall"] if self["stall"] < NO_STALL else np.inf)
+        stall = self.values.get("stall", NO_STALL)
+        return Route(stall_tension=stall if stall < NO_STALL else np.inf)

@@ -160,6 +160,14 @@ class ModelBody(Body):
             numbers[~muscle, :3] *= share[~muscle, None]
             numbers[muscle, 2:4] *= share[muscle, None]  # its peak force, or the scale of that; the others are lengths
 
+    def limit_actuators(self, most: np.ndarray) -> None:
+        model = self.model
+        for k, limit in enumerate(most):
+            own = model.actuator_forcerange[k].copy() if model.actuator_forcelimited[k] else np.array([-np.inf, np.inf])
+            new = np.clip(own, -limit, limit)
+            if np.isfinite(new).all() and (new != own).any():
+                model.actuator_forcelimited[k], model.actuator_forcerange[k] = 1, new
+
 
 def model_size(model: mujoco.MjModel) -> Size:
     """Return a model's size: reach, and torque over reach, each over the reference robot's and rounded to two digits."""

@@ -35,7 +35,8 @@ CHAIN_TIMESTEP = 1e-3  # s
 MIN_INERTIA = 1e-14  # kg m^2: MuJoCo refuses less than 1e-15; a millionth of a small disk's
 MIN_DRAWN_THICKNESS = 1.5e-3  # m, of a drawn disk
 CONTINUUM_FEATURES = frozenset({
-    "weight", "elasticity", "rest shape", "markers", "load cells", "planes", "length", "holes", "surface", "viscosity",
+    "weight", "elasticity", "rest shape", "markers", "load cells", "drives that saturate", "planes", "length", "holes", "surface",
+    "viscosity",
     "drive zeros",
 })  # fmt: skip
 PULLING, PUSHING = frozenset({"rope", "slack"}), frozenset({"rods"})  # features of its tendons

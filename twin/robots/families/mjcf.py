@@ -89,6 +89,7 @@ class _Known:
             "drive zeros",
             "start",
             "servos",
+            "drives that saturate",
             "joints",
             "encoders",
             "drifting sensors",

@@ -24,8 +24,8 @@ SILICONE_COLOUR, TENDON_COLOUR, SENSOR_COLOUR, MARKER_COLOUR = (
     [0.9, 0.2, 0.2, 1.0],
 )
 SOFT_FEATURES = frozenset({
-    "weight", "elasticity", "markers", "load cells", "strain sensors", "drifting sensors", "planes", "length", "hanging zero",
-    "rest shape", "holes",
+    "weight", "elasticity", "markers", "load cells", "drives that saturate", "strain sensors", "drifting sensors", "planes",
+    "length", "hanging zero", "rest shape", "holes",
     "surface", "viscosity", "skin", "drive zeros", "slack",
 })  # fmt: skip
 N_DISCS = 24  # of the drawing
