@@ -15,6 +15,7 @@ from twin.effects.joint_stop import NO_STOP
 from twin.foundation.parameters import Size
 from twin.mechanics.mjcf.loading import SCALAR_JOINTS, LoadedModel
 from twin.mechanics.mjcf.numbers import slides
+from twin.mechanics.mjcf.routes import outward
 
 LEAST_TRAVEL = 1e-4  # rad or m between a joint's stops
 HARD_STOP = ((0.004, 1.0), (0.99, 0.999, 1e-4, 0.5, 2.0))  # solref, solimp: without bounce, milliradians soft under a light link
@@ -159,6 +160,13 @@ class ModelBody(Body):
         for numbers in (self.model.actuator_gainprm, self.model.actuator_biasprm):
             numbers[~muscle, :3] *= share[~muscle, None]
             numbers[muscle, 2:4] *= share[muscle, None]  # its peak force, or the scale of that; the others are lengths
+
+    def move_tendon_sites(self, out: np.ndarray) -> None:
+        for further, shift in zip(out, outward(self.loaded).values(), strict=True):
+            self.model.site_pos[:] += further * shift
+
+    def stretch_lines(self, give: np.ndarray) -> None:
+        self.scale_actuators(1.0 / (1.0 - self.model.actuator_biasprm[:, 1] * give))
 
 
 def model_size(model: mujoco.MjModel) -> Size:
