@@ -36,7 +36,7 @@ class Counts(int):
         winches: tuple[Winch, ...] = (),
         crossing: tuple[str, ...] = (),
     ) -> Counts:
-        """Return the counts of a robot with this many drives, these joints, tendons and winches; `crossing` tendons cross a hinge."""
+        """Return the counts of a robot with so many drives, these joints, tendons and winches; `crossing` tendons cross a hinge."""
         made = Counts(drives)
         made.joints, made.tendons, made.winches, made.crossing = joints, tendons, winches, crossing
         return made

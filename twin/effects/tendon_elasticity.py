@@ -30,9 +30,12 @@ class TendonElasticity(Effect):
 
         l_d = l - stretch T,    T = -gear force,    l the length of the path,
 
-    and a winch that holds its drum, T = kp (l_d - ctrl) + kv l_d', pulls on the path with kp' = kp / (1 + kp stretch) and
-    kv' = kv / (1 + kp stretch): the rate of T is neglected in l_d', which for a slow motion delays T by stretch kv'. Limits of the
-    force stay where they are, and readings of force and tension are those of T.
+    and a winch that holds its drum, T = kp (l_d - ctrl) + kv l_d', pulls on the path, with s = 1 + kp stretch, by
+
+        s T + kv stretch T' = kp (l - ctrl) + kv l',    here T = (kp / s) (l - u) + (kv / s^2) l',    u + lag u' = ctrl,
+
+    lag = kv stretch / s: the same for motions that are slow beside 1 / lag (of milliseconds). An actuator with dynamics of its own
+    has kv / s instead, and no lag. Limits of the force stay where they are; readings of force and tension are T.
 
     The first tension of an SMA spring had stretched the tendon when the spring was mounted (`hooked` 1), or stretched it afterwards
     (0).

@@ -21,7 +21,7 @@ class TendonRouting(Effect):
     at that hinge grows by `out` (m). It is for tendons over sites; those that wrap around geoms have their levers from these. What
     else is at such a site (a marker, a payload) is not meant: give that a site of its own.
 
-    Source: geometry. A disk glued on with a twist, a hole drilled at the wrong mark; a guide printed or screwed on beside its place.
+    Source: geometry. A disk glued on with a twist, a hole drilled at the wrong mark; a guide printed beside its place.
 
     >>> TendonRouting(angle_2=0.05)["angle_2"]
     0.05

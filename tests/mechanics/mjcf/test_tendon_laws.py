@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.mechanics.mjcf.models import PENDULUM, robot
-from twin.body import Signals
+from twin.body import Drive, Loads, Problem, Route, Signals, Start
 from twin.diagnosis.calibration.model import Model
 from twin.effects import Effect, effect_class
 from twin.foundation.errors import DataError
@@ -22,7 +22,7 @@ from twin.robots.schemas.mjcf import counts_of
 KP, SPRING, C, GEAR = 800.0, 0.5, 4e-4, 2.0  # N/m, N m/rad, m/N
 ARM = 0.02  # m
 
-# A tendon from a post beside the hinge to a post on the lever: both `arm` from the axis, so that at zero it passes at that distance.
+# A tendon from a post beside the hinge to a post on the lever: both `arm` from the axis, so that at zero it passes there.
 LEVER = """
 <mujoco>
   <compiler angle="radian" autolimits="true"/>
@@ -68,9 +68,9 @@ def test_a_line_is_a_spring_in_series_with_its_winch(tmp_path: Path) -> None:
     made = lever(tmp_path)
     plain, seen = at_rest(made, 0.09, ()), at_rest(made, 0.09, elastic(made))
     T, path = seen["tendon.line.tension"], seen["tendon.line.length"]
-    assert T == pytest.approx(KP / (1.0 + KP * C) * (path - 0.09), rel=1e-6)  # of the rest of the swing
+    assert pytest.approx(KP / (1.0 + KP * C) * (path - 0.09), rel=1e-6) == T  # of the rest of the swing
     assert seen["actuator.winch.position"] == pytest.approx(path - C * T, abs=1e-12)
-    assert T == pytest.approx(KP * (seen["actuator.winch.position"] - 0.09), rel=1e-6)  # what the winch itself holds
+    assert pytest.approx(KP * (seen["actuator.winch.position"] - 0.09), rel=1e-6) == T  # what the winch itself holds
     assert seen["actuator.winch.force"] == pytest.approx(-T, rel=1e-12)
     assert plain["tendon.line.tension"] > T + 0.3  # N
     q = seen["joint.turn.position"]
@@ -144,8 +144,10 @@ TWO = """
 
 
 def test_each_site_goes_out_from_the_hinge_it_is_nearest_to(tmp_path: Path) -> None:
-    """Below the first hinge and above the second, in a frame turned about z; a tendon that crosses no hinge, wraps or adds joints has
-    no parameter, and only what pulls spatial tendons winds."""
+    """Below the first hinge and above the second, in a frame turned about z.
+
+    A tendon that crosses no hinge, wraps or adds joints has no parameter, and only what pulls spatial tendons winds.
+    """
     made = robot(tmp_path, TWO)
     body = made.build()
     assert isinstance(body, ModelBody)
@@ -187,3 +189,29 @@ def test_every_winch_of_the_leg_is_known() -> None:
     body = load("tendon_leg").build()
     assert isinstance(body, ModelBody)
     assert counts_of(body.loaded).winches == (("flexor", 1, 1.0),)
+
+
+def exact_tension(time: np.ndarray, ctrl: np.ndarray, path: float, kv: float) -> np.ndarray:
+    """Of a winch on a path of fixed length: (1 + kp c) T + kv c T' = kp (path - ctrl), from rest, in steps of an exact filter."""
+    s, T = 1.0 + KP * C, np.empty(len(time))
+    goal, e = KP * (path - ctrl) / s, np.exp(-np.diff(time) * s / (kv * C))
+    T[0] = goal[0]
+    for k in range(len(time) - 1):  # straight between rows, which are a fiftieth of the filter's time apart
+        T[k + 1] = 0.5 * (goal[k] + goal[k + 1]) + (T[k] - 0.5 * (goal[k] + goal[k + 1])) * e[k]
+    return T
+
+
+def test_a_damped_winch_pulls_late_through_its_line(tmp_path: Path) -> None:
+    """A stiff spring holds the lever, so that the path hardly moves; kv = 200 N s/m on 4e-4 m/N delays T by 61 ms."""
+    text = LEVER.format(arm=ARM, spring=1000.0, gear=1.0, kp=KP, low=-100.0).replace(f"-{KP} -2", f"-{KP} -200")
+    text = text.replace("1e-5 1e-4 1e-4", "0.01 0.01 0.01")
+    made, time = robot(tmp_path, text), np.arange(0.0, 1.0, 1e-3)
+    ctrl = 0.09 - 0.005 * np.sin(8.0 * time)
+    body = made.build()
+    for law in elastic(made):
+        law.edit(body)
+    found = made.solver(body).solve(Problem(time, ctrl[:, None], Loads(np.zeros(3)), Route(), (Drive.CONTROL,), start=Start(1.0)))
+    wanted = exact_tension(time, ctrl, 0.1, 200.0)
+    # N: the lever still turns by 1e-4 rad, and so the path by 2 um
+    assert np.abs(found.tension[:, 0] - wanted).max() < 0.01
+    assert np.ptp(wanted) > 4.0

@@ -59,7 +59,7 @@ def outward(loaded: LoadedModel) -> Mapping[str, np.ndarray]:
             crossings = [c for k in range(len(sites) - 1) for c in _crossings(model, data, (k, sites[k], sites[k + 1]))]
             along = np.cumsum([0.0, *np.linalg.norm(np.diff(data.site_xpos[sites], axis=0), axis=1)])
             for i, site in enumerate(sites if crossings else []):
-                nearest = min(crossings, key=lambda c: _remoteness(c, along, i, data.site_xpos[site]))  # noqa: B023
+                nearest = min(crossings, key=lambda c: _remoteness(c, along, i, data.site_xpos[site]))
                 turn = data.xmat[model.site_bodyid[site]].reshape(3, 3)
                 shift[site] = turn.T @ nearest.out
         if shift.any():
@@ -68,7 +68,7 @@ def outward(loaded: LoadedModel) -> Mapping[str, np.ndarray]:
 
 
 def _remoteness(c: _Crossing, along: np.ndarray, i: int, place: np.ndarray) -> tuple[float, float, float]:
-    """Return how far a crossing is from a tendon's i-th site: along the tendon, then straight; of two in one place the longer arm."""
+    """Return how far a crossing is from a tendon's i-th site: along the tendon, then straight; of two alike the longer arm."""
     way = min(abs(along[i] - along[c.before]), abs(along[i] - along[c.before + 1]))
     return round(float(way), SAME_PLACE), round(float(np.linalg.norm(place - c.anchor)), SAME_PLACE), -c.arm
 
@@ -92,7 +92,7 @@ def _branches(model: mujoco.MjModel, t: int) -> list[list[int]]:
 
 
 def _crossings(model: mujoco.MjModel, data: mujoco.MjData, piece: tuple[int, int, int]) -> Iterator[_Crossing]:
-    """Yield the hinges between the bodies of two sites of a tendon, `piece` being (number of the first along it, site, next site)."""
+    """Yield the hinges between two sites of a tendon, `piece` being (number of the first along it, site, next site)."""
     k, a, b = piece
     start, end = data.site_xpos[a], data.site_xpos[b]
     way = end - start

@@ -44,6 +44,7 @@ class Laws(NamedTuple):
     tree: object
     paths: object
     pull: np.ndarray
+    lag: np.ndarray  # (nu,) s, of a winch's force behind its control, by its line
 
 
 class Memory(NamedTuple):
@@ -57,6 +58,7 @@ class Memory(NamedTuple):
     rate: np.ndarray  # (nv,)
     act_rate: np.ndarray  # (nu,)
     moving: np.ndarray  # (1,) whether these rates are those of a step before
+    heard: np.ndarray  # (2, nu) controls after the lag, and the controls before it; NaN before the first
 
 
 @jit_internal
@@ -102,6 +104,18 @@ def center_rates(views, out):
 
 
 @jit_internal
+def hear(asked, lag, h, heard, ctrl):
+    """Let controls (nu,) through filters of the first order, exactly where they run straight: lag x' + x = u."""
+    for k in range(ctrl.size):
+        u, before = asked[k], heard[1, k]
+        ctrl[k] = u
+        if lag[k] > 0.0 and math.isfinite(before):
+            behind = (u - before) / h * lag[k]
+            ctrl[k] = u - behind + (heard[0, k] - before + behind) * math.exp(-h / lag[k])
+        heard[0, k], heard[1, k] = ctrl[k], u
+
+
+@jit_internal
 def write_row(views, out):
     """Write the shown arrays and the rates one after another."""
     at = 0
@@ -135,8 +149,7 @@ def run(engine, views, laws, memory, commands, rows, out):
             views.damping[k] = own[k] + raised[k]
             raised[k] = 0.0
         joint_forces(laws.joints, memory.z, h, views.qvel, views.effort, views.applied, views.damping)
-        for k in range(views.ctrl.size):
-            views.ctrl[k] = commands[i, k]
+        hear(commands[i], laws.lag, h, memory.heard, views.ctrl)
         mj_step1(model, data)
         if last >= 0:
             center_rates(views, out[last])
