@@ -82,7 +82,8 @@ class Body:
         rope          tendons may bed in, motors may stall    planes       `set_bending_anisotropy` works
         slack         tendons only pull, and may be slack     rods         tendons push as well as pull
         length        `set_stiffness_gradient` works          rest shape   `set_rest_curvature` works
-        holes         `move_tendon_holes` works               surface      may touch obstacles
+        holes         `move_tendon_holes` works, or, of an MJCF, `move_tendon_sites`
+        lines         tendons may stretch                     surface      may touch obstacles
         viscosity     may creep                               skin         compared with clouds (`Problem.seen`)
         hanging zero  lengths count from where it hangs, not from a straight body
         friction of joints  a joint may rub                    load friction  a gear may rub with its load
@@ -172,6 +173,14 @@ class Body:
     def limit_actuators(self, most: np.ndarray) -> None:
         """Limit the force or torque of each actuator to `most` (n_drive,) N or N m, either way."""
         raise self._unchangeable("actuators")
+
+    def move_tendon_sites(self, out: np.ndarray) -> None:
+        """Move the sites of each tendon that crosses a hinge (n_crossing,) m away from the axis of the nearest such hinge."""
+        raise self._unchangeable("tendon sites")
+
+    def stretch_lines(self, give: np.ndarray) -> None:
+        """Put springs that give by so much (n_actuator,), m/N in the actuator's own units, between winches and their tendons."""
+        raise self._unchangeable("tendon lines")
 
     def _unchangeable(self, what: str) -> DataError:
         return DataError(f"a body of kind {type(self).__name__} has no {what} to change; remove the effect that changes it")

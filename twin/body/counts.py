@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+
+class Winch(NamedTuple):
+    """An actuator (from 0) that winds a tendon: its length is `gear` times the tendon's, its force -1 / gear times the tension."""
+
+    tendon: str
+    actuator: int
+    gear: float
+
 
 class Counts(int):
     """A number of drives (actuators) that also names the joints and tendons, so that effects can have parameters for each of these.
@@ -15,16 +25,24 @@ class Counts(int):
 
     joints: tuple[str, ...] = ()
     tendons: tuple[str, ...] = ()
+    winches: tuple[Winch, ...] = ()
+    crossing: tuple[str, ...] = ()
 
     @staticmethod
-    def of(drives: int, joints: tuple[str, ...], tendons: tuple[str, ...] = ()) -> Counts:
-        """Return the counts of a robot with this many drives, these joints and these tendons."""
+    def of(
+        drives: int,
+        joints: tuple[str, ...],
+        tendons: tuple[str, ...] = (),
+        winches: tuple[Winch, ...] = (),
+        crossing: tuple[str, ...] = (),
+    ) -> Counts:
+        """Return the counts of a robot with so many drives, these joints, tendons and winches; `crossing` tendons cross a hinge."""
         made = Counts(drives)
-        made.joints, made.tendons = joints, tendons
+        made.joints, made.tendons, made.winches, made.crossing = joints, tendons, winches, crossing
         return made
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Counts.of, (int(self), self.joints, self.tendons)
+        return Counts.of, (int(self), self.joints, self.tendons, self.winches, self.crossing)
 
 
 def joint_names(n: int) -> tuple[str, ...]:
@@ -35,6 +53,16 @@ def joint_names(n: int) -> tuple[str, ...]:
 def tendon_names(n: int) -> tuple[str, ...]:
     """Return the names of the tendons of a number of drives of an MJCF; none of a plain number."""
     return n.tendons if isinstance(n, Counts) else ()
+
+
+def winches(n: int) -> tuple[Winch, ...]:
+    """Return what winds the tendons of an MJCF; nothing of a plain number."""
+    return n.winches if isinstance(n, Counts) else ()
+
+
+def crossing_tendons(n: int) -> tuple[str, ...]:
+    """Return the names of the tendons of an MJCF that run over sites and cross a hinge; none of a plain number."""
+    return n.crossing if isinstance(n, Counts) else ()
 
 
 def of_a_model(n: int) -> bool:

@@ -133,8 +133,9 @@ class ActuatorSaturation(Effect):
         return "one" if len(free) == 1 and min(free).startswith("most") else ""
 
     def edit(self, body: Body) -> None:
-        if of_a_model(self.n_tendon) and (most := self.per_tendon_values("most")).min() < NO_LIMIT:
-            body.limit_actuators(most)
+        if of_a_model(self.n_tendon):
+            most = self.per_tendon_values("most")
+            body.limit_actuators(np.where(most < NO_LIMIT, most, np.inf))
 
     def write(self, spec: mujoco.MjSpec) -> bool:
         """Return whether all is said: forces' ranges are numbers of the model, which `edit` has changed."""

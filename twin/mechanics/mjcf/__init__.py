@@ -4,6 +4,7 @@ loading.py   an MJCF, or why not         numbers.py   its numbers by address
 body.py      channels and changes        poses.py     starts and payloads
 solver.py    trials                      stepping.py  the compiled loop
 friction.py  joints and tendons that rub        written.py    numbers back into the MJCF
+routes.py    winches, and hinges that tendons cross
 precise_xml.py  an MJCF as text to the last digit    drawing.py  its geoms and tendons to draw
 """
 
@@ -13,6 +14,7 @@ from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
 from twin.mechanics.mjcf.poses import contacts_at_start
 from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
+from twin.mechanics.mjcf.routes import outward, winches_of
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
 from twin.mechanics.mjcf.written import check_same, name_element, written_model
 
@@ -40,10 +42,12 @@ __all__ = [
     "load_model",
     "model_size",
     "name_element",
+    "outward",
     "payload_places",
     "si_unit",
     "slides",
     "tip_site",
+    "winches_of",
     "with_comments",
     "written_model",
 ]

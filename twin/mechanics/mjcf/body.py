@@ -15,7 +15,9 @@ from twin.effects.joint_stop import NO_STOP
 from twin.foundation.parameters import Size
 from twin.mechanics.mjcf.loading import SCALAR_JOINTS, LoadedModel
 from twin.mechanics.mjcf.numbers import slides
+from twin.mechanics.mjcf.routes import outward
 
+LINE_LAG = 9  # of an actuator's dynprm, all of which MuJoCo leaves alone where it has no dynamics: s, `line_lag`
 LEAST_TRAVEL = 1e-4  # rad or m between a joint's stops
 HARD_STOP = ((0.004, 1.0), (0.99, 0.999, 1e-4, 0.5, 2.0))  # solref, solimp: without bounce, milliradians soft under a light link
 SPRING_SWING = 0.5  # rad (or a tenth of that in m): the deflection of a spring that gives a joint its scale of torque
@@ -167,6 +169,26 @@ class ModelBody(Body):
             new = np.clip(own, -limit, limit)
             if np.isfinite(new).all() and (new != own).any():
                 model.actuator_forcelimited[k], model.actuator_forcerange[k] = 1, new
+
+    def move_tendon_sites(self, out: np.ndarray) -> None:
+        for further, shift in zip(out, outward(self.loaded).values(), strict=True):
+            self.model.site_pos[:] += further * shift
+
+    def stretch_lines(self, give: np.ndarray) -> None:
+        model, stiff = self.model, 1.0 / (1.0 - self.model.actuator_biasprm[:, 1] * give)
+        late = np.where(_without_dynamics(model), np.maximum(-stiff * give * model.actuator_biasprm[:, 2], 0.0), 0.0)
+        self.scale_actuators(stiff)
+        model.actuator_biasprm[late > 0.0, 2] *= stiff[late > 0.0]
+        model.actuator_dynprm[late > 0.0, LINE_LAG] = late[late > 0.0]
+
+
+def line_lag(model: mujoco.MjModel) -> np.ndarray:
+    """Return by how much (nu,) s a stretching line makes the force of each actuator late after its control."""
+    return np.where(_without_dynamics(model), model.actuator_dynprm[:, LINE_LAG], 0.0)
+
+
+def _without_dynamics(model: mujoco.MjModel) -> np.ndarray:
+    return model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_NONE)
 
 
 def model_size(model: mujoco.MjModel) -> Size:

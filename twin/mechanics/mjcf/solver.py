@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from twin.body import DIRECT, NOT_FOUND, Loads, Problem, Route, Solution
-from twin.mechanics.mjcf.body import ModelBody, payload_places
+from twin.mechanics.mjcf.body import ModelBody, line_lag, payload_places
 from twin.mechanics.mjcf.friction import JointLaws, Paths, Slip, Tree
 from twin.mechanics.mjcf.poses import add_masses, set_start
 from twin.mechanics.mjcf.stepping import LARGEST_RATE, Laws, Memory, Views, run
@@ -123,7 +123,7 @@ class ModelSolver:
         mujoco.mj_forward(now.model, now.data)
         slip = memory.slip._replace(z=memory.slip.z.copy(), beyond=memory.slip.beyond.copy())  # type: ignore[attr-defined]
         copied = memory._replace(z=memory.z.copy(), before=memory.before.copy(), slip=slip, started=memory.started.copy(),
-                                 **_at_rest(now.model))  # fmt: skip
+                                 heard=memory.heard.copy(), **_at_rest(now.model))  # fmt: skip
         rates = now.data.qvel
         return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
 
@@ -241,7 +241,7 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
     torque, breakaway, load = (x[rubs] for x in each[:3])
     law = JointLaws(qpos[rubs], dof[rubs], torque, breakaway, load, float(rub.stribeck), float(rub.presliding))
     mu = route.mu * np.ones(model.ntendon) * (route.mu_shares or 1.0)
-    return Laws(law, mu, float(route.presliding), now.tree, now.paths, now.pull)
+    return Laws(law, mu, float(route.presliding), now.tree, now.paths, now.pull, line_lag(model))
 
 
 def _memory(now: _Compiled, laws: Laws) -> Memory:
@@ -253,7 +253,8 @@ def _memory(now: _Compiled, laws: Laws) -> Memory:
     )
     slip = Slip(np.zeros(each), np.zeros(each), *room)
     before = now.data.qpos[laws.joints.qpos].copy()  # type: ignore[attr-defined]
-    return Memory(np.zeros(len(before)), before, slip, np.zeros(1, bool), **_at_rest(now.model))
+    heard = np.full((2, now.model.nu), np.nan)
+    return Memory(np.zeros(len(before)), before, slip, np.zeros(1, bool), heard=heard, **_at_rest(now.model))
 
 
 def _at_rest(model: mujoco.MjModel) -> dict[str, np.ndarray]:

@@ -44,6 +44,7 @@ class Laws(NamedTuple):
     tree: object
     paths: object
     pull: np.ndarray
+    lag: np.ndarray  # (nu,) s, of a winch's force behind its control, by its line
 
 
 class Memory(NamedTuple):
@@ -57,6 +58,7 @@ class Memory(NamedTuple):
     rate: np.ndarray  # (nv,)
     act_rate: np.ndarray  # (nu,)
     moving: np.ndarray  # (1,) whether these rates are those of a step before
+    heard: np.ndarray  # (2, nu) controls after the lag, and the controls before it; NaN before the first
 
 
 @jit_internal
@@ -102,6 +104,18 @@ def center_rates(views, out):
 
 
 @jit_internal
+def hear(asked, lag, h, heard, ctrl):
+    """Let controls (nu,) through filters of the first order, exactly where they run straight: lag x' + x = u."""
+    for k in range(ctrl.size):
+        u, before = asked[k], heard[1, k]
+        ctrl[k] = u
+        if lag[k] > 0.0 and math.isfinite(before):
+            behind = (u - before) / h * lag[k]
+            ctrl[k] = u - behind + (heard[0, k] - before + behind) * math.exp(-h / lag[k])
+        heard[0, k], heard[1, k] = ctrl[k], u
+
+
+@jit_internal
 def write_row(views, out):
     """Write the shown arrays and the rates one after another."""
     at = 0
@@ -127,7 +141,9 @@ def run(engine, views, laws, memory, commands, rows, out):
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), memory.raised, np.zeros(nv), 0
     mu = laws.mu.max() if nt else 0.0
-    settling, last = rows.size == 0, -1
+    settling, last, limited = rows.size == 0, -1, False
+    for k in range(views.force.size):
+        limited = limited or math.isfinite(views.forcerange[k, 0]) or math.isfinite(views.forcerange[k, 1])
     done = commands.shape[0]
     for i in range(commands.shape[0]):
         for k in range(nv):
@@ -135,14 +151,13 @@ def run(engine, views, laws, memory, commands, rows, out):
             views.damping[k] = own[k] + raised[k]
             raised[k] = 0.0
         joint_forces(laws.joints, memory.z, h, views.qvel, views.effort, views.applied, views.damping)
-        for k in range(views.ctrl.size):
-            views.ctrl[k] = commands[i, k]
+        hear(commands[i], laws.lag, h, memory.heard, views.ctrl)
         mj_step1(model, data)
         if last >= 0:
             center_rates(views, out[last])
         row = -1 if settling else rows[i]
         last = row
-        if mu > 0.0 or row >= 0:
+        if mu > 0.0 or row >= 0 or limited:  # which actuator is at its limit is asked below
             mj_fwd_actuation(model, data)
         if mu > 0.0:
             for t in range(nt):

@@ -134,6 +134,8 @@ def _write_actuators(spec: mujoco.MjSpec, old: mujoco.MjModel, new: mujoco.MjMod
         for field in ("gainprm", "biasprm", "dynprm", "forcerange"):
             if _changed(old, new, f"actuator_{field}")[k]:
                 setattr(actuator, field, getattr(new, f"actuator_{field}")[k])
+        if new.actuator_forcelimited[k] != old.actuator_forcelimited[k]:
+            actuator.forcelimited = bool(new.actuator_forcelimited[k])
         damping = np.array(actuator.damping)
         damping[0] = new.actuator_damping[k]
         actuator.damping, actuator.armature = damping, float(new.actuator_armature[k])

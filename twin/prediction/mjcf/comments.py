@@ -105,7 +105,7 @@ def _elements(effect: Effect, actuators: Sequence[str]) -> dict[str, tuple[str, 
     n = effect.n_tendon
     joints = {f"{p.name}_{joint}": ("joint", joint) for joint in joint_names(n) for p in effect.per_joint}
     drives = {f"{p.name}_{i}": ("actuator", name) for i, name in enumerate(actuators, 1) for p in effect.per_tendon}
-    tendons = {f"mu_{tendon}": ("tendon", tendon) for tendon in tendon_names(n)}
+    tendons = {f"{of}_{tendon}": ("tendon", tendon) for tendon in tendon_names(n) for of in ("mu", "stretch", "out")}
     declared = {p.name for p in effect.all_parameters(n)}
     return {name: place for name, place in {**tendons, **drives, **joints}.items() if name in declared}
 

@@ -74,16 +74,20 @@ class Stepper(ABC):
             raise SolveError("the model's motion diverges; check the controls, or give the file a shorter timestep")
 
     def readings(self) -> dict[str, float]:
-        """Return the positions (SI) of joints, actuators, tendons and sites by channel, as its encoders and camera report them."""
+        """Return the positions (SI) of joints, actuators, tendons and sites by channel, as its encoders and camera report them.
+
+        What a drum behind an elastic tendon shows hangs on the actuator's force, which is here that under the last controls.
+        """
         model, now = self._motion.model, self._scratch
         now.qpos[:] = self._motion.data.qpos
         for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon, mujoco.mj_transmission):
             compute(model, now)
+        tension = -self._motion.data.actuator_force[None]
         angle = now.qpos[model.jnt_qposadr]
         columns = dict(zip(_POSITIONS, (angle, angle, now.actuator_length, now.actuator_length, now.ten_length), strict=False))
         nu, time = np.zeros((1, model.nu)), np.full(1, self._motion.data.time - self._began)
         true = Signals(
-            time, time, nu, nu, now.site_xpos[None].copy(), np.zeros(1),
+            time, time, tension, nu, now.site_xpos[None].copy(), np.zeros(1),
             others={name: column[None].copy() for name, column in columns.items()},
         )  # fmt: skip
         seen = self._chain.sense(true)

@@ -36,8 +36,7 @@ MIN_INERTIA = 1e-14  # kg m^2: MuJoCo refuses less than 1e-15; a millionth of a 
 MIN_DRAWN_THICKNESS = 1.5e-3  # m, of a drawn disk
 CONTINUUM_FEATURES = frozenset({
     "weight", "elasticity", "rest shape", "markers", "load cells", "drives that saturate", "planes", "length", "holes", "surface",
-    "viscosity",
-    "drive zeros",
+    "viscosity", "drive zeros", "lines",
 })  # fmt: skip
 PULLING, PUSHING = frozenset({"rope", "slack"}), frozenset({"rods"})  # features of its tendons
 

@@ -20,8 +20,10 @@ from twin.mechanics.mjcf import (
     control_unit,
     element_senses,
     load_model,
+    outward,
     payload_places,
     tip_site,
+    winches_of,
 )
 from twin.robots.schemas.mjcf import MJCF_SCHEMA as SCHEMA
 from twin.robots.schemas.mjcf import address_of, counts_of, joint_names, scalar_joints
@@ -100,6 +102,7 @@ class _Known:
         }
         if np.linalg.norm(model.opt.gravity) > 0.0:
             features |= {"weight"}
+        features |= ({"lines"} if winches_of(loaded) else set()) | ({"holes"} if outward(loaded) else set())
         self.features = frozenset(features)
 
 

@@ -115,7 +115,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Jaw:
     return Jaw(
         spec=spec,
         n_tendon=2,
-        features=frozenset({"antagonists", "rope", "friction of joints"}),
+        features=frozenset({"antagonists", "rope", "lines", "friction of joints"}),
         antagonists=True,
         tendon_sites=tuple((f"tendon_{i}_base", f"tendon_{i}_anchor") for i in (1, 2)),
         ports=((Port("joint_1_angle", Drive.DISPLACEMENT, (drum, -drum)),),),

@@ -108,7 +108,7 @@ def build(structure: Mapping[str, object], values: Mapping[str, float]) -> Finge
     return Finger(
         spec=_spec(length, mass, stiffness, rest, radius),
         n_tendon=2,
-        features=frozenset({"weight", "elasticity", "markers", "load cells", "drives that saturate", "slack"}),
+        features=frozenset({"weight", "elasticity", "markers", "load cells", "drives that saturate", "slack", "lines"}),
         ports=tuple((Port(f"tendon_{i + 1}_tension", Drive.TENSION, tuple(np.eye(2)[i])),) for i in (0, 1)),
         senses={
             **{f"tendon_{i}_{group}": Sense(group, i - 1) for i in (1, 2) for group in ("tension", "displacement")},

@@ -29,8 +29,10 @@ from twin.mechanics.mjcf import (
     contacts_at_start,
     control_unit,
     load_model,
+    outward,
     si_unit,
     slides,
+    winches_of,
 )
 from twin.robots.schema import BOUND_STDS, ModelFile, Row, Schema, Structure
 
@@ -82,7 +84,7 @@ def joint_names(loaded: LoadedModel) -> tuple[str, ...]:
 
 def counts_of(loaded: LoadedModel) -> Counts:
     """Return the number of a model's actuators, with the names of its joints and tendons."""
-    return Counts.of(loaded.model.nu, joint_names(loaded), loaded.names("tendon"))
+    return Counts.of(loaded.model.nu, joint_names(loaded), loaded.names("tendon"), winches_of(loaded), tuple(outward(loaded)))
 
 
 class NumberEntry(TableSchema):
