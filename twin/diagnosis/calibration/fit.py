@@ -23,8 +23,8 @@ FAR_SHARE = 0.05  # of the cost: a fit whose derivatives promise a larger fall i
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
 SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came, they are renewed
 MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit
-MOST_FIT_STEPS = 24  # at most, of a fit that may renew them
-MOST_STEPS_WITH_KEPT = 12  # at most, of one that keeps those of a neighbouring fit
+MOST_FIT_STEPS = 24  # at most, of a fit of motion or one that renewed them
+MOST_STEPS_WITH_KEPT = 12  # at most, of one that kept them
 FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
@@ -158,16 +158,16 @@ def fit(
     """Fit a model's free parameters by damped Gauss-Newton steps within bounds (each a bounded linear least-squares problem).
 
     Derivatives for the robot's own parameters, nearly linear where these are known well, are renewed where the cost falls less than
-    they say, and at the end; or they are given as `J`, the whitened columns (n, m) of the first m free parameters from a
-    neighbouring fit, and kept, but of motion. Those for effects are computed at every step. `refresh` computes all again at the
-    solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
+    they say, or where they go on to promise as much; or they are given as `J`, the whitened columns (n, m) of the first m free
+    parameters from a neighbouring fit, and kept, but of motion. Those for effects are computed at every step. `refresh` computes
+    all again at the solution, for standard errors and screening. Raise SolveError where the model cannot be solved at its start.
     """
     penalty = _Penalty.of(objective, model)
     at = objective.evaluate(model, near.traces if near else None)
     # Derivatives of the same model, of more trials than these, are near enough.
     kept = J is not None and (not objective.bends or (near is not None and near.model is model))
-    renewals = 0 if kept or np.isinf(stop.worth) else MOST_RENEWALS
     own = [i for i, f in enumerate(model.free) if f.effect is None]
+    renewals = allowed = MOST_RENEWALS if own and not (kept or np.isinf(stop.worth)) else 0
     fixed = [i for i in own if J is None or i >= J.shape[1]]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
@@ -175,8 +175,11 @@ def fit(
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping = penalty.cost(at), FIRST_DAMPING
+    before = np.inf  # what derivatives promised a step earlier
     since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
-    for left in range((MOST_STEPS_WITH_KEPT if kept and not objective.bends else MOST_FIT_STEPS) - 1, -1, -1):
+    for left in range(MOST_FIT_STEPS - 1, -1, -1):
+        if not objective.bends and renewals == allowed and left < MOST_FIT_STEPS - MOST_STEPS_WITH_KEPT:
+            break
         columns[:, moving] = objective.jacobian(at, moving)
         step = _Step.of(penalty, at, columns)
         promised = step.to(FIRST_DAMPING)[1] if renewals or objective.bends else 0.0
@@ -193,17 +196,18 @@ def fit(
                 damping = max(0.1 * damping, 1e-6)
             if now - left * fall > stop.beat:
                 break
-        slow = fall < SLOW_FALL_SHARE * promised
+        slow = fall < SLOW_FALL_SHARE * promised or promised > SLOW_FALL_SHARE * before  # one good step leaves little to promise
+        before = promised
         if better is not None and fall >= enough and not slow:
             continue
-        if renewals and left and since - now >= enough and now <= stop.beat:
+        worth_it = since > now and since - now >= enough and now <= stop.beat
+        if renewals and left and worth_it and (objective.bends or (slow and promised >= enough)):
             columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, FIRST_DAMPING
-            since = now
+            since, before = now, np.inf
         elif fall < enough or now > stop.beat:
             break
     if refresh:
-        last = objective.smallest_fall(1.0 if objective.bends else stop.tolerance, now)[1]
-        stale = since - now > last
+        stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]
         which = range(len(model.free)) if stale else moving
         columns[:, which] = objective.jacobian(at, which)
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))

@@ -66,8 +66,8 @@ class Weight:
 def lag_or_delay(context: FitContext, found: Search) -> Search:
     """Return the search with its lag and delay scored again.
 
-    Unchanged if the best candidate has neither, or if tendons are driven in different ways or by currents: springs have a memory of
-    their own.
+    Unchanged if the best candidate has neither, or if tendons are driven in different ways, by controls, or by currents: springs
+    have a memory of their own.
     """
     laws = LATE & set(found.best.effects)
     if not laws or not tells_laws(context) or not context.budget.allows("what makes it late"):
@@ -89,10 +89,11 @@ def lag_or_delay(context: FitContext, found: Search) -> Search:
 def tells_laws(context: FitContext) -> bool:
     """Return whether lag and delay are scored by the implied commands.
 
-    They are if all tendons are driven alike, and not by currents.
+    They are if all tendons are driven alike, by tensions or lengths. Controls of an MJCF are known exactly, between rows too: there
+    the evidence of the fits decides.
     """
     drives = set(context.prepared.drives)
-    return len(drives) == 1 and Drive.CURRENT not in drives
+    return len(drives) == 1 and not drives & {Drive.CURRENT, Drive.CONTROL}
 
 
 def rescored(sets: list[ScoredModel], weights: Mapping[LateEffects, Weight]) -> list[ScoredModel]:
