@@ -33,7 +33,7 @@ CALIBRATED = {
 EFFECTS: dict[str, tuple[str, Mapping[str, float]]] = {
     "actuator_gain": ("actuator_gain", {"gain_1": 0.9, "gain_2": 1.1}),
     "actuator_lag": ("actuator_lag", {"time": 0.03}),
-    "actuator_saturation": ("actuator_saturation", {"most_1": 0.2, "most_2": 1.0}),
+    "actuator_saturation": ("actuator_saturation", {"limit_1": 0.2, "limit_2": 1.0}),
     "actuator_lag, second order": ("actuator_lag", {"time": 0.03, "inertia": 0.4}),
     "base_tilt": ("base_tilt", {"about_y": 0.4}),
     "camera_misalignment": ("camera_misalignment", {"turn_x": 0.1, "shift_z": 0.01}),

@@ -36,7 +36,7 @@ class ActuatorSaturation(Effect):
     `loss` above `ceiling`, with a corner of width `knee` (A). Lengths: drive i has its own `loss_i` above `stroke`, with a corner
     of width `give` (m), both common to the drives, which are alike. A motor that holds a length gives way where its tendon would
     pull more than `stall`, and returns where it would not. Actuators of an MJCF: the force (torque) of actuator i stays within
-    +-most_i.
+    +-limit_i.
 
     A drive that stalls or stands on its end stop has a loss of 1, one that stalls on a spring less. It acts on commands: the log of
     a drive that reports its position does not show it.
@@ -70,7 +70,9 @@ class ActuatorSaturation(Effect):
     )
     per_tendon = (
         Parameter("loss", 0.0, "1", 0.0, 1.0, "1: not a millimetre more than the stroke", scale=0.2),
-        Parameter("most", NO_LIMIT, "1", 1e-3, NO_LIMIT, "N or N m: a current limit, a weak supply, a slipping clutch", scale=0.02),
+        Parameter(
+            "limit", NO_LIMIT, "1", 1e-3, NO_LIMIT, "N or N m: a current limit, a weak supply, a slipping clutch", scale=0.02
+        ),
     )
     inactive_when_off = ("limit", "corner", "stroke", "give", "ceiling", "knee")
     needs = frozenset({"drives that saturate"})
@@ -91,7 +93,7 @@ class ActuatorSaturation(Effect):
         forces = [s.others["actuator force"] for s in predicted if "actuator force" in s.others]
         largest = np.abs(np.concatenate(forces)).max(axis=0) if forces else np.zeros(0)
         for share in LIMIT_SHARES:
-            starts = {f"most_{i}": share * float(f) for i, f in enumerate(largest, 1) if share * f > cls.per_tendon[1].low}
+            starts = {f"limit_{i}": share * float(f) for i, f in enumerate(largest, 1) if share * f > cls.per_tendon[1].low}
             for values in (*({n: v} for n, v in starts.items()), *([starts] if len(starts) > 1 else [])):
                 yield FitStart(values, tuple(values))
 
@@ -130,12 +132,12 @@ class ActuatorSaturation(Effect):
 
     @classmethod
     def form(cls, free: Collection[str]) -> str:
-        return "one" if len(free) == 1 and min(free).startswith("most") else ""
+        return "one" if len(free) == 1 and min(free).startswith("limit_") else ""
 
     def edit(self, body: Body) -> None:
         if of_a_model(self.n_tendon):
-            most = self.per_tendon_values("most")
-            body.limit_actuators(np.where(most < NO_LIMIT, most, np.inf))
+            limit = self.per_tendon_values("limit")
+            body.limit_actuators(np.where(limit < NO_LIMIT, limit, np.inf))
 
     def write(self, spec: mujoco.MjSpec) -> bool:
         """Return whether all is said: forces' ranges are numbers of the model, which `edit` has changed."""

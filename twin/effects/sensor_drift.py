@@ -29,8 +29,8 @@ class SensorDrift(Effect):
 
     Source: conductive rubber drifts by up to 8.3 % in 1,000 cycles of 14 h (KineSoft, Yoo et al. 2025, arXiv 2503.01078); fresh
     cords by per cents in minutes, then less as their filler settles (cords of one batch alike). An accelerating drift is a
-    second-order Taylor expansion. Zeros
-    of encoders creep where a magnet or a coupling slips, those of motor currents and load cells as amplifiers warm up.
+    second-order Taylor expansion. Zeros of encoders creep where a magnet or a coupling slips, those of motor currents and load
+    cells as amplifiers warm up.
 
     >>> import numpy as np
     >>> z = np.zeros

@@ -15,6 +15,7 @@ from scipy.optimize import lsq_linear
 from tests.recorded_days import half, recorded_day
 from tools.simulators.rod.nuisance import built
 from twin.diagnosis import Settings, calibrated_fit
+from twin.diagnosis.calibration import fit as stage
 from twin.diagnosis.calibration.fisher_information import solve, unidentifiable
 from twin.diagnosis.calibration.fit import Fit, StopRule, fit
 from twin.diagnosis.calibration.model import Free, Model, prior_weight
@@ -491,6 +492,55 @@ def test_a_step_that_failed_is_shortened_only_as_long_as_it_may_be_worth_it(wort
     found = fit(bench, Model(Twin.of(ROBOT), FREE[2:3]), stop=StopRule(0.0, worth))
     assert bench.steps == tried
     assert found.cost == 1.0
+
+
+class Bent(Linear):
+    """Outputs 4 A tanh(x / 4): derivatives where the fit ends are a fifth of those where it begins."""
+
+    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+        x = model.vector()
+        z = self.y - 4.0 * self.A @ np.tanh(0.25 * x)
+        return Evaluation(model, {}, [], z) if z @ z <= most else None
+
+    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
+        return -(self.A / np.cosh(0.25 * at.model.vector()) ** 2)[:, list(which)]
+
+    def renewed(self, at: Evaluation, which: Sequence[int], known: np.ndarray) -> np.ndarray:
+        return self.jacobian(at, which)
+
+
+def test_derivatives_that_have_changed_are_renewed_or_the_fit_ends_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spools and zeros that nobody knows bend the outputs; a fit that keeps its first derivatives does not reach the truth."""
+    A, true = np.random.default_rng(4).normal(size=(60, 2)), np.array([6.0, -5.0])
+    bench, model = Bent(A, 4.0 * A @ np.tanh(0.25 * true)), Model(Twin.of(ROBOT), FREE[2:])
+    np.testing.assert_allclose(fit(bench, model).model.vector(), true, atol=1e-3)
+    monkeypatch.setattr(stage, "MOST_RENEWALS", 0)
+    assert np.abs(fit(bench, model).model.vector() - true).max() > 0.1
+
+
+class Kinked(Linear):
+    """Outputs A x of the robot, and beside them a delay's, b |delay - 0.5 s|, whose derivative is taken from one side alone."""
+
+    def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
+        own, delay = model.vector()[:-1], model.twin.effects[0]["delay"]
+        z = np.append(self.y - self.A @ own, -0.5 - 20.0 * abs(delay - 0.5))
+        return Evaluation(model, {}, [], z) if z @ z <= most else None
+
+    def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
+        step = at.model.free[-1].parameter.step
+        whole = np.zeros((len(self.y) + 1, self.A.shape[1] + 1))
+        whole[:-1, :-1], whole[-1, -1] = -self.A, -20.0 * step
+        return whole[:, list(which)]
+
+
+def test_a_kink_of_an_effect_does_not_stop_the_robots_own_numbers() -> None:
+    """At its kink a delay promises a fall and gives a rise, by more than the robot's numbers would gain in the same step."""
+    delay = next(p for p in catalogue()["time_delay"].parameters if p.name == "delay")
+    twin = replace(Twin.of(ROBOT), effects=(catalogue()["time_delay"]({"delay": 0.5}),))
+    A, true = 0.02 * np.random.default_rng(5).normal(size=(60, 2)), np.array([1.0, -1.0])
+    found = fit(Kinked(A, A @ true), Model(twin, (*FREE[2:], Free("time_delay", delay))))
+    np.testing.assert_allclose(found.model.vector()[:-1], true, atol=1e-3)
+    assert found.model.twin.effects[0]["delay"] == pytest.approx(0.5, abs=1e-6)
 
 
 def test_derivatives_of_a_neighbour_serve_as_well() -> None:

@@ -6,6 +6,7 @@ import re
 import sys
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -13,13 +14,15 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.checks.test_design import bench
+from tests.robots.test_motors import RADIUS, turned
+from tests.robots.test_motors import robot as motor_robot
 from tools.simulators.rod.design import bench_day
 from twin.body import Drive
 from twin.diagnosis.explain import next_experiment as stage
 from twin.diagnosis.explain.next_experiment import Experiment, menu, next_experiment
 from twin.diagnosis.noise.model import Noise
 from twin.foundation.errors import SolveError
-from twin.prediction.prepared import PreparedRecording
+from twin.prediction.prepared import PreparedRecording, prepare
 
 
 @cache
@@ -239,3 +242,19 @@ def test_one_run_may_do_and_more_than_fifty_are_no_advice(monkeypatch: pytest.Mo
     for separation, repeats in ((100.0, 1), (0.5001, 50), (0.4999, None), (0.0, None)):
         found = proposed(monkeypatch, only=(np.sqrt(separation) * d, J))
         assert (found and found.repeats) == repeats
+
+
+def test_a_robot_with_motors_is_asked_to_turn_them(tmp_path: Path) -> None:
+    """A motor pulls one antagonist in as it lets the other go, and the other pair stays where it is."""
+    built = motor_robot(tmp_path / "r")
+    angle = np.column_stack([np.linspace(0.0, -0.4, 7), np.linspace(0.0, 0.3, 7)])
+    proposed = [(words, t.command) for words, t in menu(prepare(turned(angle), built)) if not words.startswith("rest")]
+    assert {words.split(" to ")[0].removeprefix("step ") for words, _ in proposed if "three quarters" not in words} == {
+        "turn motor_1_angle", "turn motor_2_angle",
+    }  # fmt: skip
+    for words, command in proposed:
+        mine, other = ((0, 2), (1, 3)) if "motor_1" in words else ((1, 3), (0, 2))
+        np.testing.assert_allclose(command[:, mine[0]], -command[:, mine[1]], atol=1e-15)
+        assert not command[:, other].any()
+    farthest = next(c for words, c in proposed if words.startswith("turn motor_1_angle to -0.4 rad and release it, slowly"))
+    assert farthest[:, 0].min() == pytest.approx(-0.4 * RADIUS)

@@ -12,7 +12,7 @@ from scipy.signal import lsim
 
 from twin.body import Drive
 from twin.diagnosis.search.command_spline import smooth_command
-from twin.diagnosis.search.lag_or_delay import Given, lag_or_delay, likelihood, rescored, weighed
+from twin.diagnosis.search.lag_or_delay import Given, lag_or_delay, likelihood, rescored, tells_laws, weighed
 
 LAG, DELAY = frozenset({"actuator_lag"}), frozenset({"time_delay"})
 SEEN = 0.02  # N, how well outputs show a pull
@@ -151,3 +151,18 @@ def test_where_nothing_is_late_or_springs_remember_the_search_stays(effects: tup
     found: Any = SimpleNamespace(best=Set(effects, 1.0))
     study: Any = SimpleNamespace(prepared=SimpleNamespace(drives=drives))
     assert lag_or_delay(study, found) is found
+
+
+@pytest.mark.parametrize(
+    ("drives", "tells"),
+    [
+        ((Drive.TENSION,) * 2, True),
+        ((Drive.DISPLACEMENT,) * 2, True),
+        ((Drive.TENSION, Drive.DISPLACEMENT), False),
+        ((Drive.CURRENT,) * 2, False),
+        ((Drive.CONTROL,) * 2, False),  # known exactly, so that the fits themselves decide
+    ],
+)
+def test_commands_that_outputs_imply_decide_only_where_commands_are_noisy(drives: tuple[Drive, ...], tells: bool) -> None:
+    context: Any = SimpleNamespace(prepared=SimpleNamespace(drives=drives))
+    assert tells_laws(context) is tells

@@ -3,8 +3,8 @@
     python -m tools.benchmarks.diagnosis.articulated_days --out results/ [--sets 48] [--seed 42000] [--jobs 2]
 
 A tendon-driven finger, a servo arm and a leg take turns. Of the days an eighth has no effect, half one, a quarter two, an eighth
-one in no catalogue. Errors are on the holdout folder, which no diagnosis reads: of each channel over the noise that
-is in it. Rows go to results/articulated_days.jsonl as they come; a run goes on where it stopped.
+one in no catalogue. Errors are on the holdout folder, which no diagnosis reads: of each channel over the noise that is in it.
+Rows go to results/articulated_days.jsonl as they come; a run goes on where it stopped.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     python -m tools.benchmarks.diagnosis.motor_days --out results/ [--sets 40] [--seed 41000] [--jobs 2]
 
 Zeros, pretensions, spools and springs in series differ from their description within its tolerances; antagonistic pairs and motors
-that each wind one tendon take turns, and half of the days log the motors' torques. Of the days a fifth has no effect, half one, an
-eighth two, and an eighth one that is in no catalogue. Rows go to results/motor_days.jsonl as they come; a run goes on where it
+that each wind one tendon take turns, and half of the days log the motors' torques. Of the days a quarter has no effect, half one,
+an eighth two, and an eighth one in no catalogue. Rows go to results/motor_days.jsonl as they come; a run goes on where it
 stopped.
 """
 

@@ -1,8 +1,8 @@
 """A trial with tendons held by motors at given lengths or by SMA springs, sample by sample; tensions are unknowns.
 
 Springs pull from the beginning, cold, and rods are held at zero: gravity and payload are applied in `START_STEPS` equal steps with
-them. Spring temperatures
-advance once a sample, under the current and at the elongation of the sample before. Otherwise as tension_trials.py.
+them. Spring temperatures advance once a sample, under the current and at the elongation of the sample before. Otherwise as
+tension_trials.py.
 """
 
 from twin.foundation.compiled import assign, jit, jit_inline

@@ -25,8 +25,7 @@ SILICONE_COLOUR, TENDON_COLOUR, SENSOR_COLOUR, MARKER_COLOUR = (
 )
 SOFT_FEATURES = frozenset({
     "weight", "elasticity", "markers", "load cells", "drives that saturate", "strain sensors", "drifting sensors", "planes",
-    "length", "hanging zero", "rest shape", "holes", "lines",
-    "surface", "viscosity", "skin", "drive zeros", "slack",
+    "length", "hanging zero", "rest shape", "holes", "lines", "surface", "viscosity", "skin", "drive zeros", "slack",
 })  # fmt: skip
 N_DISCS = 24  # of the drawing
 

@@ -15,7 +15,7 @@ from twin.effects.tendon_friction import rounded_turn_angle
 from twin.foundation.compiled import assign, dot, jit, jit_internal
 from twin.mechanics.rod.balance.chain import commit_slip, copy_state, force_balance, friction_of, point_velocity
 from twin.mechanics.rod.balance.elastic import add_arc_gradients
-from twin.mechanics.rod.balance.linear import factorise, substitute
+from twin.mechanics.rod.balance.linear import dot_n, factorise, substitute
 from twin.mechanics.rod.balance.newton import (
     CHORD_CONTRACTION,
     LONGEST_HINGE_STEP,
@@ -390,12 +390,3 @@ def commit_present_slip(system, state):
     update_kinematics(system, state.q)
     force_balance(system, state, z, s, r, none)
     commit_slip(state, z, s)
-
-
-@jit_internal
-def dot_n(a, b):
-    """Return the dot product of two vectors."""
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
-    return total

@@ -62,3 +62,12 @@ def substitute(LU, b):
         b[k], b[k + 1], b[k + 2] = w, x, y
         for i in range(k):
             b[i] -= LU[k, i] * w + LU[k + 1, i] * x + LU[k + 2, i] * y + LU[k + 3, i] * z
+
+
+@jit_internal
+def dot_n(a, b):
+    """Return the dot product of two vectors."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
