@@ -44,7 +44,7 @@ class MotorRecipe:
 
 def possible_effects() -> list[str]:
     """Return the effects that may be wrong on this bench."""
-    return [name for name in all_effects() if not name.startswith(ELSEWHERE) and name != DriveTrain.id]
+    return [name for name in all_effects() if not name.startswith(ELSEWHERE)]
 
 
 def make_motor_day(folder: Path, recipe: MotorRecipe) -> list[tuple[Effect, float]]:
