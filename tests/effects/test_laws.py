@@ -617,6 +617,19 @@ def test_drives_and_springs_that_are_alike_are_tried_each_with_its_own() -> None
     )  # never less than none
 
 
+def test_an_actuator_follows_its_control_through_its_play() -> None:
+    """By hand, play 0.2: at rest within half of it, then behind by that; the stepped law says the same of each row."""
+    control = np.array([0.0, 0.05, 0.3, 0.25, 0.12, 0.0])[:, None]
+    time, none, warm = np.arange(6.0), np.zeros((6, 1)), np.full(6, 293.0)
+    s = Signals(time, time, none, none, np.zeros((6, 0, 3)), warm, (Drive.CONTROL,), control=control)
+    play = effect_class("tendon_backlash")({"play_1": 0.2}, 1)
+    expected = [0.0, 0.0, 0.2, 0.2, 0.2, 0.1]
+    np.testing.assert_allclose(play.drive(s).control[:, 0], expected, atol=1e-12)
+    step = play.by_step(1.0, control[0])
+    assert step is not None
+    np.testing.assert_allclose([step(c)[0] for c in control], expected, atol=1e-12)
+
+
 def test_springs_and_drives_are_sought_where_they_are() -> None:
     """No start without springs; play in all drives, and in each that moves; walls only where the robot reaches."""
     still = some_signals()
@@ -627,6 +640,13 @@ def test_springs_and_drives_are_sought_where_they_are() -> None:
     one_moves = still.with_changes(displacement=still.displacement * np.array([0.0, 1.0, 0.0]))
     assert [s.free for s in effect_class("tendon_backlash").fit_starts([one_moves], 3)] == [("gap", "swap"), ("gap_2", "swap")]
     assert len(list(effect_class("tendon_backlash").fit_starts([still.with_changes(antagonists=True)], 2))) == 1
+    asked = still.with_changes(drives=(Drive.CONTROL,) * 3)
+    starts = [s.free for s in effect_class("tendon_backlash").fit_starts([asked], 3)]
+    assert starts == [("play_1",), ("play_2",), ("play_3",), ("play_1", "play_2", "play_3")]
+    for late, name in (("actuator_lag", "time"), ("time_delay", "delay")):  # a row where controls drive, else 0.1 s
+        fast = asked.with_changes(time=0.02 * np.arange(len(asked.time)))
+        ((of_controls,), (of_tensions,)) = (list(effect_class(late).fit_starts([s], 3)) for s in (fast, still))
+        assert (of_controls.values[name], of_tensions.values[name]) == (pytest.approx(0.02), 0.1)
     limits = [s.values["limit"] for s in effect_class("actuator_saturation").fit_starts([still], 3)]
     assert limits
     assert max(limits) < still.tension.max()

@@ -46,6 +46,7 @@ EFFECTS: dict[str, tuple[str, Mapping[str, float]]] = {
     "load_dependent_friction": ("load_dependent_friction", {"share": 0.1}),
     "reflected_inertia": ("reflected_inertia", {"inertia_hip": 0.003}),
     "sensor_drift": ("sensor_drift", {"angle_hip": 0.01, "position_2": 1e-3, "levelling": 0.02}),
+    "tendon_backlash": ("tendon_backlash", {"play_1": 0.05, "play_2": 1e-3}),
     "tendon_elasticity": ("tendon_elasticity", {"stretch_flexor": 5e-5}),
     "tendon_friction": ("tendon_friction", {"mu_flexor": 0.2}),
     "tendon_routing": ("tendon_routing", {"out_flexor": 2e-3}),
@@ -53,7 +54,6 @@ EFFECTS: dict[str, tuple[str, Mapping[str, float]]] = {
     "tip_payload": ("tip_payload", {"mass": 0.02}),
 }
 OF_OTHER_ROBOTS = {
-    "tendon_backlash",
     "sma_cooling",
     "sma_hysteresis",
 }  # ask for no feature; see a diagnosis' log

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.body.lag import lag_over, lag_response
+from twin.body.lag import lag_over, lag_response, late_by
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
@@ -82,8 +82,8 @@ class ActuatorLag(Effect):
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
-        """Start at seconds, the time in which a spring warms, if currents drive; else at less than a row of most logs."""
-        for time in (0.5, 4.0) if any(s.driven_by_current.any() for s in predicted) else (0.1,):
+        """Start at seconds, the time in which a spring warms, if currents drive; else as `late_by` has it."""
+        for time in (0.5, 4.0) if any(s.driven_by_current.any() for s in predicted) else (late_by(predicted),):
             yield FitStart({"time": time}, ("time",))
 
     def extended_starts(self, predicted: list[Signals]) -> Iterator[FitStart]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -11,7 +11,18 @@ from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
 
-GAP_GUESS = 2e-4  # m, from which fits start
+GAP_GUESS = 2e-4  # m, or in the unit of a control, from which fits start
+
+
+class PlayingSteps:
+    """Controls (nu,) one after another through plays (nu,): each is followed where it leaves the middle by half its play."""
+
+    def __init__(self, play: np.ndarray, first: np.ndarray) -> None:
+        self._half, self._followed = 0.5 * play, np.array(first, float)
+
+    def __call__(self, control: np.ndarray) -> np.ndarray:
+        self._followed = np.clip(self._followed, control - self._half, control + self._half)
+        return self._followed.copy()
 
 
 @jit
@@ -40,6 +51,9 @@ class TendonBacklash(Effect):
     Each of two antagonists on a rigid joint only pulls, so its play is on the pulling side, z = +1, in both directions of travel.
     It is slack of gap/2 in both: a dead band that is crossed where the load, not the travel, changes its sign.
 
+    An actuator of an MJCF follows its control through the play operator: c' = c - play_i/2 z in the unit of the control, with z = 0
+    where a trial starts.
+
     Source: play operator (Krasnosel'skii and Pokrovskii). Worn gears, a loose coupling, a slack line: tenths of a millimetre.
 
     >>> from twin.body import Drive
@@ -55,7 +69,10 @@ class TendonBacklash(Effect):
         Parameter("swap", 1e-4, "m", 1e-5, 1e-2, "half the gap for pure play; ours", scale=5e-5),
         Parameter("slack", 0.0, "m", -2e-2, 2e-2, "a line cut too long; negative: pre-tensioned", scale=5e-5),
     )
-    per_tendon = (Parameter("gap", 0.0, "m", -2e-2, 2e-2, "one drive's, beside that of all; as gap", scale=5e-5),)
+    per_tendon = (
+        Parameter("gap", 0.0, "m", -2e-2, 2e-2, "one drive's, beside that of all; as gap", scale=5e-5),
+        Parameter("play", 0.0, "1", 0.0, 0.5, "an actuator's, in the unit of its control; as gap", scale=5e-5),
+    )
     inactive_when_off = ("swap",)
     extended_parameters = ("slack",)
     extended_needs = frozenset({"elasticity", "slack"})
@@ -65,7 +82,15 @@ class TendonBacklash(Effect):
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
-        """Start with equal play in all drives; and, for several drives that bend a body, in each drive that moves."""
+        """Start with equal play in all drives; and, for several drives that bend a body, in each drive that moves.
+
+        Actuators start each with its own, then all of them.
+        """
+        if (driven := predicted[0].driven_by_control).any():
+            single = [{f"play_{i + 1}": GAP_GUESS} for i in np.flatnonzero(driven)]
+            for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
+                yield FitStart(values, tuple(values))
+            return
         yield FitStart({"gap": GAP_GUESS}, ("gap", "swap"))
         if n_tendon == 1 or any(s.antagonists for s in predicted):
             return
@@ -82,7 +107,14 @@ class TendonBacklash(Effect):
             own = tuple(f"gap_{i}" for i in range(1, self.n_tendon))
             yield FitStart({"slack": 5e-5}, ("slack", *own))
 
+    def by_step(self, step: float, first: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        return PlayingSteps(self.per_tendon_values("play"), first)
+
     def drive(self, command: Signals) -> Signals:
+        if np.any(play := self.per_tendon_values("play")):
+            z = np.zeros_like(command.control)
+            play_side(np.ascontiguousarray(command.control - command.control[:1]), np.maximum(0.5 * play, 1e-12), z)
+            command = command.with_changes(control=command.control - 0.5 * play * z)
         moved = command.displacement - self["slack"] - 0.5 * self._gap() * self._side(command)
         return command.with_changes(displacement=np.where(command.driven_by_length, moved, command.displacement))
 
@@ -91,6 +123,8 @@ class TendonBacklash(Effect):
         return true.with_changes(displacement=np.where(true.driven_by_length | true.driven_by_current, true.displacement, reported))
 
     def route(self) -> Route:
+        if not np.any(self._gap()):
+            return Route()
         return Route(backlash=tuple(0.5 * self._gap()), crossing_travel=tuple(self._swap()))
 
     def _gap(self) -> np.ndarray:

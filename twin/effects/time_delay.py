@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import mujoco
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.effects.base.effect import DataNeed, Effect
+from twin.body.lag import late_by
+from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 
 STRAIGHT = 1  # interpolation of an MJCF's delayed commands
@@ -48,10 +49,13 @@ class TimeDelay(Effect):
     id = "time_delay"
     parameters = (Parameter("delay", 0.0, "s", -3.0, 3.0, "positive: outputs come late", scale=0.05),)
     confusable_with = ("actuator_lag",)
-    guesses = ({"delay": 0.1},)
     moves_with = "the rate of change of the pull"
     plot_against = "rate"
     hidden_without = frozenset({DataNeed.TWO_RATES})
+
+    @classmethod
+    def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
+        yield FitStart({"delay": late_by(predicted)}, ("delay",))
 
     def command(self, reported: Signals) -> Signals:
         t = reported.time

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from twin.diagnosis.evidence import ranking as stage
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern
-from twin.diagnosis.evidence.ranking import gains, projected, rank
+from twin.diagnosis.evidence.ranking import Candidate, gains, projected, promised_change, rank
 from twin.diagnosis.thresholds import STARTS_PER_EFFECT
 from twin.effects import FitStart
 
@@ -56,6 +56,23 @@ def test_a_gain_is_the_fall_of_the_least_squares_less_the_price_of_its_parameter
         expected = fall(columns, own) - len(names) * np.log(N)
         assert gain("base_tilt", names, columns, fitted(ended)) == pytest.approx(expected, rel=1e-6)
     assert fall(two[:, :1], [0]) != pytest.approx(fall(two[:, :1], [0, 1]), rel=1e-3)
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_the_promised_change_is_that_of_the_least_squares(ended: bool) -> None:
+    """z after a fit of the columns less z after one without them; parameters that are held by priors move along. 1e-6 as above."""
+    columns, own = RNG.normal(size=(N, 2)), [0] if ended else [0, 1]
+    start = FitStart({}, ("about_x", "about_y"))
+    known = Dictionary((Pattern("base_tilt", start, ("about_x", "about_y"), (0, 1)),), columns)
+    found = promised_change(OBJECTIVE, fitted(ended), known, Candidate("base_tilt", start, 0.0, 0.0))
+
+    def left(free: np.ndarray) -> np.ndarray:
+        A = np.vstack([free, np.zeros((1, free.shape[1]))])
+        A[-1, 0] = STEP / STD
+        return Z - free @ np.linalg.lstsq(A, np.append(Z, 0.0), rcond=None)[0]
+
+    expected = left(np.column_stack([J[:, own], columns])) - left(J[:, own])
+    np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 def test_beside_a_smooth_error_it_is_the_fall_of_the_weighted_least_squares() -> None:

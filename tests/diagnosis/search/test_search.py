@@ -139,6 +139,23 @@ def test_a_pattern_that_promises_a_quarter_of_what_counts_is_refitted(
     assert (("asymmetry",) in world.refitted) == tried
 
 
+@pytest.mark.parametrize(("beyond", "tried"), [(0.0, False), (0.04, False), (0.1, True)])
+def test_what_is_no_function_of_the_pose_is_refitted_below_the_accuracy_of_the_description(
+    monkeypatch: pytest.MonkeyPatch, beyond: float, tried: bool
+) -> None:
+    """A lag may move the outputs by less than the description is good for; half of 0.13 sigma beyond the pose is promise enough."""
+    world, limits = World(monkeypatch, {"lag": 500.0}), AcceptanceLimits(accuracy=1.0)
+    slow: Any = SimpleNamespace(
+        **vars(STUDY)
+        | {"objective": SimpleNamespace(n=10_000, bends=False), "evidence": SimpleNamespace(beyond_pose=lambda change: change)}
+    )
+    monkeypatch.setattr(stage, "rank", lambda *args, **named: [SimpleNamespace(effect="lag", start=None, gain=0.01 * 10_000)])
+    monkeypatch.setattr(stage, "promised_change", lambda *args: beyond)
+    patterns: Any = SimpleNamespace(beside=lambda effects: SimpleNamespace(patterns=()))
+    search(slow, world.of(), patterns, limits)
+    assert (("lag",) in world.refitted) == tried
+
+
 def test_patterns_are_taken_anew_of_what_promises_anything_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch, {"friction": 500.0, "creep": 300.0, "tilt": 0.0})
     world.found()

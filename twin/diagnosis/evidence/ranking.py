@@ -61,6 +61,15 @@ def rank(
     return sorted(chosen, key=lambda c: -c.gain)
 
 
+def promised_change(objective: Objective, fit: Fit, known: Dictionary, candidate: Candidate) -> np.ndarray:
+    """Return the change of z (n * m,) that a candidate's white pattern promises, the model's own parameters fitted along."""
+    pattern = next(p for p in known.patterns if p.effect == candidate.effect and p.start == candidate.start)
+    C, own = known.columns[:, list(pattern.where)], fit.J[:, ~fit.at_bound()]
+    held = own.T @ own + np.diag(prior_weight(fit.model)[~fit.at_bound()] ** 2) + 1e-9 * np.eye(own.shape[1])
+    left = C - own @ solve(held, own.T @ C)
+    return left @ _amplitudes(C.T @ left, left.T @ fit.z, pattern.least(objective.prepared.n_tendon))
+
+
 def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
     """Return X' V^-1 X less what the model's own parameters, held by their priors, can imitate; X = [J, ...], VX = V^-1 X.
 

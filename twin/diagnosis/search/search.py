@@ -10,7 +10,7 @@ import numpy as np
 
 from twin.diagnosis.evidence.first_order import Dictionary, dictionary
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
-from twin.diagnosis.evidence.ranking import rank
+from twin.diagnosis.evidence.ranking import Candidate, promised_change, rank
 from twin.diagnosis.evidence.scored_model import (
     EffectForms,
     ScoredModel,
@@ -62,7 +62,7 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
             # Patterns depend little on what is already fitted (gains by some per cent). Only the leading set's are computed again,
             # of effects that promise something by the base's patterns; the others use the base's.
             if member is (*beam, *step)[0] and member is not base:
-                least = REUSED_PROMISE_SHARE * _asked(context, base, member, limits)
+                least = REUSED_PROMISE_SHARE * _asked(context, base, member, limits, limits.material)
                 promise = rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
                 lacks = dictionary(context.objective, member.fit, {c.effect for c in promise if c.gain >= least})
             context.progress(f"effects, {level} at once")
@@ -109,7 +109,7 @@ def extend(
 ) -> None:
     """Add to `fresh` `member` with each of the effects whose pattern promises most."""
     for candidate in rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks):
-        if candidate.gain < _asked(context, base, member, limits):
+        if not _worth_a_fit(context, base, member, lacks, limits, candidate):
             continue
         name = " + ".join((*member.effects, candidate.effect))
         if not context.budget.allows(name):
@@ -127,9 +127,25 @@ def _leaves(context: FitContext, base: ScoredModel, member: ScoredModel) -> floa
     return max(float(member.fit.z @ member.fit.z) - noise, 0.0) / max(float(base.fit.z @ base.fit.z) - noise, 1.0)
 
 
-def _asked(context: FitContext, base: ScoredModel, member: ScoredModel, limits: AcceptanceLimits) -> float:
-    """Return the gain that an effect's pattern must promise beside `member` to be fitted there."""
-    return PROMISED_SHARE * max(limits.accept, _material(context, base, member, limits.visible))
+def _worth_a_fit(
+    context: FitContext, base: ScoredModel, member: ScoredModel, lacks: Dictionary, limits: AcceptanceLimits, candidate: Candidate
+) -> bool:
+    """Return whether a candidate's pattern promises enough, as the gate will ask of the fitted effect.
+
+    Less than the description's accuracy is enough where it is no function of the pose, as of a lag or of friction.
+    """
+    if candidate.gain >= _asked(context, base, member, limits, limits.visible):
+        return True
+    least = _asked(context, base, member, limits, limits.material)
+    if candidate.gain < least:
+        return False
+    change = promised_change(context.objective, member.fit, lacks, candidate)
+    return context.objective.n * context.evidence.beyond_pose(change) ** 2 >= least
+
+
+def _asked(context: FitContext, base: ScoredModel, member: ScoredModel, limits: AcceptanceLimits, size: float) -> float:
+    """Return the gain that a pattern must promise beside `member`, of an effect that must move the outputs by `size` sigmas."""
+    return PROMISED_SHARE * max(limits.accept, _material(context, base, member, size))
 
 
 def _material(context: FitContext, base: ScoredModel, member: ScoredModel, limit: float) -> float:
