@@ -57,8 +57,8 @@ def late_by(predicted: list[Signals]) -> float:
 
     A body that moves by itself answers a tenth of a second with errors that no derivative leads back from.
     """
-    first = predicted[0]
-    return min(0.1, float(np.median(np.diff(first.time)))) if first.driven_by_control.any() and len(first.time) > 1 else 0.1
+    rows = [np.diff(s.time) for s in predicted if s.driven_by_control.any() and len(s.time) > 1]
+    return min([0.1, *(float(np.median(gaps)) for gaps in rows)])
 
 
 def damped(command: Signals, time: float) -> Signals:
