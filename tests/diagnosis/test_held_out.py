@@ -88,6 +88,17 @@ def test_a_sealed_trial_without_equilibrium_is_named_and_counts_for_no_stage(ope
     assert opened.error(lambda c: c.base) == pytest.approx(1e-3)
 
 
+def test_a_trial_off_by_more_than_noise_and_the_description_is_missed(opened: HeldOut) -> None:
+    """1 mm in x with a floor of 0.4 mm; a description good for 0.25 mm a coordinate allows 2 hypot(0.4, 0.43) = 1.2 mm."""
+
+    def missed(accuracy: float) -> list[tuple[int, str]]:
+        declared = replace(opened.prepared, robot=replace(opened.prepared.robot, accuracy=accuracy))
+        return [(m.trial, m.group) for m in replace(opened, prepared=declared).errors(0).missed]
+
+    assert missed(0.0) == [(1, "marker")]
+    assert missed(0.25e-3) == []
+
+
 def test_only_sealed_trials_are_opened(opened: HeldOut) -> None:
     assert opened.trials == [1, 3]
     assert [k for k, y in enumerate(opened.prepared.measured) if np.isfinite(y).any()] == [1, 3]

@@ -11,7 +11,7 @@ from tests.diagnosis.checks.test_design import bench
 from tools.simulators.rod.design import bench_day
 from twin.diagnosis.split import split
 from twin.measurements import Channel, Recording, Trial
-from twin.prediction.prepared import PreparedRecording, prepare
+from twin.prediction.prepared import Inputs, PreparedRecording, prepare
 from twin.robots import load
 
 
@@ -95,13 +95,28 @@ def sealed_of(bench: PreparedRecording) -> set[int]:
 
 
 def test_the_only_hold_and_the_only_end_of_a_range_are_not_sealed_and_an_end_that_two_show_is() -> None:
-    """The commands span 2 N, a tenth of which is 0.2 N."""
+    """A load cell tells 10 mN, so that 4.000 and 3.999 N are one end of the range and 4.0 and 3.9 N are not."""
     alike = [2.0] * 6
     assert sealed_of(pulls([2.0, 2.0, *alike])) == set(range(8))
     assert sealed_of(pulls([2.0, 2.0, *alike], resting=0)) == set(range(1, 8))
     assert sealed_of(pulls([2.0, 2.0, *alike], nudged=((0, 2), (0, 3), (1, 2), (2, 3)))) == set(range(8)), "a nudge is no motion"
-    assert sealed_of(pulls([4.0, 3.85, *alike])) == set(range(8))
-    assert sealed_of(pulls([4.0, 3.75, *alike])) == set(range(1, 8))
+    assert sealed_of(pulls([4.0, 3.999, *alike])) == set(range(8))
+    assert sealed_of(pulls([4.0, 3.9, *alike])) == set(range(1, 8))
+
+
+def test_the_trial_that_turns_a_motor_furthest_either_way_is_fitted() -> None:
+    """Eight trials turn a motor to and fro about its home, alike but for one that goes further forth and one further back: what
+    begins there, a stop or a slack tendon, shows in no other. The one that goes back least is no end."""
+    far = pulls([2.0] * 8)
+
+    def turned(k: int, low: float, high: float) -> Inputs:
+        command = far.inputs[k].command.copy()
+        command[:, 0] = np.where(np.arange(len(command)) % 2, high, low)
+        return replace(far.inputs[k], command=command, home=np.zeros(3), reach=np.full(3, 2.0))
+
+    ways = [(-1.5, 1.6), (-1.7, 1.5), (-1.4, 1.5), *[(-1.5, 1.5)] * 5]
+    bench = replace(far, inputs=tuple(turned(k, *way) for k, way in enumerate(ways)))
+    assert sealed_of(bench) == set(range(2, 8))
 
 
 @pytest.mark.parametrize(

@@ -46,12 +46,22 @@ class Claim:
 
 
 @dataclass(frozen=True)
+class Missed:
+    """A held-out trial that the final twin misses, by the outputs that show it most: its RMS error and the noise floor, SI."""
+
+    trial: int
+    group: str
+    error: float
+    floor: float
+
+
+@dataclass(frozen=True)
 class Errors:
     """RMS errors on the held-out trials, SI, by group of outputs (points: Euclidean per point).
 
     `ci_*`: confidence intervals over trials. `without_physics`: error of a polynomial of the inputs (`predict_by_polynomial`).
     `lost`: held-out trials for which one of the three twins has no equilibrium; they are left out of every error. `spikes`: samples
-    left out of the other trials, in words.
+    left out of the other trials, in words. `missed`: trials that noise and the description do not explain.
     """
 
     nominal: dict[str, float]
@@ -63,6 +73,7 @@ class Errors:
     without_physics: dict[str, float] = field(default_factory=dict)
     lost: tuple[int, ...] = ()
     spikes: tuple[str, ...] = ()
+    missed: tuple[Missed, ...] = ()
 
     @property
     def improved(self) -> bool:

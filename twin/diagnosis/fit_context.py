@@ -66,13 +66,7 @@ class FitContext:
     @property
     def accuracy(self) -> np.ndarray:
         """The declared accuracy of the description (m,), in sigmas of each output; zero where none is declared."""
-        robot, outputs = self.prepared.robot, self.prepared.outputs
-        stated = np.array([robot.accuracy if OUTPUT_GROUPS[o.group].has_declared_accuracy else 0.0 for o in outputs])
-        values = {p.name: p.value for p in robot.parameters}
-        if (strain := values.get("sensors.accuracy", 0.0)) > 0.0:  # dR = 2 R0 d(strain), kappa being about 1
-            rest = parameter_array(values, "sensors.resistance", int(str(robot.structure["sensors"])))
-            stated += [2.0 * rest[o.index] * strain if o.group == "sensor" else 0.0 for o in outputs]
-        return stated / self.objective.whitener.noise.sigma
+        return stated_accuracy(self.prepared) / self.objective.whitener.noise.sigma
 
     @property
     def excused(self) -> np.ndarray:
@@ -91,3 +85,14 @@ class FitContext:
     @property
     def trials(self) -> list[int]:
         return self.objective.trials
+
+
+def stated_accuracy(prepared: PreparedRecording) -> np.ndarray:
+    """Return the declared accuracy of the description for each output (m,), SI; zero where none is declared."""
+    robot, outputs = prepared.robot, prepared.outputs
+    stated = np.array([robot.accuracy if OUTPUT_GROUPS[o.group].has_declared_accuracy else 0.0 for o in outputs])
+    values = {p.name: p.value for p in robot.parameters}
+    if (strain := values.get("sensors.accuracy", 0.0)) > 0.0:  # dR = 2 R0 d(strain), kappa being about 1
+        rest = parameter_array(values, "sensors.resistance", int(str(robot.structure["sensors"])))
+        stated += [2.0 * rest[o.index] * strain if o.group == "sensor" else 0.0 for o in outputs]
+    return stated

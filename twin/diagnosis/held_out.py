@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +11,11 @@ from twin.diagnosis.calibration.first_calibration import sensitivity
 from twin.diagnosis.checks.spikes import without_spikes
 from twin.diagnosis.checks.zero_jumps import rezeroed
 from twin.diagnosis.conclusion import Conclusion
-from twin.diagnosis.diagnosis import Errors
+from twin.diagnosis.diagnosis import Errors, Missed
 from twin.diagnosis.evidence.polynomial import predict_by_polynomial
+from twin.diagnosis.fit_context import stated_accuracy
 from twin.diagnosis.split import blind
+from twin.diagnosis.thresholds import MISSED_TRIAL_RATIO
 from twin.foundation.errors import SolveError
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms, squared_errors
 from twin.prediction.prepared import PreparedRecording
@@ -95,10 +97,25 @@ class HeldOut:
         raw = {s: [self.prepared.measured[k] - at[k] for k in kept] for s, at in stages.items()}
         error = {s: {g: rms(self.prepared, r, g) if kept else float("nan") for g in groups} for s, r in raw.items()}
         ci = {s: {g: interval(squared_errors(self.prepared, raw[s], g), seed) for g in groups} for s in ("calibrated", "after")}
+        floor = self._floor(kept, groups)
         return Errors(
-            error["nominal"], error["calibrated"], error["after"], self._floor(kept, groups), ci["calibrated"], ci["after"],
-            self._without_physics(kept, groups), tuple(lost), self.spikes,
+            error["nominal"], error["calibrated"], error["after"], floor, ci["calibrated"], ci["after"],
+            self._without_physics(kept, groups), tuple(lost), self.spikes, tuple(self._missed(kept, raw["after"], floor)),
         )  # fmt: skip
+
+    def _missed(self, kept: Sequence[int], raw: Sequence[np.ndarray], floor: Mapping[str, float]) -> Iterator[Missed]:
+        """Yield the trials that are missed, each with the outputs that show it most.
+
+        That is by more than `MISSED_TRIAL_RATIO` times the noise floor and the declared accuracy of the description together.
+        """
+        stated = stated_accuracy(self.prepared)
+        excused = {g: rms(self.prepared, [stated[None, :]], g) for g in floor}
+        for k, r in zip(kept, raw, strict=True):
+            off = {g: rms(self.prepared, [r], g) for g in floor}
+            far = [g for g in floor if off[g] > MISSED_TRIAL_RATIO * np.hypot(floor[g], excused[g]) > 0.0]
+            if far:
+                most = max(far, key=lambda g: off[g] / floor[g])
+                yield Missed(k, most, off[most], floor[most])
 
     def _without_physics(self, kept: Sequence[int], groups: Sequence[str]) -> dict[str, float]:
         """Return the RMS error by group of a polynomial of the inputs, fitted to the trials of each conclusion."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.diagnosis.checks.design import longest_rest, pulled, rates
 from twin.diagnosis.noise.estimate import repeats
-from twin.diagnosis.thresholds import HELD_OUT_SHARE, RANGE_END_SHARE, SAME_RATE_RATIO, SHORTEST_HOLD
+from twin.diagnosis.thresholds import HELD_OUT_SHARE, SAME_RATE_RATIO, SHORTEST_HOLD
 from twin.prediction.prepared import PreparedRecording
 
 LOAD_CONDITIONS = ("payload", "mount", "force")
@@ -19,7 +19,7 @@ def split(prepared: PreparedRecording, seed: int) -> tuple[list[int], list[int]]
 
     About a quarter is held out. A trial is held out last if it alone among the fitted ones shows a condition (a payload, a mount, a
     kind of motion, an end of a range) or repeats another, since repeats show the noise. Losing a load counts more than losing a
-    repeat.
+    repeat. What begins at an end of a range, as a stop, a slack tendon or a saturated motor, shows nowhere else.
     """
     n = len(prepared.inputs)
     shown = list(_conditions(prepared))
@@ -41,30 +41,29 @@ def blind(prepared: PreparedRecording, trials: Sequence[int]) -> PreparedRecordi
 
 def _conditions(prepared: PreparedRecording) -> Iterator[set[tuple[Hashable, ...]]]:
     """Yield the conditions that each trial shows, by its inputs and loads only."""
-    tops = np.array([np.abs(i.pull).max(axis=0) for i in prepared.inputs])
-    ranges = {
-        "command": tops,
-        "torque": np.array([[np.mean(i.loads.torque)] for i in prepared.inputs]),
-        "temperature": np.array([[i.temperature.mean()] for i in prepared.inputs]),
+    top = max(float(np.abs(i.pull).max()) for i in prepared.inputs)
+    told, one = prepared.pull_resolution, np.zeros(1)
+    ends = {
+        "most": (np.array([i.pull.max(axis=0) for i in prepared.inputs]), told),
+        "least": (-np.array([i.pull.min(axis=0) for i in prepared.inputs]), told),
+        "most torque": (np.array([[np.mean(i.loads.torque)] for i in prepared.inputs]), one),
+        "least torque": (-np.array([[np.mean(i.loads.torque)] for i in prepared.inputs]), one),
+        "warmest": (np.array([[i.temperature.mean()] for i in prepared.inputs]), one),
+        "coldest": (-np.array([[i.temperature.mean()] for i in prepared.inputs]), one),
     }
     for k, i in enumerate(prepared.inputs):
-        moved = pulled(i, float(tops.max()))
+        moved = pulled(i, top)
         shown: set[tuple[Hashable, ...]] = {
             ("payload", round(i.loads.hung, 6)),
             ("mount", *np.round(i.loads.gravity, 3)),
             ("force", *np.round(i.loads.force, 3)),
             ("together", *moved),
             *(("pull of", t) for t in moved),
-            *(("pace", round(float(np.log(r) / np.log(SAME_RATE_RATIO)))) for r in rates(i, float(tops.max()))),
+            *(("pace", round(float(np.log(r) / np.log(SAME_RATE_RATIO)))) for r in rates(i, top)),
         }
-        if longest_rest(i, float(tops.max())) >= SHORTEST_HOLD:
+        if longest_rest(i, top) >= SHORTEST_HOLD:
             shown.add(("hold",))
-        for name, values in ranges.items():
-            span = np.ptp(values, axis=0)
-            shown |= {
-                ("most", name, c) for c in np.flatnonzero(values[k] >= values.max(axis=0) - RANGE_END_SHARE * span) if span[c] > 0
-            }
-            shown |= {
-                ("least", name, c) for c in np.flatnonzero(values[k] <= values.min(axis=0) + RANGE_END_SHARE * span) if span[c] > 0
-            }
+        for name, (values, alike) in ends.items():
+            reaches = (values[k] >= values.max(axis=0) - alike) & (np.ptp(values, axis=0) > alike)
+            shown |= {(name, c) for c in np.flatnonzero(reaches)}
         yield shown

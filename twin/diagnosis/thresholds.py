@@ -54,8 +54,8 @@ HELD_OUT_SHARE = _row("HELD_OUT_SHARE", 0.25, "of the trials",
 FEWEST_TRIALS_FOR_HELD_OUT = _row("FEWEST_TRIALS_FOR_HELD_OUT", 6, "trials",
     "with fewer, one or two held-out trials show little and the fit needs all: each is held out in turn",
     "derivation: the RMS of m alike trials scatters by 1 / sqrt(2 m) of its spread from trial to trial; m = 1 below six")
-RANGE_END_SHARE = _row("RANGE_END_SHARE", 0.1, "of a range",
-    "of a commanded range: the only trial this close to one of its ends is kept for the fit", "judgement")
+LOAD_LEVEL_GAP = _row("LOAD_LEVEL_GAP", 0.1, "of a range",
+    "of the loads shown: loads no further apart are one level, left out at once", "judgement")
 SAME_RATE_RATIO = _row("SAME_RATE_RATIO", 10.0**0.5, "ratio",
     "pulls whose rates differ by more are different motions to a body that relaxes",
     "derivation: half of the decade that two rates should span (TWO_RATES_RATIO)")
@@ -285,6 +285,8 @@ FRICTION_NOISE_DRAWS = _row("FRICTION_NOISE_DRAWS", 12, "draws", "of noise under
 
 # ---- judge -------------------------------------------------------------------------------------------------------------------
 
+MISSED_TRIAL_RATIO = _row("MISSED_TRIAL_RATIO", 2.0, "ratio", "to the noise floor: a held-out trial off by more is missed",
+    "derivation: the RMS of ten rows of noise alone stays below it with 99.998 %")
 LEFTOVER_SHARE = _row("LEFTOVER_SHARE", 0.15, "of the structure before",
     "less left over may be an error of a right effect's equation", ATTRIBUTION_BENCHMARK)
 LARGE_STRUCTURE = _row("LARGE_STRUCTURE", 0.45, "sigma", "structure that counts whatever was there before", ATTRIBUTION_BENCHMARK)

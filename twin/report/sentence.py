@@ -12,7 +12,6 @@ from twin.report.numbers import DISPLAY_UNITS, decimals_for_digits, format_numbe
 
 MOST_NAMES = 3  # parameters of an effect, or untried sets, named in a sentence
 CERTAIN_PROBABILITY = 0.9  # below it, the rivals of a single claim are named beside it
-MISSED_TRIAL_RATIO = 2.0  # times the noise floor; noise alone stays below it in a trial of ten rows
 
 
 def headline_group(diagnosis: Diagnosis) -> str:
@@ -124,6 +123,8 @@ def describe_verdict(diagnosis: Diagnosis) -> str:
         start = (
             "No missing effect: after calibration only noise is left."
             if d.verdict == "noise"
+            else "Unexplained: after calibration only noise is left of the fitted trials."
+            if d.errors.missed and d.structure_before <= d.limits.left
             else f"Unexplained: after calibration a structured error of {d.structure_before:.2f} sigma is left that no "
             f"{'effect tried' if d.untried else 'known effect'} explains; it varies mostly with {left}."
         )
@@ -171,27 +172,7 @@ def describe_errors(diagnosis: Diagnosis) -> str:
         words += (
             f" The twin has no equilibrium for held-out {labels}, so the errors leave {'it' if len(e.lost) == 1 else 'them'} out."
         )
-    return words + _describe_missed_trials(d) + _describe_stability(d)
-
-
-def _describe_missed_trials(d: Diagnosis) -> str:
-    """List held-out trials off by more than `MISSED_TRIAL_RATIO` noise floors, where the fitted trials seem explained.
-
-    Each is listed with the kind of output that shows it most.
-    """
-    found = []
-    for k in d.held_out_trials if d.verdict in ("explained", "noise") else ():
-        left = {g: evaluate.rms(d.prepared, [d.prepared.measured[k] - d.predictions["after"][k]], g) for g in output_groups(d)}
-        missed = {g: left[g] / floor for g, floor in d.errors.floor.items() if left[g] > MISSED_TRIAL_RATIO * floor > 0.0}
-        if missed:
-            most = max(missed, key=lambda g: missed[g])
-            unit, factor = DISPLAY_UNITS[most]
-            off, floor = factor * left[most], factor * d.errors.floor[most]
-            label, kind = trial_labels(d, (k,))[0], display_name(OUTPUT_GROUPS[most].kind)
-            found.append(f"{label} by {off:.2g} {unit} in {kind} (noise floor {floor:.2g} {unit})")
-    if not found:
-        return ""
-    return f" But it misses held-out {', '.join(found)}: the fitted trials do not show everything that happens there."
+    return words + _describe_stability(d)
 
 
 def _describe_other_outputs(d: Diagnosis) -> str:

@@ -14,7 +14,7 @@ from twin.diagnosis.evidence.half_session import halves
 from twin.diagnosis.evidence.left_out import left_out
 from twin.diagnosis.evidence.scored_model import ScoredModel
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import FEWEST_TRIALS_TO_HALVE, RANGE_END_SHARE, SAME_RATE_RATIO, WORSE_ERROR_RATIO
+from twin.diagnosis.thresholds import FEWEST_TRIALS_TO_HALVE, LOAD_LEVEL_GAP, SAME_RATE_RATIO, WORSE_ERROR_RATIO
 from twin.diagnosis.verdict.gate import Gated
 from twin.foundation.display_names import display_name
 from twin.prediction.prepared import PreparedRecording
@@ -81,7 +81,7 @@ def levels(prepared: PreparedRecording, trials: Sequence[int]) -> dict[str, list
         "torque": np.array([np.mean(i.loads.torque) for i in inputs]),
         "rate": np.log(np.maximum(speed, 1e-12)) / np.log(SAME_RATE_RATIO),
     }
-    found = {name: _apart(v, 1.0 if name == "rate" else RANGE_END_SHARE * np.ptp(v)) for name, v in values.items()}
+    found = {name: _apart(v, 1.0 if name == "rate" else LOAD_LEVEL_GAP * np.ptp(v)) for name, v in values.items()}
     mounts = [tuple(np.round(i.loads.gravity, 3)) for i in inputs]
     found["mount"] = [[k for k, m in enumerate(mounts) if m == each] for each in dict.fromkeys(mounts)]
     return {NAMED_CONDITIONS[name]: groups for name, groups in found.items() if len(groups) > 2 and max(map(len, groups)) > 1}
