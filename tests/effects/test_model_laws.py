@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -41,3 +42,22 @@ def test_a_limit_narrows_what_the_model_allows_and_leaves_the_others() -> None:
     np.testing.assert_array_equal(body.model.actuator_forcerange[1], plain.model.actuator_forcerange[1])
     law({"limit_2": NO_LIMIT}, LEG.n_tendon).edit(plain)
     np.testing.assert_array_equal(plain.model.actuator_forcerange, LEG.build().model.actuator_forcerange)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("values", [{"stiffness_hip": 0.3, "preload_hip": -0.2}, {"preload_hip": 0.1}, {"stiffness_hip": 0.3}])
+def test_a_spring_more_pushes_by_its_preload_less_its_stiffness_times_the_angle(values: dict[str, float]) -> None:
+    """MuJoCo's own passive torque at four angles. A push without stiffness is that of a spring 1,000 rad away: a thousandth off."""
+    plain, body = LEG.build(), LEG.build()
+    assert isinstance(plain, ModelBody)
+    assert isinstance(body, ModelBody)
+    catalogue()["joint_stiffness"](values, LEG.n_tendon).edit(body)
+    k, push = (values.get(f"{name}_hip", 0.0) for name in ("stiffness", "preload"))
+    hip = plain.model.joint("hip")
+    for angle in (-1.0, 0.0, 0.3, 1.0):
+        torque = []
+        for model in (plain.model, body.model):
+            data = mujoco.MjData(model)
+            data.qpos[hip.qposadr[0]] = model.qpos0[hip.qposadr[0]] + angle
+            mujoco.mj_forward(model, data)
+            torque.append(data.qfrc_passive[hip.dofadr[0]])
+        assert torque[1] - torque[0] == pytest.approx(push - k * angle, abs=1.01e-3 * abs(push * angle) * (k == 0.0) + 1e-12)

@@ -41,7 +41,7 @@ EFFECTS: dict[str, tuple[str, Mapping[str, float]]] = {
     "encoder_offset": ("encoder_offset", {"offset_hip": 0.03}),
     "joint_friction": ("joint_friction", {"torque_hip": 0.05, "torque_knee": 0.01}),
     "joint_friction, all its law": ("joint_friction", {"torque_hip": 0.05, "breakaway": 0.5, "viscous": 0.3}),
-    "joint_stiffness": ("joint_stiffness", {"stiffness_hip": 0.3, "stiffness_knee": 0.1}),
+    "joint_stiffness": ("joint_stiffness", {"stiffness_hip": 0.3, "preload_hip": -0.1, "preload_knee": 0.05}),
     "joint_stop": ("joint_stop", {"upper_hip": 0.1, "lower_knee": 0.2}),
     "load_dependent_friction": ("load_dependent_friction", {"share": 0.1}),
     "reflected_inertia": ("reflected_inertia", {"inertia_hip": 0.003}),

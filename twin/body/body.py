@@ -162,8 +162,11 @@ class Body:
         """Keep the joints between stops (n_joint,) rad or m, hard ones, where these are nearer than their own."""
         raise self._unchangeable("joints")
 
-    def add_joint_stiffness(self, stiffness: np.ndarray) -> None:
-        """Add springs of stiffness (n_joint,) N m/rad or N/m to the joints, at rest where the model's own joint is."""
+    def add_joint_springs(self, stiffness: np.ndarray, preload: np.ndarray) -> None:
+        """Add springs to the joints.
+
+        Of `stiffness` (n_joint,) N m/rad or N/m, that push with `preload` (n_joint,) N m or N in the model's reference pose.
+        """
         raise self._unchangeable("joints")
 
     def scale_actuators(self, share: np.ndarray) -> None:

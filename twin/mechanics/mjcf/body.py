@@ -19,6 +19,9 @@ from twin.mechanics.mjcf.routes import outward
 
 LINE_LAG = 9  # of an actuator's dynprm, all of which MuJoCo leaves alone where it has no dynamics: s, `line_lag`
 LEAST_TRAVEL = 1e-4  # rad or m between a joint's stops
+FARTHEST_REST = (
+    1e3  # rad or m from the reference pose: a spring at rest there pushes with a constant torque, to some tenths of a per cent
+)
 HARD_STOP = ((0.004, 1.0), (0.99, 0.999, 1e-4, 0.5, 2.0))  # solref, solimp: without bounce, milliradians soft under a light link
 SPRING_SWING = 0.5  # rad (or a tenth of that in m): the deflection of a spring that gives a joint its scale of torque
 # group of signals of what turns, of what slides or pulls, and their SI units
@@ -138,13 +141,13 @@ class ModelBody(Body):
         for joint, more in zip(self.joints, inertia, strict=True):
             self.model.dof_armature[self.model.jnt_dofadr[joint]] += more
 
-    def add_joint_stiffness(self, stiffness: np.ndarray) -> None:
+    def add_joint_springs(self, stiffness: np.ndarray, preload: np.ndarray) -> None:
         model = self.model
-        for joint, more in zip(self.joints, stiffness, strict=True):
+        for joint, more, push in zip(self.joints, stiffness, preload, strict=True):
             at, own = model.jnt_qposadr[joint], float(model.jnt_stiffness[joint])
-            total = own + more
+            total = max(own + more, abs(push) / FARTHEST_REST)
             if total > 0.0:
-                model.qpos_spring[at] = (own * model.qpos_spring[at] + more * model.qpos0[at]) / total
+                model.qpos_spring[at] = (own * model.qpos_spring[at] + (total - own) * model.qpos0[at] + push) / total
                 model.jnt_stiffness[joint] = total
 
     def limit_joints(self, lower: np.ndarray, upper: np.ndarray) -> None:
