@@ -54,14 +54,14 @@ def fills(case: Case) -> Iterator[Suspicion]:
 
 
 def _sent_away(case: Case, drive: int, s: Series, trials: Sequence[Series]) -> list[int]:
-    """Return the runs of a drive's trial that go off and back, to a value that stands in several rows, where the robot does not."""
+    """Return the runs of a drive's trial at a value that stands in several rows, off its course, to which the robot does not go."""
     whole = np.concatenate([t.read[:, 0] for t in trials])
     often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 2]
     value = s.read[s.runs[:, 0], 0]
-    far = np.flatnonzero((s.apart > SPIKE_SIZE * _typical(trials)) & np.isin(value, often))
     if case.predicted is None:
-        others = [whole[np.isfinite(whole) & (whole != value[r])] for r in far]
-        return [int(r) for r, o in zip(far, others, strict=True) if 0.0 < float(np.ptp(o)) < s.apart[r]]
+        away = [(r, whole[np.isfinite(whole) & (whole != value[r])]) for r in np.flatnonzero(np.isin(value, often))]
+        return [int(r) for r, others in away if 0.0 < float(np.ptp(others)) < s.apart[r]]
+    far = np.flatnonzero((s.off_course > SPIKE_SIZE * _typical(trials)) & np.isin(value, often))
     found = []
     for of_value in [far[value[far] == v] for v in np.unique(value[far])]:
         none = no_readings(case, drive, s.trial, [(int(a), int(b)) for a, b in s.runs[of_value]])
@@ -107,9 +107,9 @@ def _filled(case: Case, name: str, trials: Sequence[Series], away: Sequence[tupl
 
 
 def _typical(trials: Sequence[Series]) -> float:
-    """Return how far the error of a reading usually is from the line between its neighbours."""
+    """Return how far the error of a reading usually is from the line between its neighbours; of a command, where it is not held."""
     off = np.concatenate([np.linalg.norm(np.diff(s.left, n=2, axis=0), axis=1) / np.sqrt(6.0) for s in trials])
-    off = off[np.isfinite(off)]
+    off = off[np.isfinite(off) & ((off > 0.0) | (not trials[0].drives))]
     return max(trials[0].noise, float(np.median(off)) if off.size else 0.0)
 
 
@@ -120,11 +120,10 @@ def stuck(case: Case) -> Iterator[Suspicion]:
     drives = of_drives(case)
     for name, trials in (of_outputs(case) | drives).items():
         rows: Rows = defaultdict(list)
-        equal, readings = _equal(trials), sum(len(s.time) for s in trials)
         command = trials[0].drives and not _scatters(trials)
         for s in trials:
             for a, b in s.runs[np.ptp(s.runs, axis=1) > 2].tolist():
-                usual = not _goes_on(s, a, b) if command else _by_chance(b - a - 1, equal, readings) >= CHANCE_OF_REPEATS
+                usual = not _goes_on(s, a, b) if command else _by_chance(b - a - 1, *_moving(trials, s, a, b)) >= CHANCE_OF_REPEATS
                 if usual:
                     continue
                 if no_readings(case, list(drives).index(name), s.trial, [(a + 1, b)]) if s.drives else _held(s, a, b):
@@ -180,6 +179,22 @@ def _equal(trials: Sequence[Series]) -> float:
     """Return how often a reading equals the one before."""
     readings, runs = (sum(f(s) for s in trials) for f in (lambda s: int(np.ptp(s.runs, axis=1).sum()), lambda s: len(s.runs)))
     return (1 + readings - runs) / max(readings, 2)
+
+
+def _moving(trials: Sequence[Series], of: Series, a: int, b: int) -> tuple[float, int]:
+    """Return how often a reading equals the one before where the robot as described moves as in rows a to b, and how many do so.
+
+    A robot at rest repeats its readings, to the last digit of a coarse encoder; that is no measure of chance while it moves. Rows a
+    to b themselves do not count. Without a prediction every reading does.
+    """
+    if not np.isfinite(of.shown[a:b]).all():
+        return _equal(trials), sum(len(s.time) for s in trials)
+    pace = np.median(np.linalg.norm(np.diff(of.shown[a:b], axis=0), axis=1))
+    there = {s.trial: np.linalg.norm(np.diff(s.shown, axis=0), axis=1) >= pace for s in trials}
+    there[of.trial][a : b - 1] = False
+    readings = sum(int(t.sum()) for t in there.values())
+    alike = sum(int((np.diff(s.read, axis=0)[there[s.trial]] == 0.0).all(axis=1).sum()) for s in trials)
+    return (1 + alike) / max(readings, 2), readings
 
 
 def _by_chance(repeats: int, equal: float, readings: int) -> float:
