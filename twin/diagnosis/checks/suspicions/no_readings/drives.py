@@ -23,6 +23,10 @@ def no_readings(case: Case, drive: int, trial: int, runs: Sequence[tuple[int, in
     """Return which of these runs of rows, in order, of a drive the outputs of a trial do not answer to."""
     if case.predicted is None:
         return []
+    as_is = _Answer.of(case, trial, case.predicted[trial])
+    runs = [(a, b) for a, b in runs if as_is.astray(a, b + max(b - a, SPIKE_WINDOW))]
+    if not runs:
+        return []
     inputs, empty = case.prepared.inputs[trial], np.zeros(len(case.prepared.inputs[trial].time), bool)
     for a, b in runs:
         empty[a:b] = True
@@ -57,20 +61,30 @@ class _Answer:
         assert case.predicted is not None
         return cls((read - without[:, columns]) / noise, (case.predicted[trial] - without)[:, columns] / noise)
 
+    def astray(self, first: int, end: int) -> bool:
+        """Return whether the outputs leave the prediction by what cannot be missed in rows `first` to `end`: else all is well."""
+        off = self._since(first, end)
+        most = float(np.linalg.norm(np.nan_to_num(off), axis=1).max(initial=0.0))
+        return most > UNMISSABLE_MOTION * np.sqrt(max(1, np.isfinite(off).any(axis=0).sum()))
+
+    def _since(self, first: int, end: int) -> np.ndarray:
+        """Return what is left (n, m) in rows `first` to `end` less the mean of the rows just before, of outputs read there."""
+        beside = self.left[max(0, first - SPIKE_WINDOW) : first]
+        known = np.isfinite(beside).any(axis=0)
+        return np.where(known, self.left[first:end] - np.nanmean(np.where(known, beside, 0.0), axis=0), np.nan)
+
     def closer(self, first: int, end: int) -> bool:
         """Return whether, in rows `first` to `end`, the outputs do not show what the cells do to the prediction.
 
         What the description is wrong about just before is taken off. Rows count in which the cells do a quarter of the most that
         they do: in others the description's own errors are as large.
         """
-        beside = self.left[max(0, first - SPIKE_WINDOW) : first]
-        known = np.isfinite(beside).any(axis=0)
-        without = self.left[first:end][:, known] - np.nanmean(beside[:, known], axis=0)
+        without = self._since(first, end)
         there = np.isfinite(without)
-        without, change = np.where(there, without, 0.0), np.where(there, self.change[first:end][:, known], 0.0)
+        without, change = np.where(there, without, 0.0), np.where(there, self.change[first:end], 0.0)
         size = np.linalg.norm(change, axis=1)
         most = float(size.max(initial=0.0))
-        if not most > UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())):
+        if not most > UNMISSABLE_MOTION * np.sqrt(max(1, there.any(axis=0).sum())):
             return False
         acts = size > SHARED_MOTION_SHARE * most
         return bool(np.linalg.norm(without[acts]) < LEFT_BY_FILE_CHANGE * np.linalg.norm((without - change)[acts]))

@@ -61,7 +61,7 @@ def _sent_away(case: Case, drive: int, s: Series, trials: Sequence[Series]) -> l
     if case.predicted is None:
         away = [(r, whole[np.isfinite(whole) & (whole != value[r])]) for r in np.flatnonzero(np.isin(value, often))]
         return [int(r) for r, others in away if 0.0 < float(np.ptp(others)) < s.apart[r]]
-    far = np.flatnonzero((s.off_course > SPIKE_SIZE * _typical(trials)) & np.isin(value, often))
+    far = np.flatnonzero((s.off_course > SPIKE_SIZE * _typical([s])) & np.isin(value, often))
     found = []
     for of_value in [far[value[far] == v] for v in np.unique(value[far])]:
         none = no_readings(case, drive, s.trial, [(int(a), int(b)) for a, b in s.runs[of_value]])
@@ -107,9 +107,9 @@ def _filled(case: Case, name: str, trials: Sequence[Series], away: Sequence[tupl
 
 
 def _typical(trials: Sequence[Series]) -> float:
-    """Return how far the error of a reading usually is from the line between its neighbours; of a command, where it is not held."""
+    """Return how far the error of a reading usually is from the line between its neighbours."""
     off = np.concatenate([np.linalg.norm(np.diff(s.left, n=2, axis=0), axis=1) / np.sqrt(6.0) for s in trials])
-    off = off[np.isfinite(off) & ((off > 0.0) | (not trials[0].drives))]
+    off = off[np.isfinite(off)]
     return max(trials[0].noise, float(np.median(off)) if off.size else 0.0)
 
 
@@ -182,14 +182,15 @@ def _equal(trials: Sequence[Series]) -> float:
 
 
 def _moving(trials: Sequence[Series], of: Series, a: int, b: int) -> tuple[float, int]:
-    """Return how often a reading equals the one before where the robot as described moves as in rows a to b, and how many do so.
+    """Return how often a reading equals the one before where the robot as described moves as in rows a to b, and of how many rows.
 
-    A robot at rest repeats its readings, to the last digit of a coarse encoder; that is no measure of chance while it moves. Rows a
-    to b themselves do not count. Without a prediction every reading does.
+    A robot at rest repeats its readings, to the last digit of a coarse encoder; that is no measure of chance while it moves. Rows
+    count in which it goes further than the noise, or as fast as in rows a to b, which do not count themselves. Without a prediction
+    every reading counts.
     """
     if not np.isfinite(of.shown[a:b]).all():
         return _equal(trials), sum(len(s.time) for s in trials)
-    pace = np.median(np.linalg.norm(np.diff(of.shown[a:b], axis=0), axis=1))
+    pace = min(of.noise, float(np.median(np.linalg.norm(np.diff(of.shown[a:b], axis=0), axis=1))))
     there = {s.trial: np.linalg.norm(np.diff(s.shown, axis=0), axis=1) >= pace for s in trials}
     there[of.trial][a : b - 1] = False
     readings = sum(int(t.sum()) for t in there.values())
