@@ -66,7 +66,11 @@ def _sent_away(case: Case, drive: int, s: Series, trials: Sequence[Series]) -> l
     for of_value in [far[value[far] == v] for v in np.unique(value[far])]:
         none = no_readings(case, drive, s.trial, [(int(a), int(b)) for a, b in s.runs[of_value]])
         found += [int(r) for r in of_value if tuple(s.runs[r]) in none]
-    return found
+    kept: list[int] = []
+    for r in sorted(found, key=lambda r: np.ptp(s.runs[r])):  # what a command went away from, and came back to, is a reading
+        if not {r - 1, r + 1} & set(kept):
+            kept.append(r)
+    return kept
 
 
 def _left_by(s: Series, run: int) -> float:
