@@ -222,4 +222,7 @@ def _held(s: Series, a: int, b: int) -> bool:
     if not np.linalg.norm(behind) > UNMISSABLE_MOTION * s.noise:
         return False
     after = b + np.flatnonzero(np.isfinite(left[b:]).all(axis=1))
-    return not after.size or bool(np.linalg.norm(left[after[0]] - left[a]) < LEFT_BY_PATTERN * np.linalg.norm(behind))
+    if not after.size:
+        return True
+    caught_up = left[b - 1] - left[after[0]]  # by more than it was behind where the description's own error grows meanwhile
+    return bool(caught_up @ behind > LEFT_BY_PATTERN * (behind @ behind))
