@@ -1,4 +1,4 @@
-"""Faults of trackers, encoders and loggers planted in good days of a rod, a finger and a joint robot are told before any fit."""
+"""Faults of trackers, encoders and loggers planted in good days of a rod, a finger and two joint robots are told before any fit."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from tools.benchmarks.diagnosis.faults import FAULTS
+from tools.simulators.articulated import day as articulated
+from tools.simulators.articulated.robots import ROBOTS as ARTICULATED
+from tools.simulators.articulated.trials import session
 from tools.simulators.two_link import write_day
 from twin.diagnosis.checks.suspicions import Case, Suspicion
 from twin.diagnosis.checks.suspicions.no_readings import jumps, repeats
@@ -24,10 +27,7 @@ from twin.robots.robot import models_folder
 
 KINDS = (repeats.lost_markers, repeats.fills, repeats.stuck, repeats.frozen, jumps.exchanged, jumps.rolled)
 SAMPLES = {"rod": "continuum/samples/friday", "finger": "finger/samples/drift"}
-NOT_TOLD = {  # what no rule sees: which robot, and why
-    ("finger", "a drive that is stuck"): "a command without noise that stands through a turn and goes back may be meant",
-    ("joint robot", "a reading drops out as 0"): "a joint's angle of 0 is one that it passes through",
-}
+ROBOTS = ("rod", "finger", "joint robot", "leg")  # the leg: an MJCF and logged commands, which it follows late
 KIND = {
     "zeros": "lost markers", "as -1": "filled cells", "as 9999": "filled cells", "stays": "stuck value", "is stuck": "stuck value",
     "names": "swapped labels", "rolls over": "roll-over", "rows that repeat": "frozen rows",
@@ -44,7 +44,17 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         day = read(path)
         travel = [sum(float(np.nanstd(t.values[c.name])) for c in day.outputs()) for t in day.trials]
         write(day.select(sorted(np.argsort(travel)[-6:].tolist())), folder / name)
-    return {name: folder / name for name in found}
+    return {name: folder / name for name in found} | {"leg": leg(folder / "leg")}
+
+
+def leg(folder: Path) -> Path:
+    """Four trials of an articulated leg, of an MJCF of its own, which is driven by commands without noise."""
+    planned = session(ARTICULATED["leg"](), np.random.default_rng([101, 1]))
+    short = tuple(t for t in planned.trials if t.name in ("steps", "fast_hip", "random_1", "hold", "held_steps"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(articulated, "session", lambda *_, **__: replace(planned, trials=short))
+        articulated.make_set(folder, articulated.Recipe("leg", seed=101))
+    return folder / "measured"
 
 
 @cache
@@ -66,16 +76,14 @@ def told(day: Recording) -> list[Suspicion]:
     return [s for kind in KINDS for s in kind(Case(prepare(day, twin.robot), twin, predicted(day.robot, commands)))]
 
 
-@pytest.mark.parametrize("robot", ["rod", "finger", "joint robot"])
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_a_good_day_raises_nothing(robot: str, days: dict[str, Path]) -> None:
     assert told(read(days[robot])) == []
 
 
 @pytest.mark.parametrize("fault", [f for f in FAULTS if not f.startswith("a drive drops out as 9999")])
-@pytest.mark.parametrize("robot", ["rod", "finger", "joint robot"])
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_a_fault_is_refused_or_told(robot: str, fault: str, days: dict[str, Path], tmp_path: Path) -> None:
-    if (robot, fault) in NOT_TOLD:
-        pytest.skip(NOT_TOLD[robot, fault])
     shutil.copytree(days[robot], tmp_path / "set")
     try:
         FAULTS[fault](tmp_path / "set")
@@ -118,3 +126,41 @@ def test_a_command_that_is_held_is_not_stuck(days: dict[str, Path]) -> None:
     seen = {o.channel.name: y for o, y in zip(prepared.outputs, shown[0].T, strict=True)}
     followed = prepare(commanded.with_values([seen], "simulation"), twin.robot)
     assert [s for kind in KINDS for s in kind(Case(followed, twin, shown))] == []
+
+
+def test_a_command_out_of_range_that_a_leg_does_not_follow_is_told(days: dict[str, Path], tmp_path: Path) -> None:
+    """A servo at its limit for two rows moves the leg as described, and the leg did not move."""
+    shutil.copytree(days["leg"], tmp_path / "set")
+    FAULTS["a drive drops out as 9999"](tmp_path / "set")
+    (found,) = told(read(tmp_path / "set"))
+    assert found.kind == "filled cells"
+    assert "exactly 9999 in 4 rows" in found.words
+
+
+def pulsed(day: Recording) -> Recording:
+    """The day with a command that goes to zero for three rows, twice in each trial, as a drop-out would."""
+    name, trials = day.inputs()[0].name, []
+    for t in day.trials:
+        command = t.values[name].copy()
+        for row in (len(command) // 3, 2 * len(command) // 3):
+            command[row : row + 3] = 0.0
+        trials.append(replace(t, values={**t.values, name: command}))
+    return replace(day, trials=tuple(trials))
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_pulses_of_a_command_are_told_where_the_leg_does_not_follow(follows: bool, days: dict[str, Path]) -> None:
+    """The same cells are readings where the outputs, with their noise, show them; else none, and what is beside them is."""
+    day = pulsed(read(days["leg"]))
+    twin = Twin.of(load(day.robot, day.folder))
+    prepared = prepare(day, twin.robot)
+    shown = tuple(t.outputs(twin, prepared) for t in simulate(twin, prepared))
+    rng = np.random.default_rng(0)
+    seen = [
+        {o.channel.name: y + (o.channel.noise or 0.0) * rng.normal(size=len(y)) for o, y in zip(prepared.outputs, p.T, strict=True)}
+        for p in shown
+    ]
+    if follows:
+        prepared = prepare(day.with_values(seen, "simulation"), twin.robot)
+    found = [s for kind in KINDS for s in kind(Case(prepared, twin, shown))]
+    assert [s.words.partition(" in ")[0] for s in found] == ([] if follows else [f"{day.inputs()[0].name}: exactly 0"])

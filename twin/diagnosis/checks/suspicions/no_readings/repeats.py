@@ -8,13 +8,12 @@ import numpy as np
 
 from twin.diagnosis.checks.suspicions.case import Case, Suspicion
 from twin.diagnosis.checks.suspicions.channels import white
+from twin.diagnosis.checks.suspicions.no_readings.drives import no_readings
 from twin.diagnosis.checks.suspicions.no_readings.series import Series, headline, of_drives, of_outputs, where
 from twin.diagnosis.thresholds import (
     CHANCE_OF_REPEATS,
     LEFT_BY_PATTERN,
-    SHARED_MOTION_SHARE,
     SPIKE_SIZE,
-    SPIKE_WINDOW,
     UNMISSABLE_MOTION,
 )
 
@@ -50,17 +49,28 @@ def fills(case: Case) -> Iterator[Suspicion]:
             if not s.at_zero[s.runs[r, 0]] and _left_by(s, r) > far
         ]
         yield from _filled(case, name, trials, away)
-    seen = headline(case)
-    for name, trials in of_drives(case).items():
-        whole = np.concatenate([s.read[:, 0] for s in trials])
-        often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 2]
-        away = []
-        for s in trials:
-            for r in (1 + np.flatnonzero(np.isin(s.read[s.runs[1:-1, 0], 0], often))).tolist():
-                others = whole[np.isfinite(whole) & (whole != s.read[s.runs[r, 0], 0])] if not seen else whole
-                if _unfollowed(seen[s.trial], *s.runs[r]) if seen else 0.0 < float(np.ptp(others)) < s.apart[r]:
-                    away.append((s, r))
-        yield from _filled(case, name, trials, away)
+    for drive, (name, trials) in enumerate(of_drives(case).items()):
+        yield from _filled(case, name, trials, [(s, r) for s in trials for r in _sent_away(case, drive, s, trials)])
+
+
+def _sent_away(case: Case, drive: int, s: Series, trials: Sequence[Series]) -> list[int]:
+    """Return the runs of a drive's trial at a value that stands in several rows, off its course, to which the robot does not go."""
+    whole = np.concatenate([t.read[:, 0] for t in trials])
+    often = [v for v, n in zip(*np.unique(whole[np.isfinite(whole)], return_counts=True), strict=True) if n > 2]
+    value = s.read[s.runs[:, 0], 0]
+    if case.predicted is None:
+        away = [(r, whole[np.isfinite(whole) & (whole != value[r])]) for r in np.flatnonzero(np.isin(value, often))]
+        return [int(r) for r, others in away if 0.0 < float(np.ptp(others)) < s.apart[r]]
+    far = np.flatnonzero((s.off_course > SPIKE_SIZE * _typical([s])) & np.isin(value, often))
+    found = []
+    for of_value in [far[value[far] == v] for v in np.unique(value[far])]:
+        none = no_readings(case, drive, s.trial, [(int(a), int(b)) for a, b in s.runs[of_value]])
+        found += [int(r) for r in of_value if tuple(s.runs[r]) in none]
+    kept: list[int] = []
+    for r in sorted(found, key=lambda r: np.ptp(s.runs[r])):  # what a command went away from, and came back to, is a reading
+        if not {r - 1, r + 1} & set(kept):
+            kept.append(r)
+    return kept
 
 
 def _left_by(s: Series, run: int) -> float:
@@ -107,34 +117,20 @@ def _typical(trials: Sequence[Series]) -> float:
     return max(trials[0].noise, float(np.median(off)) if off.size else 0.0)
 
 
-def _unfollowed(seen: Seen, a: int, b: int) -> bool:
-    """Return whether the robot as described goes a way in rows a to b of a drive that the outputs do not go, then or later."""
-    read, shown, noise = seen
-    left, known = (read - shown) / noise, np.isfinite(read[[a - 1, b]]).all(axis=0) & np.isfinite(read[a:b]).all(axis=0)
-    before, inside, after = left[a - 1, known], left[a:b, known], left[b, known]
-    way = 0.5 * (before + after) - inside.mean(axis=0)
-    if np.linalg.norm(way) <= max(UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())), float(np.linalg.norm(after - before))):
-        return False
-    went, gone = ((v[a:b].mean(axis=0) - 0.5 * (v[a - 1] + v[b]))[known] / noise[known] for v in (shown, read))
-    if gone @ went > LEFT_BY_PATTERN * went @ went:
-        return False
-    late = np.nan_to_num(left[b : 2 * b - a + SPIKE_WINDOW, known] - before) @ way
-    return bool(went @ way > LEFT_BY_PATTERN * way @ way and np.all(late < SHARED_MOTION_SHARE * way @ way))
-
-
 def stuck(case: Case) -> Iterator[Suspicion]:
     """Yield channels that repeat a value to the last digit, where chance does not, while the robot moves, and then catch up."""
     if case.predicted is None:
         return
-    seen = headline(case)
-    for name, trials in (of_outputs(case) | (of_drives(case) if seen else {})).items():
+    drives = of_drives(case)
+    for name, trials in (of_outputs(case) | drives).items():
         rows: Rows = defaultdict(list)
-        equal, readings = _equal(trials), sum(len(s.time) for s in trials)
         command = trials[0].drives and not _scatters(trials)
         for s in trials:
-            for a, b in s.runs[np.ptp(s.runs, axis=1) > 2]:
-                usual = not _goes_on(s, a, b) if command else _by_chance(b - a - 1, equal, readings) >= CHANCE_OF_REPEATS
-                if not usual and (_driven(seen[s.trial], a, b) if s.drives else _held(s, a, b)):
+            for a, b in s.runs[np.ptp(s.runs, axis=1) > 2].tolist():
+                usual = not _goes_on(s, a, b) if command else _by_chance(b - a - 1, *_moving(trials, s, a, b)) >= CHANCE_OF_REPEATS
+                if usual:
+                    continue
+                if no_readings(case, list(drives).index(name), s.trial, [(a + 1, b)]) if s.drives else _held(s, a, b):
                     rows[s.trial] += range(a, b)
         if rows:
             words = f"{name}: one value, to the last digit, over {where(case, rows)}, while the robot moves"
@@ -189,17 +185,34 @@ def _equal(trials: Sequence[Series]) -> float:
     return (1 + readings - runs) / max(readings, 2)
 
 
+def _moving(trials: Sequence[Series], of: Series, a: int, b: int) -> tuple[float, int]:
+    """Return how often a reading equals the one before where the robot as described moves as in rows a to b, and of how many rows.
+
+    A robot at rest repeats its readings, to the last digit of a coarse encoder; that is no measure of chance while it moves. Rows
+    count in which it goes further than the noise, or as fast as in rows a to b, which do not count themselves. Without a prediction
+    every reading counts.
+    """
+    if not np.isfinite(of.shown[a:b]).all():
+        return _equal(trials), sum(len(s.time) for s in trials)
+    pace = min(of.noise, float(np.median(np.linalg.norm(np.diff(of.shown[a:b], axis=0), axis=1))))
+    there = {s.trial: np.linalg.norm(np.diff(s.shown, axis=0), axis=1) >= pace for s in trials}
+    there[of.trial][a : b - 1] = False
+    readings = sum(int(t.sum()) for t in there.values())
+    alike = sum(int((np.diff(s.read, axis=0)[there[s.trial]] == 0.0).all(axis=1).sum()) for s in trials)
+    return (1 + alike) / max(readings, 2), readings
+
+
 def _by_chance(repeats: int, equal: float, readings: int) -> float:
     """Return how many times so many readings that equal the one before are expected somewhere in so many readings."""
     return readings * min(equal, 1.0) ** repeats
 
 
 def _goes_on(s: Series, a: int, b: int) -> bool:
-    """Return whether a command goes on, after it stood in rows a to b, as if it had not: the way that it went beside them."""
-    if a < 1 or b + 1 >= len(s.time):
+    """Return whether a command, after it stood in rows a to b, jumps by what it would have gone in them, or goes on slower."""
+    if b >= len(s.time):
         return False
-    before, jump, after = (float(s.read[i, 0] - s.read[i - 1, 0]) for i in (a, b, b + 1))
-    return min(before * jump, after * jump) > 0.0 and abs(jump) > LEFT_BY_PATTERN * (b - a) * min(abs(before), abs(after))
+    beside = [abs(float(s.read[i, 0] - s.read[i - 1, 0])) for i in (a, b + 1) if 0 < i < len(s.time)]
+    return abs(float(s.read[b, 0] - s.read[b - 1, 0])) > LEFT_BY_PATTERN * (b - a) * min(beside, default=0.0)
 
 
 def _held(s: Series, a: int, b: int) -> bool:
@@ -209,16 +222,7 @@ def _held(s: Series, a: int, b: int) -> bool:
     if not np.linalg.norm(behind) > UNMISSABLE_MOTION * s.noise:
         return False
     after = b + np.flatnonzero(np.isfinite(left[b:]).all(axis=1))
-    return not after.size or bool(np.linalg.norm(left[after[0]] - left[a]) < LEFT_BY_PATTERN * np.linalg.norm(behind))
-
-
-def _driven(seen: Seen, a: int, b: int) -> bool:
-    """Return whether the robot moved over rows a to b of a drive by what the robot as described makes up after them."""
-    read, shown, noise = seen
-    if b >= len(read):
-        return False
-    jump, moved = (shown[b] - shown[b - 1]) / noise, (read[b - 1] - read[a]) / noise
-    known = np.isfinite(moved)
-    if not np.linalg.norm(jump[known]) > UNMISSABLE_MOTION * np.sqrt(max(1, known.sum())):
-        return False
-    return bool(moved[known] @ jump[known] > LEFT_BY_PATTERN * jump[known] @ jump[known])
+    if not after.size:
+        return True
+    caught_up = left[b - 1] - left[after[0]]  # by more than it was behind where the description's own error grows meanwhile
+    return bool(caught_up @ behind > LEFT_BY_PATTERN * (behind @ behind))

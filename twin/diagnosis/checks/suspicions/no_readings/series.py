@@ -60,6 +60,16 @@ class Series:
         return out
 
     @cached_property
+    def off_course(self) -> np.ndarray:
+        """How far (m,) the ends of each run are, at most, from the line between the readings before and after it; 0 at the ends."""
+        out, value = np.zeros(len(self.runs)), self.read[self.runs[:, 0]]
+        if len(out) > 2:
+            row = (value[2:] - value[:-2]) / (np.ptp(self.runs[1:-1], axis=1) + 1)[:, None]
+            off = (value[1:-1] - value[:-2] - row, value[2:] - value[1:-1] - row)
+            out[1:-1] = np.max([np.linalg.norm(o, axis=1) for o in off], axis=0)
+        return out
+
+    @cached_property
     def written(self) -> np.ndarray:
         """The readings (n, d) in the file's units."""
         scales = [c.scale for c in self.channels]
