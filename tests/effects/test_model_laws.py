@@ -18,13 +18,23 @@ LEG = load("tendon_leg")
 def test_zeros_drift_at_their_rates_and_level_off() -> None:
     """y + rate t, and y + rate (1 - exp(-k t)) / k; of joints, drives and forces, each by its own."""
     n, clock, nothing = LEG.n_tendon, np.array([0.0, 600.0]), np.zeros((2, 2))
-    read = {k: np.ones((2, 2)) for k in ("joint angle", "actuator angle", "actuator length", "actuator force", "tendon length")}
+    read = {
+        k: np.ones((2, 2))
+        for k in ("joint angle", "actuator angle", "actuator length", "actuator force", "joint torque", "tendon length")
+    }
+    read["tendon tension"] = np.ones((2, 1))
     true = Signals(clock, clock, nothing, nothing, np.zeros((2, 0, 3)), clock, others=read)
     drift = catalogue()["sensor_drift"]
-    seen = drift({"angle_hip": 1e-4, "position_2": 2e-6, "force_1": 1e-3}, n).sense(true).others
+    seen = (
+        drift({"angle_hip": 1e-4, "position_2": 2e-6, "force_1": 1e-3, "torque_knee": 1e-4, "tension_flexor": -1e-3}, n)
+        .sense(true)
+        .others
+    )
     np.testing.assert_allclose(seen["joint angle"][1], [1.06, 1.0])
     np.testing.assert_allclose(seen["actuator length"][1], [1.0, 1.0012])
     np.testing.assert_allclose(seen["actuator force"][1], [1.6, 1.0])
+    np.testing.assert_allclose(seen["joint torque"][1], [1.0, 1.06])
+    np.testing.assert_allclose(seen["tendon tension"][1], [0.4])
     assert (seen["tendon length"] == 1.0).all()
     assert all((seen[k][0] == 1.0).all() for k in read)
     levelled = drift({"angle_hip": 1e-4, "levelling": 0.01}, n).sense(true).others["joint angle"]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.body import Signals
-from twin.body.counts import of_a_model
+from twin.body.counts import of_a_model, tendon_names
 from twin.effects.base.effect import Effect, FitStart
 from twin.effects.base.saturating_drift import saturated_time, saturating_starts
 from twin.foundation.parameters import Parameter
@@ -16,7 +16,7 @@ from twin.foundation.parameters import Parameter
 # Readings of an MJCF whose zeros drift, by the parameter of their rates.
 READINGS = {
     "angle": ("joint angle", "joint shift"), "position": ("actuator angle", "actuator length"),
-    "force": ("actuator torque", "actuator force"),
+    "force": ("actuator torque", "actuator force"), "torque": ("joint torque", "joint force"), "tension": ("tendon tension",),
 }  # fmt: skip
 
 
@@ -25,7 +25,8 @@ class SensorDrift(Effect):
 
     It drifts by its rate at first and levels off as the cords settle; a negative levelling accelerates it, and without levelling it
     is R_i (1 + rate_i t). On a robot with an MJCF the zeros drift in the same way, y = y_true + rate (1 - exp(-levelling t)) /
-    levelling: of joints' angles (`angle`), of drives' positions (`position`), or of their forces (`force`).
+    levelling: of joints' angles (`angle`) or torques (`torque`), of drives' positions (`position`) or forces (`force`), or of
+    tendons' tensions (`tension`).
 
     Source: conductive rubber drifts by up to 8.3 % in 1,000 cycles of 14 h (KineSoft, Yoo et al. 2025, arXiv 2503.01078); fresh
     cords by per cents in minutes, then less as their filler settles (cords of one batch alike). An accelerating drift is a
@@ -48,7 +49,11 @@ class SensorDrift(Effect):
         Parameter("position", 0.0, "1/s", -1e-2, 1e-2, "rad or m a second: of a coupling that slips", scale=1e-6),
         Parameter("force", 0.0, "1/s", -1e-1, 1e-1, "N or N m a second: warm-up of an amplifier", scale=2e-5),
     )
-    per_joint = (Parameter("angle", 0.0, "1/s", -1e-2, 1e-2, "rad a second: of a magnet that slips", scale=2e-6),)
+    per_joint = (
+        Parameter("angle", 0.0, "1/s", -1e-2, 1e-2, "rad a second: of a magnet that slips", scale=2e-6),
+        Parameter("torque", 0.0, "1/s", -1e-1, 1e-1, "N m a second: warm-up of a gauge", scale=2e-6),
+    )
+    of_tendons = (Parameter("tension", 0.0, "1/s", -1e-1, 1e-1, "N a second: warm-up of a load cell", scale=2e-5),)
     inactive_when_off = ("levelling",)
     needs = frozenset({"drifting sensors"})
     moves_with = "the time of day"
@@ -59,7 +64,8 @@ class SensorDrift(Effect):
         """Return the parameters of strain sensors, or those of the readings of an MJCF."""
         if not of_a_model(n_tendon):
             return (*cls.parameters, *(replace(cls.per_tendon[0], name=f"rate_{i}") for i in range(1, n_tendon + 1)))
-        return tuple(p for p in super().all_parameters(n_tendon) if not p.name.startswith("rate_"))
+        tendons = (replace(p, name=f"{p.name}_{tendon}") for p in cls.of_tendons for tendon in tendon_names(n_tendon))
+        return (*(p for p in super().all_parameters(n_tendon) if not p.name.startswith("rate_")), *tendons)
 
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
@@ -69,7 +75,7 @@ class SensorDrift(Effect):
         """
         table = {p.name: p for p in cls.all_parameters(n_tendon)}
         if of_a_model(n_tendon):
-            kinds = ([n for n in table if n.startswith(p.name)] for p in (*cls.per_joint, *cls.per_tendon[1:]))
+            kinds = ([n for n in table if n.startswith(f"{kind}_")] for kind in READINGS)
         else:
             single = [[f"rate_{i}"] for i in range(1, n_tendon + 1)]
             kinds = (*single, [name for names in single for name in names])
@@ -78,7 +84,7 @@ class SensorDrift(Effect):
 
     @classmethod
     def form(cls, free: Collection[str]) -> str:
-        return next((kind for kind in READINGS if any(n.startswith(kind) for n in free)), "")
+        return next((kind for kind in READINGS if any(n.startswith(f"{kind}_") for n in free)), "")
 
     def sense(self, true: Signals) -> Signals:
         if of_a_model(self.n_tendon):
@@ -91,7 +97,7 @@ class SensorDrift(Effect):
         return true.with_changes(others={**true.others, "sensor": drifted})
 
     def _with_moved_zeros(self, true: Signals) -> Signals:
-        """Return the readings of an MJCF from elements' rates (n_joint,) or (n_drive,)."""
+        """Return the readings of an MJCF from elements' rates (n_joint,), (n_drive,) or (n_tendon,)."""
         time, moved = saturated_time(true.clock, self["levelling"])[:, None], dict[str, np.ndarray]()
         for kind, groups in READINGS.items():
             rate = np.array([v for n, v in self.values.items() if n.startswith(f"{kind}_")])
