@@ -137,7 +137,7 @@ def fitted(value: float, effect: str | None = None, ended: bool = False, low: fl
     parameter = Parameter("stiffness", 2.0, "N/m", low, 10.0, "by hand", std=std)
     model = SimpleNamespace(free=[SimpleNamespace(effect=effect, parameter=parameter)], value=lambda free: value)
     model.twin = SimpleNamespace(values={"stiffness": value}, effects=())
-    return SimpleNamespace(model=model, at_bound=lambda: np.array([ended]))
+    return SimpleNamespace(model=model, at_bound=lambda: np.array([ended]), std=lambda: np.zeros(1))
 
 
 def test_a_parameter_far_from_its_description_is_doubted_and_an_effects_own_is_not() -> None:

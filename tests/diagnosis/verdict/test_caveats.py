@@ -29,7 +29,7 @@ def test_a_caveat_bars_explained_and_nothing_else() -> None:
     assert verdict(False, replace(doubtful, after=0.01), limits) == verdict(False, replace(CLEAN, after=0.01), limits) == "noise"
 
 
-def fitted(*values: float, at_bound: tuple[int, ...] = ()) -> Any:
+def fitted(*values: float, at_bound: tuple[int, ...] = (), error: float = 0.0) -> Any:
     """A fit of numbers described as 0 +- 1, from -5 to 5."""
     free = [
         SimpleNamespace(effect=None, parameter=Parameter(f"n{k}", 0.0, "m", -5.0, 5.0, "by hand", std=1.0))
@@ -37,7 +37,9 @@ def fitted(*values: float, at_bound: tuple[int, ...] = ()) -> Any:
     ]
     twin = SimpleNamespace(values={f"n{k}": v for k, v in enumerate(values)})
     return SimpleNamespace(
-        model=SimpleNamespace(free=free, twin=twin), at_bound=lambda: [k in at_bound for k in range(len(values))]
+        model=SimpleNamespace(free=free, twin=twin),
+        at_bound=lambda: [k in at_bound for k in range(len(values))],
+        std=lambda: np.full(len(values), error),
     )
 
 
@@ -46,6 +48,12 @@ def test_numbers_far_off_and_at_an_end_are_counted_and_the_first_is_named() -> N
     assert far_from_description(fitted(2.9, 3.1)).startswith("n1 ended at a bound or 3 standard deviations off")
     assert far_from_description(fitted(3.1, 0.0, 5.0, at_bound=(2,))).startswith("2 numbers of the robot (n0, ...) ended")
     assert ["end of its range" in said for said in unlikely(fitted(3.1, 0.0, 5.0, at_bound=(2,)))] == [False, True]
+
+
+def test_a_number_is_far_off_by_the_errors_of_the_description_and_of_the_fit_together() -> None:
+    """sqrt(1^2 + 0.75^2) = 1.25, and three of them are 3.75."""
+    assert far_from_description(fitted(3.7, error=0.75)) == ""
+    assert far_from_description(fitted(3.8, error=0.75)).startswith("n0")
 
 
 @pytest.mark.parametrize(("own", "told"), [(HALF, False), (0.9 * HALF, False), (0.0, True), (0.6 * HALF, True)])

@@ -1,13 +1,18 @@
 """Warnings about a fit, in words."""
 
+import numpy as np
+
 from twin.diagnosis.calibration.fit import Fit
 from twin.diagnosis.thresholds import UNLIKELY_PARAMETER_DISTANCE
 
 
 def unlikely(found: Fit) -> list[str]:
-    """Return, in words, the robot's own parameters that are far from their description or at an end of their range."""
+    """Return, in words, the robot's own parameters that are far from their description or at an end of their range.
+
+    A number is known no better than by its standard error: where trials disagree about it, it may come out far off by that alone.
+    """
     warnings = []
-    for free, ended in zip(found.model.free, found.at_bound(), strict=True):
+    for free, ended, error in zip(found.model.free, found.at_bound(), found.std(), strict=True):
         p = free.parameter
         value = found.model.twin.values.get(p.name, p.value)
         if free.effect is not None or not p.std:
@@ -17,7 +22,7 @@ def unlikely(found: Fit) -> list[str]:
                 f"{p.name} came out at an end of its range ({value:.4g} {p.unit}, allowed {p.low:.4g} to {p.high:.4g}): the true "
                 "one may lie beyond it, and effects imitate the difference; widen the range in robot.toml if it may"
             )
-        elif abs(value - p.value) > UNLIKELY_PARAMETER_DISTANCE * p.std:
+        elif abs(value - p.value) > UNLIKELY_PARAMETER_DISTANCE * np.hypot(p.std, error):
             how = abs(value - p.value) / p.std
             warnings.append(
                 f"{p.name} came out {how:.1f} standard deviations of its description away ({value:.4g} {p.unit}, described as "
