@@ -51,7 +51,8 @@ HERE = SimpleNamespace(traces={})
 def weighed(model: Model, score: float = 0.0) -> Any:
     """J names every parameter by its column."""
     J = np.tile(np.arange(float(len(model.free))), (2, 1))
-    return ScoredModel(SimpleNamespace(model=model, J=J, evaluation=HERE), score, None)  # type: ignore[arg-type]
+    fit = SimpleNamespace(model=model, J=J, evaluation=HERE, at_bound=lambda: np.zeros(len(model.free), bool))
+    return ScoredModel(fit, score, None)  # type: ignore[arg-type]
 
 
 class Fits:
@@ -92,22 +93,20 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
 
 
-def test_motion_whose_numbers_are_at_bounds_is_fitted_from_the_description(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With derivatives of its own; statics, and motion within its bounds, goes on from what was fitted."""
+@pytest.mark.parametrize(("ended", "anew"), [("backbone.youngs_modulus", True), ("about_x", False), ("", False)])
+def test_a_robot_whose_own_numbers_are_at_bounds_is_fitted_from_the_description(
+    ended: str, anew: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With derivatives of its own; one within its bounds, whatever an effect's number is at, goes on from what was fitted."""
     base = calibrated("base_tilt")
     off = base.at(base.vector() * 1.01)
-    for bends, at_bound in ((True, True), (True, False), (False, True)):
-        fits, member, told = Fits(monkeypatch), weighed(off), study()
-        member.fit.at_bound = lambda at=at_bound: np.array([at, False])
-        told.objective.bends = bends
-        with_effect_added(told, member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",)))
-        ((model, how),) = fits.asked
-        anew = bends and at_bound
-        own = {f.parameter.name for f in base.free if f.effect is None}
-        assert model.twin.values == pytest.approx(
-            (base.twin.values | {n: ROBOT.value(n) for n in own}) if anew else off.twin.values
-        )
-        assert (how["J"] is None) == anew
+    fits, member = Fits(monkeypatch), weighed(off)
+    member.fit.at_bound = lambda: np.array([f.parameter.name == ended for f in off.free])
+    with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",)))
+    ((model, how),) = fits.asked
+    own = {f.parameter.name for f in base.free if f.effect is None}
+    assert model.twin.values == pytest.approx((base.twin.values | {n: ROBOT.value(n) for n in own}) if anew else off.twin.values)
+    assert (how["J"] is None) == anew
 
 
 def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def with_effect_added(
     the effect is fitted from the numbers as described.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
-    if context.objective.bends and member.fit.at_bound().any():
+    if any(ended and f.effect is None for f, ended in zip(model.free, member.fit.at_bound(), strict=True)):
         model, near, J = _as_described(model), None, None
     values = dict(start.values)
     try:

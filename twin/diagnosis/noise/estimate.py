@@ -18,6 +18,8 @@ CLEAR_CORRELATION = 3.0  # standard errors of a clear correlation
 LARGEST_CORRELATION = 0.9  # correlation from row to row: beyond it noise is a drift
 LARGEST_FADE = 0.97  # the same, of the correlated part beside white noise
 OUTLIER_PROBABILITY = 1e-6  # probability: rows that noise makes less often are not noise
+# Of the range of a group of outputs: solvers and steps are not exact. A rollout's channels without noise are known no better.
+PRECISION_SHARE = 1e-5
 # Two trials repeat each other if their inputs differ by less than this share of their range (RMS), or by two readings' noise.
 REPEAT_DIFFERENCE = 0.03
 
@@ -91,6 +93,7 @@ def estimate_noise(
             drive = _likeliest(D, G_all, member, len(groups), prepared.reading, sigma=declared)[1]
     else:
         sigma, fitted = _likeliest(D, G_all, member, len(groups), prepared.reading, drive=drive)
+        sigma = np.maximum(sigma, PRECISION_SHARE * _ranges([prepared.measured[k] for k in trials], member))
         drive = fitted if drive is None else drive
     noise = Noise(sigma, drive, np.zeros(len(sigma)), source)
     rho, fade = _remembered(noise, d, G, member) if pairs else (rho, rho)
@@ -128,6 +131,13 @@ def _along_rows(
     size = np.sqrt(6.0 - 8.0 * rho + 2.0 * rho**2)
     shrunk = np.sqrt(6.0) / size[:, None]
     return [(r[:-2] - 2 * r[1:-1] + r[2:]) / size for r in residual], [g[1:-1] * shrunk for g in sensitivity]
+
+
+def _ranges(measured: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
+    """Return for each output (n_output,) the largest range of a channel of its group; zero where nothing was measured."""
+    whole = np.concatenate(measured)
+    span = np.nan_to_num(np.fmax.reduce(whole, axis=0) - np.fmin.reduce(whole, axis=0))
+    return np.array([span[member == g].max() for g in member])
 
 
 def _members(prepared: PreparedRecording) -> tuple[list[str], np.ndarray]:
