@@ -1,4 +1,4 @@
-"""A twin's own rollouts are diagnosed as what they are, in small: the whole benchmark is `tools.benchmarks.diagnosis.own_rollouts`."""
+"""A twin's own rollouts are diagnosed as what they are, in small; whole: `tools.benchmarks.diagnosis.own_rollouts`."""
 
 from __future__ import annotations
 

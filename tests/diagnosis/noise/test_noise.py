@@ -164,12 +164,12 @@ def test_without_repeats_noise_is_read_off_second_differences_and_said() -> None
 
 
 def test_outputs_without_noise_are_known_to_a_hundred_thousandth_of_their_range() -> None:
-    """A rollout's own: smooth but for rounding. The widest channel of a group counts, 0.2 m; noise that is declared stands."""
+    """A rollout's own: smooth but for rounding. The widest channel of a group counts, 0.21 m; noise that is declared stands."""
     lone = bench(payload=0.01)
     path = np.stack([np.linspace(0.0, 0.2, N), np.linspace(0.0, 0.1, N), np.full(N, np.nan)], axis=1)
     exact = replace(lone, measured=(path, path + 0.01))
     residual = [1e-9 * np.sin(TIME)[:, None] * np.ones(3)] * 2
-    np.testing.assert_allclose(estimate_noise(exact, [0], residual[:1], DEAF[:1])[0].sigma, 2e-6)
+    np.testing.assert_allclose(estimate_noise(exact, [0], residual[:1], DEAF[:1])[0].sigma, 2.1e-6)
     fine = (*CHANNELS[:3], *(replace(c, noise=1e-9) for c in CHANNELS[3:]))
     declared = replace(bench(payload=0.01, channels=fine), measured=exact.measured)
     np.testing.assert_array_equal(estimate_noise(declared, [0], residual[:1], DEAF[:1])[0].sigma, 1e-9)

@@ -26,7 +26,8 @@ def study(trials: int, sigma: float, source: str, gaps: dict[int, float] | None 
         inputs.append(SimpleNamespace(clock=start + np.arange(float(rows))))
         start += rows
     noise = Noise(np.full(OUTPUTS, sigma), np.zeros(3), np.zeros(OUTPUTS), source)
-    bench = SimpleNamespace(outputs=[SimpleNamespace(group="marker")] * OUTPUTS, inputs=inputs, reading=np.ones(3))
+    still = [np.zeros((rows, OUTPUTS))] * trials
+    bench = SimpleNamespace(outputs=[SimpleNamespace(group="marker")] * OUTPUTS, inputs=inputs, reading=np.ones(3), measured=still)
     return SimpleNamespace(
         prepared=bench, trials=list(range(trials)), objective=SimpleNamespace(whitener=SimpleNamespace(noise=noise))
     )

@@ -20,6 +20,7 @@ LARGEST_FADE = 0.97  # the same, of the correlated part beside white noise
 OUTLIER_PROBABILITY = 1e-6  # probability: rows that noise makes less often are not noise
 # Of the range of a group of outputs: solvers and steps are not exact. A rollout's channels without noise are known no better.
 PRECISION_SHARE = 1e-5
+SMALLEST_NOISE = 1e-9  # SI, of an output that never changes
 # Two trials repeat each other if their inputs differ by less than this share of their range (RMS), or by two readings' noise.
 REPEAT_DIFFERENCE = 0.03
 
@@ -67,7 +68,7 @@ def estimate_noise(
     cells = np.where(prepared.driven_by(Drive.CONTROL), 0.0, cells)  # known exactly
     drive = cells if np.isfinite(cells).all() else None
     notes = []
-    groups, member = _members(prepared)
+    member = _members(prepared)
     rho = np.zeros(member.size)
     if pairs:
         reading = prepared.reading if drive is None else drive
@@ -87,13 +88,13 @@ def estimate_noise(
             source = f"second differences along each trial; taken as {in_time}"
             notes.append(f"no repeated trials: the noise floor is estimated from second differences and taken as {in_time}")
     D, G_all = np.concatenate(d), np.concatenate(G)
+    least = _least(prepared, member)
     if source == DECLARED:
         sigma = declared
         if drive is None:
-            drive = _likeliest(D, G_all, member, len(groups), prepared.reading, sigma=declared)[1]
+            drive = _likeliest(D, G_all, member, least, prepared.reading, sigma=declared)[1]
     else:
-        sigma, fitted = _likeliest(D, G_all, member, len(groups), prepared.reading, drive=drive)
-        sigma = np.maximum(sigma, PRECISION_SHARE * _ranges([prepared.measured[k] for k in trials], member))
+        sigma, fitted = _likeliest(D, G_all, member, least, prepared.reading, drive=drive)
         drive = fitted if drive is None else drive
     noise = Noise(sigma, drive, np.zeros(len(sigma)), source)
     rho, fade = _remembered(noise, d, G, member) if pairs else (rho, rho)
@@ -116,8 +117,9 @@ def row_noise(
     seen = np.isfinite(d).any(axis=0)
     sigma = np.full(d.shape[1], np.inf)
     if np.any(seen):
-        groups, member = np.unique(_members(prepared)[1][seen], return_inverse=True)
-        sigma[seen] = _likeliest(d[:, seen], G[:, seen], member, len(groups), prepared.reading, drive=drive)[0]
+        member = _members(prepared)
+        groups, own = np.unique(member[seen], return_inverse=True)
+        sigma[seen] = _likeliest(d[:, seen], G[:, seen], own, _least(prepared, member)[groups], prepared.reading, drive=drive)[0]
     return Noise(sigma, drive, np.zeros(len(sigma)), "rows of a trial")
 
 
@@ -133,17 +135,17 @@ def _along_rows(
     return [(r[:-2] - 2 * r[1:-1] + r[2:]) / size for r in residual], [g[1:-1] * shrunk for g in sensitivity]
 
 
-def _ranges(measured: Sequence[np.ndarray], member: np.ndarray) -> np.ndarray:
-    """Return for each output (n_output,) the largest range of a channel of its group; zero where nothing was measured."""
-    whole = np.concatenate(measured)
+def _least(prepared: PreparedRecording, member: np.ndarray) -> np.ndarray:
+    """Return the least noise (n_group,) of each group of outputs: `PRECISION_SHARE` of its widest channel's range."""
+    whole = np.concatenate(prepared.measured)
     span = np.nan_to_num(np.fmax.reduce(whole, axis=0) - np.fmin.reduce(whole, axis=0))
-    return np.array([span[member == g].max() for g in member])
+    return np.array([max(PRECISION_SHARE * span[member == g].max(), SMALLEST_NOISE) for g in range(member.max() + 1)])
 
 
-def _members(prepared: PreparedRecording) -> tuple[list[str], np.ndarray]:
-    """Return the groups of outputs in their order, and each output's group (n_output,)."""
+def _members(prepared: PreparedRecording) -> np.ndarray:
+    """Return each output's group (n_output,), by its place in the order of groups."""
     groups = list(dict.fromkeys(o.group for o in prepared.outputs))
-    return groups, np.array([groups.index(o.group) for o in prepared.outputs])
+    return np.array([groups.index(o.group) for o in prepared.outputs])
 
 
 def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray, reading: np.ndarray) -> np.ndarray:
@@ -177,14 +179,16 @@ def _detrended(d: np.ndarray, inputs: Inputs, G: np.ndarray, member: np.ndarray,
 def _scales(d: np.ndarray, member: np.ndarray) -> np.ndarray:
     """Return the robust spread (n_group,) of differences d (n, m), by group."""
     median = [np.nanmedian(np.abs(d[:, member == g])) for g in range(member.max() + 1)]
-    return np.maximum(1.4826 * np.array(median), 1e-9)
+    return np.maximum(1.4826 * np.array(median), SMALLEST_NOISE)
 
 
 def _likeliest(
-    d: np.ndarray, G: np.ndarray, member: np.ndarray, n_group: int, reading: np.ndarray, *, drive: np.ndarray | None = None,
+    d: np.ndarray, G: np.ndarray, member: np.ndarray, least: np.ndarray, reading: np.ndarray, *, drive: np.ndarray | None = None,
     sigma: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return the maximum-likelihood sigma by group and that of the inputs, a common multiple of `reading` (n_tendon,).
+    """Return the maximum-likelihood sigma by group, at least `least` (n_group,), and that of the inputs.
+
+    The latter is a common multiple of `reading` (n_tendon,).
 
     Differences are d (n, m) ~ N(0, diag sigma^2 + G diag sigma_u^2 G'). Where sigma is sought, rows whose |z|^2 noise exceeds with
     a probability below one in a million are left out, repeatedly until none is left: a body that snaps over an obstacle from row to
@@ -192,11 +196,11 @@ def _likeliest(
     """
     present = np.isfinite(d)
     unlikely = chi2.isf(OUTLIER_PROBABILITY, np.maximum(present.sum(axis=1), 1))
-    scale = _scales(d, member)
+    scale = np.maximum(_scales(d, member), least)
     d, G = np.where(present, d, 0.0), G * present[:, :, None]  # missing samples have no weight
 
     def unpack(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        s = sigma if sigma is not None else (scale * np.exp(x[:n_group]))[member]
+        s = sigma if sigma is not None else np.maximum(scale * np.exp(x[: len(least)]), least)[member]
         return s, drive if drive is not None else reading * np.exp(x[-1])
 
     def of_rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -212,7 +216,7 @@ def _likeliest(
         square, log_determinant = of_rows(x)
         return 0.5 * float((square + log_determinant)[usual].sum())
 
-    x = np.zeros((0 if sigma is not None else n_group) + (drive is None))
+    x = np.zeros((0 if sigma is not None else len(least)) + (drive is None))
     usual, outlying = np.zeros(len(d), dtype=bool), np.zeros(len(d), dtype=bool)
     while x.size and not np.array_equal(usual, ~outlying):
         usual = ~outlying
