@@ -35,7 +35,7 @@ RATES = (2.0, 10.0, 50.0)  # Hz
 # Of an effect, the first law that acts on the robot.
 EFFECTS: dict[str, tuple[tuple[str, dict[str, float]], ...]] = {
     "none": (),
-    "friction": (("tendon_friction", {"mu": 0.2}), ("joint_friction", {"torque_hip": 0.05, "torque_knee": 0.03})),
+    "friction": (("joint_friction", {"torque_hip": 0.05, "torque_knee": 0.03}), ("tendon_friction", {"mu": 0.2})),
     "lag": (("actuator_lag", {"time": 0.3}),),
     "payload": (("tip_payload", {"mass": 0.02}),),
 }
