@@ -25,7 +25,7 @@ from tools.benchmarks.diagnosis.memory import Memory
 from tools.benchmarks.diagnosis.rules import RULES, Rule, without
 from tools.benchmarks.diagnosis.second_bench_days import true_row
 from tools.benchmarks.table import Row, kept_rows, markdown
-from tools.simulators.rod.day import Recipe, make_set
+from tools.simulators.rod.day import make_set
 from tools.simulators.rod.rod import NoEquilibrium
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.calibrate import calibrate
@@ -103,10 +103,9 @@ def run(case: Case, folder: Path) -> Row:
     """Make one day, and return its answers by rule."""
     where = folder / f"set_{case.seed}"
     shutil.rmtree(where, ignore_errors=True)
-    recipe = Recipe(case.effects, case.amplitude, case.seed, case.design, case.seed % 3 == 0, True, case.coloured, case.mismatch)
     told: Row = {**asdict(case), "true": list(case.effects)}
     try:
-        make_set(where, recipe)
+        make_set(where, case.recipe())
         truth = json.loads((where / "truth.json").read_text())["effects"]
         return {**told, "sigmas": [e["sigmas"] for e in truth], **_decided(where, case.seed)}
     except (TwinError, NoEquilibrium) as error:

@@ -54,6 +54,11 @@ class Case:
     mismatch: str
     coloured: bool
 
+    def recipe(self) -> Recipe:
+        """Return what the simulator makes the set by."""
+        lengths = self.seed % 3 == 0
+        return Recipe(self.effects, self.amplitude, self.seed, self.design, lengths, True, self.coloured, self.mismatch)
+
 
 def plan(sets: int, seed: int, only: str | None = None) -> list[Case]:
     """The sets in the order they are run: any first part of it is a fair sample of the whole. With `only`, all of one design, and
@@ -102,9 +107,8 @@ def run(case: Case, folder: Path) -> Row:
     told: Row = {key: value for key, value in asdict(case).items() if key != "effects"}
     where = folder / f"set_{case.seed}"
     shutil.rmtree(where, ignore_errors=True)
-    recipe = Recipe(case.effects, case.amplitude, case.seed, case.design, case.seed % 3 == 0, True, case.coloured, case.mismatch)
     try:
-        make_set(where, recipe)
+        make_set(where, case.recipe())
         truth = json.loads((where / "truth.json").read_text())["effects"]
         row, d = answer(where, case.seed)
     except (DataError, NoEquilibrium) as error:
