@@ -213,6 +213,12 @@ def test_unknown_parameters_and_broken_bounds_are_refused(law: type[Effect]) -> 
     assert [f"effect {law.id}" in said and "allowed" in said for said in problems] == [True]
 
 
+@laws
+@pytest.mark.parametrize("n_tendon", [1, 3])
+def test_fits_may_start_without_a_prediction(law: type[Effect], n_tendon: int) -> None:
+    assert all(set(start.values) <= {p.name for p in law.all_parameters(n_tendon)} for start in law.fit_starts([], n_tendon))
+
+
 def starts(law: type[Effect], data: Recording) -> list[Effect]:
     """The law as its fits begin, at most four of them."""
     robot = load(data.robot)

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import spence
 
-from tools.benchmarks.diagnosis.second_bench_days import exact, totals
+from tools.benchmarks.diagnosis.second_bench_days import exact, totals, true_row
 from tools.simulators.second_rod import write
 from tools.simulators.second_rod.contact import POST_OBSTACLE, WALL_OBSTACLE, obstacle
 from tools.simulators.second_rod.day import draw_day
@@ -235,6 +235,8 @@ def test_a_day_is_read_back_with_its_truth(made: Path) -> None:
     assert {"tendon_1_displacement", "disk_8_z"} <= {channel.name for channel in recording.outputs()}
     assert [effect["id"] for effect in truth["effects"]] == ["backbone_precurvature"]
     assert truth["effects"][0]["known"]
+    row = true_row(recording.folder)
+    assert (row["kind"], row["true"], row["drive"]) == ("one", ["backbone_precurvature"], truth["drive"])
     assert truth["effects"][0]["size"]["after_refit"] == pytest.approx(3.0, rel=0.12)  # sizing stops this near
     for trial in recording.trials:
         # the first marker cannot leave its interval: SI units and the base frame
@@ -266,25 +268,22 @@ def test_a_killed_run_goes_on(made: Path, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_the_totals_count_effects_hardly_told_apart_as_one() -> None:
-    def answer(verdict: str, *names: str) -> dict[str, Any]:
-        return {"verdict": verdict, "claims": list(names), "after": float(len(names)), "floor": 0.5}
+    def day(kind: str, true: list[str], verdict: str, *names: str) -> dict[str, Any]:
+        return {"kind": kind, "true": true, "verdict": verdict, "claims": list(names), "after": float(len(names)), "floor": 0.5}
 
-    def truth(*names: str, known: bool = True) -> dict[str, Any]:
-        return {"effects": [{"id": name, "known": known} for name in names]}
-
-    assert exact(answer("explained", "actuator_lag"), ["time_delay"])
-    assert not exact(answer("explained", "actuator_lag", "time_delay"), ["time_delay"])
+    assert exact(day("one", ["time_delay"], "explained", "actuator_lag"))
+    assert not exact(day("one", ["time_delay"], "explained", "actuator_lag", "time_delay"))
     lines = totals(
         [
-            (answer("noise"), truth()),
-            (answer("unexplained"), truth()),
-            (answer("explained", "camera_misalignment", "contact"), truth("base_tilt")),
-            (answer("partly_explained", "contact"), truth("magnet", known=False)),
+            day("none", [], "noise"),
+            day("none", [], "unexplained"),
+            day("one", ["base_tilt"], "explained", "camera_misalignment", "contact"),
+            day("unknown", ["magnet"], "partly_explained", "contact"),
         ]
     )
     assert [line.split()[-1] for line in lines] == ["1/2", "1/1", "0/1", "0/0", "0/0", "1/1", "4.00"]
-    pair = (answer("explained", "contact"), truth("contact", "base_tilt"))  # after 1.0 for 0.5; the other day 2.0
-    assert totals([pair, (answer("explained", "contact", "base_tilt"), truth("contact"))])[-1].endswith(" 3.00, 3.80")
+    pair = day("pair", ["contact", "base_tilt"], "explained", "contact")  # after 1.0 for 0.5; the other day 2.0
+    assert totals([pair, day("one", ["contact"], "explained", "contact", "base_tilt")])[-1].endswith(" 3.00, 3.80")
 
 
 @pytest.mark.parametrize("kind", sorted(EFFECT_KINDS))

@@ -1,9 +1,11 @@
 """Markdown tables, shares of cases, and rows kept as JSON lines so that a long run goes on where it stopped."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from twin.foundation.parallel import run_parallel
 
 Row = dict[str, Any]
 
@@ -19,10 +21,19 @@ def read_rows(log: Path) -> list[Row]:
     return rows
 
 
-def append_row(log: Path, row: Row) -> None:
-    """Add a row to a file."""
-    with log.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row) + "\n")
+def kept_rows(log: Path, work: Mapping[Any, Any], jobs: int, told: Callable[[Row], str]) -> list[Row]:
+    """Run what has no row in a file yet, `jobs` tasks side by side, and return all rows of the file.
+
+    `work` has the tasks (`joblib.delayed(...)(...)`) by the day of their row, or by the seed of a row without a day. Each row goes
+    to the file as it comes, and what is told of it is printed.
+    """
+    log.parent.mkdir(parents=True, exist_ok=True)
+    done = {row.get("day", row.get("seed")) for row in read_rows(log)}
+    for row in run_parallel([task for key, task in work.items() if key not in done], jobs):
+        with log.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        print(told(row), flush=True)
+    return read_rows(log)
 
 
 def share(hits: Sequence[bool]) -> str:

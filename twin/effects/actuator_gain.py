@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Body, Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
 
@@ -36,12 +36,12 @@ class ActuatorGain(Effect):
 
         Lengths start shorter, as the body always allows.
         """
+        if not predicted:
+            return
         (gain,) = cls.per_tendon
         driven = predicted[0].driven_by_control | predicted[0].driven_by_length
         way = -1.0 if predicted[0].driven_by_length.any() else 1.0
-        single = [{f"gain_{i + 1}": gain.value + way * gain.step} for i in np.flatnonzero(driven)]
-        for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
-            yield FitStart(values, tuple(values))
+        yield from each_then_all([{f"gain_{i + 1}": gain.value + way * gain.step} for i in np.flatnonzero(driven)])
 
     def edit(self, body: Body) -> None:
         gain = self.per_tendon_values("gain")

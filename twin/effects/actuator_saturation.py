@@ -107,6 +107,8 @@ class ActuatorSaturation(Effect):
         if of_a_model(n_tendon):
             yield from cls._starts_of_model(predicted)
             return
+        if not predicted:
+            return
         lengths = [s.displacement for s in predicted if s.driven_by_length.all()]
         if len(lengths) == len(predicted):
             longest = np.concatenate(lengths).max(axis=0)
@@ -119,7 +121,7 @@ class ActuatorSaturation(Effect):
                 if 0.1 < (stall := float(np.quantile(tautest, 1.0 - share))) < NO_STALL:
                     yield FitStart({"stall": stall}, ("stall",), ROPE_FEATURES)
             return
-        if predicted and all(s.driven_by_current.all() for s in predicted):
+        if all(s.driven_by_current.all() for s in predicted):
             largest = max(float(s.current.max(initial=0.0)) for s in predicted)
             for share in LIMIT_SHARES:
                 if 0.02 < share * largest < 50.0:

@@ -108,6 +108,8 @@ class Contact(Effect):
     @classmethod
     def fit_starts(cls, predicted: list[Signals], n_tendon: int) -> Iterator[FitStart]:
         """Start with walls around the robot, each touched in some samples only."""
+        if not predicted:
+            return
         names = tuple(p.name for p in cls.parameters if p.name not in cls.extended_parameters)
         for azimuth in 2 * np.pi * np.arange(N_WALL_AZIMUTHS) / N_WALL_AZIMUTHS:
             furthest = _marker_reach(predicted, azimuth).max(axis=1)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Signals
-from twin.effects.base.effect import Effect, FitStart
+from twin.effects.base.effect import Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
 AFFINE = (mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE)
@@ -45,12 +45,12 @@ class DriveZero(Effect):
 
         Tendons start paid out, which the body always allows.
         """
+        if not predicted:
+            return
         if predicted[0].driven_by_length.any():
             yield FitStart({"length": -cls.parameters[0].step}, ("length",))
         for kind, driven in zip(cls.per_tendon, (predicted[0].driven_by_control, predicted[0].driven_by_length), strict=True):
-            single = [{f"{kind.name}_{i + 1}": kind.value - kind.step} for i in np.flatnonzero(driven)]
-            for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
-                yield FitStart(values, tuple(values))
+            yield from each_then_all([{f"{kind.name}_{i + 1}": kind.value - kind.step} for i in np.flatnonzero(driven)])
 
     @classmethod
     def form(cls, free: Collection[str]) -> str:

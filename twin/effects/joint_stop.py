@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.body import Body, Signals
 from twin.body.counts import joint_names
-from twin.effects.base.effect import DataNeed, Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
 NO_STOP = 10.0  # rad or m: farther than any joint of one axis goes
@@ -53,11 +53,7 @@ class JointStop(Effect):
         for end, sign in ENDS.items():
             near, far = (low, high) if sign > 0.0 else (high, low)
             moved = [k for k in range(len(joints)) if abs(far[k] - near[k]) > cls.per_joint[0].step]
-            stops = {f"{end}_{joints[k]}": float(near[k] + STARTING_SHARE * (far[k] - near[k])) for k in moved}
-            for name, value in stops.items():
-                yield FitStart({name: value}, (name,))
-            if len(stops) > 1:
-                yield FitStart(stops, tuple(stops))
+            yield from each_then_all([{f"{end}_{joints[k]}": float(near[k] + STARTING_SHARE * (far[k] - near[k]))} for k in moved])
 
     def edit(self, body: Body) -> None:
         if joint_names(self.n_tendon):

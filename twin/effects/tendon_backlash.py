@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from twin.body import Route, Signals
-from twin.effects.base.effect import DataNeed, Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter
 
@@ -86,13 +86,11 @@ class TendonBacklash(Effect):
 
         Actuators start each with its own, then all of them.
         """
-        if (driven := predicted[0].driven_by_control).any():
-            single = [{f"play_{i + 1}": GAP_GUESS} for i in np.flatnonzero(driven)]
-            for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
-                yield FitStart(values, tuple(values))
+        if predicted and (driven := predicted[0].driven_by_control).any():
+            yield from each_then_all([{f"play_{i + 1}": GAP_GUESS} for i in np.flatnonzero(driven)])
             return
         yield FitStart({"gap": GAP_GUESS}, ("gap", "swap"))
-        if n_tendon == 1 or any(s.antagonists for s in predicted):
+        if n_tendon == 1 or not predicted or any(s.antagonists for s in predicted):
             return
         if any(s.driven_by_current.any() for s in predicted):
             yield FitStart({"gap": 4.0 * GAP_GUESS, "swap": 2.0 * GAP_GUESS}, ("gap", "swap"))

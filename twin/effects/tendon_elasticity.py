@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.body import ROPE_FEATURES, Body, Route, Signals
 from twin.body.counts import of_a_model, winches
-from twin.effects.base.effect import DataNeed, Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
 DRUM_READINGS = ("actuator angle", "actuator length")  # groups of what an MJCF's actuators show of their places
@@ -83,9 +83,7 @@ class TendonElasticity(Effect):
         added to a toe by `extended_starts`. Start an MJCF with each tendon alone and with all.
         """
         if of_a_model(n_tendon):
-            single = [{name: 5e-5} for name in _stretches(n_tendon)]
-            for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
-                yield FitStart(values, tuple(values))
+            yield from each_then_all([{name: 5e-5} for name in _stretches(n_tendon)])
             return
         antagonists, sprung = (any(x) for x in ([s.antagonists for s in predicted], [s.driven_by_current.any() for s in predicted]))
         largest = max((float(s.tension.max(initial=0.0)) for s in predicted), default=0.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.body import Body, Signals
 from twin.body.counts import crossing_tendons, of_a_model
-from twin.effects.base.effect import DataNeed, Effect, FitStart
+from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
 
@@ -54,9 +54,7 @@ class TendonRouting(Effect):
         if not of_a_model(n_tendon):
             yield from super().fit_starts(predicted, n_tendon)
             return
-        single = [{p.name: p.step} for p in cls.all_parameters(n_tendon)]
-        for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
-            yield FitStart(values, tuple(values))
+        yield from each_then_all([{p.name: p.step} for p in cls.all_parameters(n_tendon)])
 
     def edit(self, body: Body) -> None:
         if of_a_model(self.n_tendon):

@@ -1,6 +1,8 @@
-"""Safe reading of files: which may be opened, how much is read, and where a fault is."""
+"""Safe reading of files: which may be opened, how much is read, and where a fault is. Folders written whole or not at all."""
 
 import codecs
+import os
+import shutil
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +27,24 @@ def prefix_errors(where: object) -> Iterator[None]:
         yield
     except DataError as fault:
         raise DataError(f"{where}: {fault}") from None
+
+
+@contextmanager
+def written_whole(folder: Path) -> Iterator[Path]:
+    """Lend a new folder next to `folder`, and give it that name at the end; after an error nothing of it stays.
+
+    An empty `folder` may be there already.
+    """
+    draft = folder.absolute().parent / f".{folder.absolute().name}.{os.getpid()}.writing"
+    draft.mkdir(parents=True)
+    try:
+        yield draft
+        if folder.exists():
+            folder.rmdir()
+        draft.rename(folder)
+    except BaseException:
+        shutil.rmtree(draft, ignore_errors=True)
+        raise
 
 
 def is_file(path: Path) -> bool:

@@ -1,7 +1,5 @@
 """Writing of a measurement set, whole or not at all, in the units its channels declare."""
 
-import os
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -11,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from twin.foundation.errors import DataError, short_repr
-from twin.foundation.files import check_file_name
+from twin.foundation.files import check_file_name, written_whole
 from twin.measurements.conditions import PAYLOAD_AT, SCALAR_CONDITIONS
 from twin.measurements.parsing.toml_text import toml_lines
 from twin.measurements.read import SET_FILE, SET_FORMAT
@@ -33,21 +31,13 @@ def write(recording: Recording, folder: str | Path, *, file_format: FileFormat =
     labels = [check_file_name(trial.label) for trial in recording.trials]
     if len(set(labels)) < len(labels):
         raise DataError(f"{folder}: two trials have the same name; give each its own")
-    draft = folder.absolute().parent / f".{folder.absolute().name}.{os.getpid()}.writing"
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise DataError(f"{folder}: holds something already and is not overwritten; name a new folder or empty this one")
-        draft.mkdir(parents=True)
-        try:
+        with written_whole(folder) as draft:
             (draft / SET_FILE).write_text(_toml(recording, file_format), encoding="utf-8")
             for trial in recording.trials:
                 _write_trial(recording, trial, draft, file_format)
-            if folder.exists():
-                folder.rmdir()
-            draft.rename(folder)
-        except BaseException:
-            shutil.rmtree(draft, ignore_errors=True)
-            raise
     except (OSError, UnicodeError, pa.ArrowException) as fault:
         raise DataError(f"{folder}: cannot be written ({short_repr(str(fault))}); choose another place") from None
 

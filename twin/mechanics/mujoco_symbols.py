@@ -21,7 +21,3 @@ mj_step = types.ExternalFunction("mj_step", _MODEL_DATA)
 mj_step1 = types.ExternalFunction("mj_step1", _MODEL_DATA)
 mj_step2 = types.ExternalFunction("mj_step2", _MODEL_DATA)
 mj_fwd_actuation = types.ExternalFunction("mj_fwdActuation", _MODEL_DATA)
-mj_apply_force = types.ExternalFunction(
-    "mj_applyFT",
-    types.void(types.uintp, types.uintp, types.voidptr, types.voidptr, types.voidptr, types.int32, types.voidptr),
-)

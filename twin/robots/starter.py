@@ -4,13 +4,13 @@ The numbers are those of a robot of the same family that ships with the twin, ea
 an MJCF of the user's own (`model_starter.py`).
 """
 
-import os
 import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 from twin.foundation.errors import DataError, UnknownNameError, short_repr
+from twin.foundation.files import written_whole
 from twin.foundation.units import unit_scale
 from twin.measurements.parsing.toml_text import toml_lines, toml_value
 from twin.robots.family import family_names, load_family
@@ -77,19 +77,14 @@ def _write_whole(name: str, place: Path, fill: Callable[[Path], Robot]) -> Path:
         taken = ", ".join(robot_names())
         raise DataError(f"{short_repr(name)} cannot be a robot's name; write up to 64 letters, digits, - and _, none of {taken}")
     folder = place / name
-    draft = place / f".{name}.{os.getpid()}.writing"
     try:
         if folder.exists():
             raise DataError(f"{folder} is there already and is not overwritten; choose another name, or another place with --out")
-        (draft / FIRST_SET).mkdir(parents=True)
-        try:
+        with written_whole(folder) as draft:
+            (draft / FIRST_SET).mkdir(parents=True)
             robot = fill(draft)
             (draft / "README.md").write_text(readme_text(name), "utf-8")
             write_set(draft / FIRST_SET, robot)
-            draft.rename(folder)
-        except BaseException:
-            shutil.rmtree(draft, ignore_errors=True)
-            raise
     except OSError as error:
         raise DataError(f"{folder}: cannot be written ({error.strerror or error}); choose another place with --out") from None
     return folder

@@ -69,9 +69,9 @@ class Bench:
         self.robot.actuation = self.robot.actuation._replace(spring=twin_springs(twin).records)
 
 
-def controller(kind: str, payload: float = 0.0) -> TipController:
-    """`full`, `PI only` (with inverse kinematics), `no friction` (`full` told mu = 0), `no tip feedback`; told `payload` (kg)."""
-    loads, guard = Loads(DOWNWARD_GRAVITY, payload=payload), HeatingGuard(twin_springs(KNOWN_TWIN), ROOM_TEMPERATURE)
+def controller(kind: str) -> TipController:
+    """`full`, `PI only` (with inverse kinematics), `no friction` (`full` told mu = 0), `no tip feedback`; told of no payload."""
+    loads, guard = Loads(DOWNWARD_GRAVITY), HeatingGuard(twin_springs(KNOWN_TWIN), ROOM_TEMPERATURE)
     if kind == "PI only":
         return TipController(KNOWN_TWIN, loads, PITensionLoop(guard), reset=None)
     if kind == "no friction":

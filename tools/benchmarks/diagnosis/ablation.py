@@ -15,7 +15,6 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import tyro
 from joblib import delayed
@@ -24,8 +23,9 @@ from tools.benchmarks.diagnosis.attribution import Case, plan
 from tools.benchmarks.diagnosis.attribution_table import exact, false_positive, first, flagged, made, right
 from tools.benchmarks.diagnosis.memory import Memory
 from tools.benchmarks.diagnosis.rules import RULES, Rule, without
-from tools.benchmarks.table import Row, append_row, markdown, read_rows
-from tools.simulators.rod.day import Recipe, make_set
+from tools.benchmarks.diagnosis.second_bench_days import true_row
+from tools.benchmarks.table import Row, kept_rows, markdown
+from tools.simulators.rod.day import make_set
 from tools.simulators.rod.rod import NoEquilibrium
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.calibrate import calibrate
@@ -38,7 +38,6 @@ from twin.diagnosis.pipeline import decide
 from twin.diagnosis.search.screen import screen
 from twin.diagnosis.verdict.judge import withdraw
 from twin.foundation.errors import TwinError
-from twin.foundation.parallel import run_parallel
 from twin.foundation.threads import single_thread
 from twin.measurements import Recording, read
 from twin.prediction.own_clocks import on_rows_of_outputs
@@ -104,10 +103,9 @@ def run(case: Case, folder: Path) -> Row:
     """Make one day, and return its answers by rule."""
     where = folder / f"set_{case.seed}"
     shutil.rmtree(where, ignore_errors=True)
-    recipe = Recipe(case.effects, case.amplitude, case.seed, case.design, case.seed % 3 == 0, True, case.coloured, case.mismatch)
     told: Row = {**asdict(case), "true": list(case.effects)}
     try:
-        make_set(where, recipe)
+        make_set(where, case.recipe())
         truth = json.loads((where / "truth.json").read_text())["effects"]
         return {**told, "sigmas": [e["sigmas"] for e in truth], **_decided(where, case.seed)}
     except (TwinError, NoEquilibrium) as error:
@@ -118,12 +116,7 @@ def run(case: Case, folder: Path) -> Row:
 
 def run_second(day: Path) -> Row:
     """Return the answers by rule of one day of the second rod simulator, made before."""
-    truth = json.loads((day.parent.parent / "truth" / f"{day.name}.json").read_text())
-    known = [e["known"] for e in truth["effects"]]
-    kind = "unknown" if not all(known) else ("none", "one", "pair")[len(known)]
-    sizes = [e["size"]["after_refit"] for e in truth["effects"]]
-    told: Row = {"seed": int("".join(c for c in day.name if c.isdigit()) or 0), "day": day.name, "kind": kind, "amplitude": 0.0}
-    told |= {"true": [e["id"] for e in truth["effects"]], "sigmas": sizes}
+    told: Row = {"seed": int("".join(c for c in day.name if c.isdigit()) or 0), "amplitude": 0.0, **true_row(day)}
     try:
         return {**told, **_decided(day, 1)}
     except TwinError as error:
@@ -192,17 +185,14 @@ def main(out: Path, sets: int = 60, seed: int = 30000, second: Path | None = Non
         second: also the days in this folder, which `python -m tools.simulators.second_rod` has written
         jobs: days side by side, each on one core
     """
-    out.mkdir(parents=True, exist_ok=True)
-    log = out / "ablation.jsonl"
-    done = {(r["seed"], r.get("day")) for r in read_rows(log)}
-    left: list[Any] = [delayed(run)(case, out) for case in plan(sets, seed) if (case.seed, None) not in done]
-    names = {day for _, day in done}
-    left += [delayed(run_second)(p) for p in sorted((second / "sets").iterdir()) if p.name not in names] if second else []
-    for row in run_parallel(left, jobs):
-        append_row(log, row)
-        said = row.get("not made") or row["answers"][AS_IT_IS]
-        print(row["seed"], row["true"], said, flush=True)
-    print(table([r for r in read_rows(log) if "answers" in r]))
+    work = {case.seed: delayed(run)(case, out) for case in plan(sets, seed)}
+    if second:
+        work |= {day.name: delayed(run_second)(day) for day in sorted((second / "sets").iterdir())}
+
+    def told(row: Row) -> str:
+        return f"{row['seed']} {row['true']} {row.get('not made') or row['answers'][AS_IT_IS]}"
+
+    print(table([r for r in kept_rows(out / "ablation.jsonl", work, jobs, told) if "answers" in r]))
 
 
 if __name__ == "__main__":

@@ -19,13 +19,12 @@ from joblib import delayed
 
 from tools.benchmarks.diagnosis.answer import in_words, no_answer
 from tools.benchmarks.diagnosis.attribution_table import exact, false_positive, first, flagged, right
-from tools.benchmarks.table import Row, append_row, markdown, read_rows, share
+from tools.benchmarks.table import Row, kept_rows, markdown, share
 from tools.simulators.articulated.day import Recipe, make_set
 from tools.simulators.articulated.drives import all_effects
 from tools.simulators.articulated.robots import ROBOTS
 from twin.diagnosis import Settings, diagnose
 from twin.foundation.errors import TwinError
-from twin.foundation.parallel import run_parallel
 from twin.measurements import read
 from twin.prediction.evaluate import evaluate
 from twin.prediction.twin import Twin
@@ -105,15 +104,13 @@ def main(out: Path, sets: int = 48, seed: int = 42000, jobs: int = 1) -> None:
         out: folder of the days and of articulated_days.jsonl
         jobs: days side by side, each on one core
     """
-    out.mkdir(parents=True, exist_ok=True)
-    log = out / "articulated_days.jsonl"
-    done = {r["seed"] for r in read_rows(log)}
-    left = [delayed(run)(kind, recipe, out) for kind, recipe in plan(sets, seed) if recipe.seed not in done]
-    for row in run_parallel(left, jobs):
-        append_row(log, row)
+    work = {recipe.seed: delayed(run)(kind, recipe, out) for kind, recipe in plan(sets, seed)}
+
+    def told(row: Row) -> str:
         said = f"-> {in_words(row)} {row.get('over_floor')} ({row.get('seconds', np.nan):.0f} s)"
-        print(f"{row['seed']} {row['robot']} {row['true']} {[round(s, 1) for s in row['sigmas']]} {said}", flush=True)
-    print(table(read_rows(log)))
+        return f"{row['seed']} {row['robot']} {row['true']} {[round(s, 1) for s in row['sigmas']]} {said}"
+
+    print(table(kept_rows(out / "articulated_days.jsonl", work, jobs, told)))
 
 
 if __name__ == "__main__":

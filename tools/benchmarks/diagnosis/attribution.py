@@ -26,14 +26,13 @@ from tools.benchmarks import cluster
 from tools.benchmarks.diagnosis.answer import answer
 from tools.benchmarks.diagnosis.attribution_table import table
 from tools.benchmarks.diagnosis.compared import COMPARED, SAME_LAW, distance
-from tools.benchmarks.table import append_row, read_rows
+from tools.benchmarks.table import Row, kept_rows
 from tools.simulators.rod.day import MISMATCH, Recipe, make_set
 from tools.simulators.rod.effects import all_effects
 from tools.simulators.rod.rod import NoEquilibrium
 from twin.diagnosis import Diagnosis
 from twin.effects import catalogue
 from twin.foundation.errors import DataError
-from twin.foundation.parallel import run_parallel
 
 AMPLITUDES = (1.0, 3.0, 8.0)
 DRAWN_DESIGNS = ("default", "default", "default", "mixed", "sideways", "hanging", "by_length", "by_current")
@@ -54,6 +53,11 @@ class Case:
     design: str
     mismatch: str
     coloured: bool
+
+    def recipe(self) -> Recipe:
+        """Return what the simulator makes the set by."""
+        lengths = self.seed % 3 == 0
+        return Recipe(self.effects, self.amplitude, self.seed, self.design, lengths, True, self.coloured, self.mismatch)
 
 
 def plan(sets: int, seed: int, only: str | None = None) -> list[Case]:
@@ -98,17 +102,19 @@ def plan(sets: int, seed: int, only: str | None = None) -> list[Case]:
     return out
 
 
-def run(case: Case, folder: Path) -> dict[str, Any]:
-    """Make one set, diagnose it, keep what the table needs."""
+def run(case: Case, folder: Path) -> Row:
+    """Make one set, diagnose it, and return what the table needs, or why there is none."""
+    told: Row = {key: value for key, value in asdict(case).items() if key != "effects"}
     where = folder / f"set_{case.seed}"
     shutil.rmtree(where, ignore_errors=True)
-    recipe = Recipe(case.effects, case.amplitude, case.seed, case.design, case.seed % 3 == 0, True, case.coloured, case.mismatch)
-    make_set(where, recipe)
-    truth = json.loads((where / "truth.json").read_text())["effects"]
-    row, d = answer(where, case.seed)
+    try:
+        make_set(where, case.recipe())
+        truth = json.loads((where / "truth.json").read_text())["effects"]
+        row, d = answer(where, case.seed)
+    except (DataError, NoEquilibrium) as error:
+        return {**told, "not made": str(error)}
     if d is not None:
         row |= {"truth": truth, "apart": _apart(truth, d)}
-    told = {key: value for key, value in asdict(case).items() if key != "effects"}
     return {**told, "true": list(case.effects), "sigmas": [e["sigmas"] for e in truth], **row}
 
 
@@ -123,14 +129,6 @@ def _apart(truth: list[dict], d: Diagnosis) -> dict[str, float]:
             if tolerance == SAME_LAW:
                 out[t["id"]] = distance(true, found)
     return out
-
-
-def _try(case: Case, folder: Path) -> dict[str, Any]:
-    """Return the row of a set, or why there is none."""
-    try:
-        return run(case, folder)
-    except (DataError, NoEquilibrium) as error:
-        return {"seed": case.seed, "not made": str(error)}
 
 
 def main(
@@ -149,19 +147,17 @@ def main(
         jobs: sets diagnosed side by side, each on one core
         backend: processes here, or Ray: RAY_ADDRESS, else a local one
     """
-    out.mkdir(parents=True, exist_ok=True)
-    log = out / "attribution.jsonl"
-    done = {r["seed"] for r in read_rows(log)}
-    left = (delayed(_try)(case, out) for case in plan(sets, seed, design) if case.seed not in done)
+    work = {case.seed: delayed(run)(case, out) for case in plan(sets, seed, design)}
+
+    def told(row: Row) -> str:
+        if "not made" in row:
+            return f"seed {row['seed']}: not made or not readable: {row['not made']}"
+        said = f"{row['verdict']} {row['claims']} ({row.get('seconds', np.nan):.0f} s)"
+        return f"{row['seed']} {row['true']} {row['sigmas']} {row['design']} {row['mismatch']} -> {said}"
+
     with cluster.backend(backend, jobs):
-        for row in run_parallel(left, jobs):
-            if "not made" in row:
-                print(f"seed {row['seed']}: not made or not readable: {row['not made']}", flush=True)
-                continue
-            append_row(log, row)
-            print(f"{row['seed']} {row['true']} {row['sigmas']} {row['design']} {row['mismatch']} -> {row['verdict']} "
-                  f"{row['claims']} ({row.get('seconds', np.nan):.0f} s)", flush=True)  # fmt: skip
-    print(table(read_rows(log)))
+        rows = kept_rows(out / "attribution.jsonl", work, jobs, told)
+    print(table([r for r in rows if "not made" not in r]))
 
 
 if __name__ == "__main__":

@@ -20,14 +20,13 @@ from joblib import delayed
 
 from tools.benchmarks.diagnosis.answer import answer
 from tools.benchmarks.diagnosis.attribution_table import table
-from tools.benchmarks.table import Row, append_row, read_rows
+from tools.benchmarks.table import Row, kept_rows
 from tools.simulators.motor_rod.day import MotorRecipe, make_motor_day, possible_effects, truth_of
 from tools.simulators.motor_rod.drives import WINDINGS
 from tools.simulators.rod.day import MISMATCH
 from tools.simulators.rod.effects import all_effects
 from tools.simulators.rod.rod import NoEquilibrium
 from twin.foundation.errors import DataError
-from twin.foundation.parallel import run_parallel
 
 KINDS = ("none", "one", "one", "pair", "one", "unknown", "one", "none")
 SIZES = (1.0, 3.0, 8.0)
@@ -73,15 +72,13 @@ def main(out: Path, sets: int = 40, seed: int = 41000, jobs: int = 1) -> None:
         out: folder of the days and of motor_days.jsonl
         jobs: days side by side, each on one core
     """
-    out.mkdir(parents=True, exist_ok=True)
-    log = out / "motor_days.jsonl"
-    done = {r["seed"] for r in read_rows(log)}
-    left = [delayed(run)(kind, recipe, out) for kind, recipe in plan(sets, seed) if recipe.seed not in done]
-    for row in run_parallel(left, jobs):
-        append_row(log, row)
+    work = {recipe.seed: delayed(run)(kind, recipe, out) for kind, recipe in plan(sets, seed)}
+
+    def told(row: Row) -> str:
         said = row.get("not made") or f"{row['sigmas']} -> {row['verdict']} {row['claims']} ({row.get('seconds', np.nan):.0f} s)"
-        print(f"{row['seed']} {row.get('true')} {row['design']} {row['mismatch']} {said}", flush=True)
-    print(table([r for r in read_rows(log) if "not made" not in r]))
+        return f"{row['seed']} {row.get('true')} {row['design']} {row['mismatch']} {said}"
+
+    print(table([r for r in kept_rows(out / "motor_days.jsonl", work, jobs, told) if "not made" not in r]))
 
 
 if __name__ == "__main__":

@@ -48,8 +48,8 @@ class Rule:
     scores: bool = False
 
 
-def _threshold(name: str, value: float, scores: bool = False) -> Rule:
-    return Rule(name, {name: value}, scores=scores)
+def _threshold(name: str, value: float) -> Rule:
+    return Rule(name, {name: value})
 
 
 def _function(function: Callable[..., Any], instead: Callable[..., Any]) -> Rule:

@@ -9,47 +9,39 @@ trials, in mm of a marker: calibrated / after the effects / noise floor. Effects
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import tyro
+from joblib import delayed
 
 from tools.benchmarks.diagnosis.answer import answer, errors_in_words, no_answer
-from tools.benchmarks.diagnosis.attribution_table import flagged, same
-from tools.benchmarks.table import Row, append_row, read_rows
+from tools.benchmarks.diagnosis.attribution_table import first, flagged, same
+from tools.benchmarks.table import Row, kept_rows
 from twin.foundation.errors import TwinError
 
 
-def diagnose_days(folder: Path) -> list[Row]:
-    """Return a row for every set of the folder, in order; what was not there before is added to the file."""
-    log = folder / "diagnosed.jsonl"
-    rows = {row["day"]: row for row in read_rows(log)}
-    for path in sorted((folder / "sets").iterdir()):
-        if path.name in rows:
-            continue
-        try:
-            row, _ = answer(path, 1)
-        except TwinError as error:
-            row = no_answer(error)
-        rows[path.name] = {"day": path.name, **row}
-        append_row(log, rows[path.name])
-        print(f"{path.name} diagnosed, {row.get('seconds', np.nan):.0f} s", flush=True)
-    return [rows[name] for name in sorted(rows)]
+def true_row(day: Path) -> Row:
+    """Return what is true of a day that the simulator wrote: its name, drive, kind and effects, and their sizes in sigma."""
+    truth = json.loads((day.parent.parent / "truth" / f"{day.name}.json").read_text())
+    effects = truth["effects"]
+    kind = "unknown" if not all(e["known"] for e in effects) else ("none", "one", "pair")[len(effects)]
+    return {
+        "day": day.name, "drive": truth["drive"], "kind": kind, "true": [e["id"] for e in effects],
+        "sigmas": [e["size"]["after_refit"] for e in effects],
+    }  # fmt: skip
 
 
-def names(truth: dict[str, Any]) -> list[str]:
-    """Return the true effects."""
-    return [effect["id"] for effect in truth["effects"]]
+def diagnosed(day: Path) -> Row:
+    """Return the answer on a day."""
+    try:
+        return {"day": day.name, **answer(day, 1)[0]}
+    except TwinError as error:
+        return {"day": day.name, **no_answer(error)}
 
 
-def first_is_true(row: Row, effects: list[str]) -> bool:
-    """Return whether the first claim is one of the true effects."""
-    return bool(row["claims"]) and any(same(row["claims"][0], effect) for effect in effects)
-
-
-def exact(row: Row, effects: list[str]) -> bool:
+def exact(row: Row) -> bool:
     """Return whether every claim goes with a true effect of its own, and none is left over."""
-    left = list(effects)
+    left = list(row["true"])
     for claim in row["claims"]:
         match = next((effect for effect in left if same(claim, effect)), None)
         if match is None:
@@ -58,45 +50,44 @@ def exact(row: Row, effects: list[str]) -> bool:
     return not left
 
 
-def kind(truth: dict[str, Any]) -> str:
-    """Return "none", "one", "pair", or "odd" where a true effect is in no catalogue."""
-    if any(not effect["known"] for effect in truth["effects"]):
-        return "odd"
-    return ("none", "one", "pair")[len(truth["effects"])]
-
-
-def day_line(row: Row, truth: dict[str, Any]) -> str:
+def day_line(row: Row) -> str:
     """Return one day of the table."""
-    effects = " + ".join(f"{e['id']} {e['size']['after_refit']:.1f}" for e in truth["effects"]) or "none"
+    effects = " + ".join(f"{name} {sigma:.1f}" for name, sigma in zip(row["true"], row["sigmas"], strict=True)) or "none"
     claims = ", ".join(f"{c} {p:.2f}" for c, p in zip(row["claims"], row["probability"], strict=True)) or "-"
-    return f"{row['day']}  {truth['drive']:12}  {effects:48}  {row['verdict']:16}  {claims:56}  {errors_in_words(row)}"
+    return f"{row['day']}  {row['drive']:12}  {effects:48}  {row['verdict']:16}  {claims:56}  {errors_in_words(row)}"
 
 
-def totals(pairs: list[tuple[Row, dict[str, Any]]]) -> list[str]:
-    """Return counts over rows and their truths."""
+def totals(rows: list[Row]) -> list[str]:
+    """Return counts over rows that have their truths."""
 
     def count(of: str, hits: list[bool]) -> str:
         return f"{of:44}{sum(hits)}/{len(hits)}"
 
-    by = {name: [(row, truth) for row, truth in pairs if kind(truth) == name] for name in ("none", "one", "pair", "odd")}
-    over = [row["after"] / row["floor"] for row, _ in (*by["one"], *by["pair"]) if "after" in row]
+    by = {kind: [row for row in rows if row["kind"] == kind] for kind in ("none", "one", "pair", "unknown")}
+    over = [row["after"] / row["floor"] for row in (*by["one"], *by["pair"]) if "after" in row]
     ratios = [f"{q:.2f}" for q in np.quantile(over, [0.5, 0.9])] if over else ["-"]
     return [
-        count("false positives, no effect", [bool(row["claims"]) or row["verdict"] != "noise" for row, _ in by["none"]]),
-        count("right effect first, one effect", [first_is_true(row, names(truth)) for row, truth in by["one"]]),
-        count("exact set, one effect", [exact(row, names(truth)) for row, truth in by["one"]]),
-        count("first is a true one, two effects", [first_is_true(row, names(truth)) for row, truth in by["pair"]]),
-        count("exact set, two effects", [exact(row, names(truth)) for row, truth in by["pair"]]),
-        count("out of catalogue, flagged", [flagged(row) for row, _ in by["odd"]]),
+        count("false positives, no effect", [bool(row["claims"]) or row["verdict"] != "noise" for row in by["none"]]),
+        count("right effect first, one effect", [first(row) for row in by["one"]]),
+        count("exact set, one effect", [exact(row) for row in by["one"]]),
+        count("first is a true one, two effects", [first(row) for row in by["pair"]]),
+        count("exact set, two effects", [exact(row) for row in by["pair"]]),
+        count("out of catalogue, flagged", [flagged(row) for row in by["unknown"]]),
         f"{'held-out error over floor, known (median, 90 %)':48}{', '.join(ratios)}",
     ]
 
 
 def main(folder: tyro.conf.Positional[Path]) -> None:
     """Diagnose the days of a folder and print the table."""
-    rows = diagnose_days(folder)
-    pairs = [(row, json.loads((folder / "truth" / f"{row['day']}.json").read_text())) for row in rows]
-    print("\n".join([*(day_line(*pair) for pair in pairs), "", *totals(pairs)]))
+    days = {day.name: day for day in sorted((folder / "sets").iterdir())}
+    work = {name: delayed(diagnosed)(day) for name, day in days.items()}
+
+    def told(row: Row) -> str:
+        return f"{row['day']} diagnosed, {row.get('seconds', np.nan):.0f} s"
+
+    found = {row["day"]: row for row in kept_rows(folder / "diagnosed.jsonl", work, 1, told)}
+    rows = [found[name] | true_row(day) for name, day in days.items()]
+    print("\n".join([*(day_line(row) for row in rows), "", *totals(rows)]))
 
 
 if __name__ == "__main__":

@@ -72,6 +72,7 @@ def pulled(model: mujoco.MjModel, steps: int) -> np.ndarray:
 
 
 def timed(work: Callable[[], object]) -> float:
+    """Return the process time (s) of some work."""
     began = time.process_time()
     work()
     return time.process_time() - began

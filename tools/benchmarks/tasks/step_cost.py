@@ -6,14 +6,13 @@ All twins take the same random actions, turn about; bare MuJoCo then makes as ma
 that the twin was left in. Process time, medians of the repeats and of their ratios, since other work on the machine slows all.
 """
 
-import time
-from collections.abc import Callable
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 import tyro
 
+from tools.benchmarks.solvers.rollout_speed import timed
 from twin.effects import effect_class
 from twin.env.continuum import ContinuumReach
 from twin.env.plants.rod_plant import RodPlant
@@ -33,13 +32,6 @@ def twins() -> dict[str, Twin]:
         rubs = effect_class("tendon_friction")({"mu": MU, "presliding": presliding})
         found[f"friction and creep, {name}"] = replace(found["creep"], effects=(rubs, *found["creep"].effects))
     return found
-
-
-def timed(work: Callable[[], object]) -> float:
-    """Return the process time (s) of some work."""
-    began = time.process_time()
-    work()
-    return time.process_time() - began
 
 
 def motion(env: ContinuumReach) -> ChainMotion:

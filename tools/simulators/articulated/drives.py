@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from tools.simulators.articulated.bench import channels
-from tools.simulators.articulated.effects import SESSION, Columns, Effect, has_tendons, mechanical, one_of
+from tools.simulators.articulated.effects import SESSION, Columns, Effect, mechanical, one_of
 from tools.simulators.articulated.plant import Plant
 from tools.simulators.articulated.robots import Robot
 
@@ -20,11 +20,8 @@ class TendonFriction(Effect):
     share: np.ndarray
 
     id = "tendon_friction"
+    acts_on = "winches"
     most = 2.0
-
-    @classmethod
-    def fits(cls, robot: Robot) -> bool:
-        return has_tendons(robot)
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:
@@ -41,10 +38,7 @@ class TendonElasticity(Effect):
     tendon: np.ndarray
 
     id = "tendon_elasticity"
-
-    @classmethod
-    def fits(cls, robot: Robot) -> bool:
-        return has_tendons(robot)
+    acts_on = "winches"
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:
@@ -63,10 +57,7 @@ class TendonBacklash(Effect):
     drive: np.ndarray
 
     id = "tendon_backlash"
-
-    @classmethod
-    def fits(cls, robot: Robot) -> bool:
-        return has_tendons(robot)
+    acts_on = "winches"
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:
@@ -84,10 +75,7 @@ class DriveZero(Effect):
     drive: np.ndarray
 
     id = "drive_zero"
-
-    @classmethod
-    def fits(cls, robot: Robot) -> bool:
-        return has_tendons(robot)
+    acts_on = "winches"
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:

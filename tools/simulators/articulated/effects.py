@@ -8,7 +8,7 @@ day asks of a joint (`Joint.load`, N m) or a drive (`Drive.peak`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -29,11 +29,12 @@ class Effect:
     id: ClassVar[str]
     in_catalogue: ClassVar[bool] = True
     most: ClassVar[float] = np.inf  # the largest strength that makes sense
+    acts_on: ClassVar[Literal["", "winches", "servos"]] = ""  # what a robot needs for it
 
     @classmethod
     def fits(cls, robot: Robot) -> bool:
         """Return whether the robot has what the effect acts on."""
-        return True
+        return not cls.acts_on or bool(getattr(robot, cls.acts_on))
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:
@@ -47,11 +48,6 @@ class Effect:
     def on_columns(self, columns: Columns, clock: np.ndarray) -> Columns:
         """Return what is logged instead of these outputs, at these times of the session."""
         return columns
-
-
-def has_tendons(robot: Robot) -> bool:
-    """Return whether a robot is pulled by tendons."""
-    return bool(robot.winches)
 
 
 def one_of(count: int, rng: np.random.Generator) -> np.ndarray:
@@ -97,11 +93,8 @@ class LoadDependentFriction(Effect):
     servo: np.ndarray
 
     id = "load_dependent_friction"
+    acts_on = "servos"
     most = 0.8
-
-    @classmethod
-    def fits(cls, robot: Robot) -> bool:
-        return bool(robot.servos)
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:
@@ -119,11 +112,8 @@ class ReflectedInertia(Effect):
     joint: np.ndarray
 
     id = "reflected_inertia"
+    acts_on = "servos"
     most = 20.0
-
-    @classmethod
-    def fits(cls, robot: Robot) -> bool:
-        return bool(robot.servos)
 
     @classmethod
     def draw(cls, robot: Robot, rng: np.random.Generator) -> Self:

@@ -24,7 +24,7 @@ class Hand:
     traction: np.ndarray  # (k, s) 1/mm^2, integrates to 1
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, skin: Skin, duration: float, strength: float = 1.0) -> Hand:
+    def draw(cls, rng: np.random.Generator, skin: Skin, duration: float) -> Hand:
         """Pushes of 2.5 to 6 s one after another and overlapping, over in the last half second."""
         begin = np.arange(REST_BEFORE_HAND + 1.0, duration - 3.0, 2.2)
         count = len(begin)
@@ -37,7 +37,7 @@ class Hand:
         patch /= (patch * skin.area).sum(1, keepdims=True)
         # Inwards and askew; lower patches need more force for the same bend.
         aim = np.column_stack([-np.cos(azimuth), -np.sin(azimuth), np.zeros(count)]) + rng.normal(0.0, 0.3, (count, 3))
-        force = strength * rng.uniform(0.15, 0.5, count) * np.minimum((90.0 / (height - 10.0)) ** 1.5, 2.0)
+        force = rng.uniform(0.15, 0.5, count) * np.minimum((90.0 / (height - 10.0)) ** 1.5, 2.0)
         return cls(begin, end, force[:, None] * aim / np.linalg.norm(aim, axis=1, keepdims=True), patch)
 
     @classmethod

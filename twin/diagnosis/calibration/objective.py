@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from joblib import Parallel, delayed
 
-from twin.body import SOLVE_TOLERANCE, Drive
+from twin.body import Drive
 from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.noise.whitening import Whitener
 from twin.effects import Effect
@@ -79,9 +79,9 @@ class Objective:
         return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
 
     def predict(
-        self, twin: Twin, near: Mapping[int, Trace] | None = None, keep: bool = False, once: bool = False
+        self, twin: Twin, near: Mapping[int, Trace] | None = None, once: bool = False
     ) -> tuple[dict[int, Trace], list[np.ndarray]]:
-        way = SolveOptions(near or {}, keep, once, SOLVE_TOLERANCE if keep else DERIVATIVE_TOLERANCE)
+        way = SolveOptions(near or {}, False, once, DERIVATIVE_TOLERANCE)
         traces = dict(iterate_traces(twin, self.prepared, self.trials, way))
         return traces, [traces[k].outputs(twin, self.prepared) for k in self.trials]
 

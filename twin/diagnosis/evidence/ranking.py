@@ -64,9 +64,9 @@ def rank(
 def promised_change(objective: Objective, fit: Fit, known: Dictionary, candidate: Candidate) -> np.ndarray:
     """Return the change of z (n * m,) that a candidate's white pattern promises, the model's own parameters fitted along."""
     pattern = next(p for p in known.patterns if p.effect == candidate.effect and p.start == candidate.start)
-    C, own = known.columns[:, list(pattern.where)], fit.J[:, ~fit.at_bound()]
-    held = own.T @ own + np.diag(prior_weight(fit.model)[~fit.at_bound()] ** 2) + 1e-9 * np.eye(own.shape[1])
-    left = C - own @ solve(held, own.T @ C)
+    C = known.columns[:, list(pattern.where)]
+    own, imitation = _imitated(fit.J.T @ np.concatenate([fit.J, C], axis=1), fit)
+    left = C - fit.J[:, own] @ imitation[:, fit.J.shape[1] :]
     return left @ _amplitudes(C.T @ left, left.T @ fit.z, pattern.least(objective.prepared.n_tendon))
 
 
@@ -76,9 +76,18 @@ def projected(X: np.ndarray, VX: np.ndarray, fit: Fit) -> np.ndarray:
     A parameter at an end of its range imitates nothing.
     """
     S = X.T @ VX
+    own, imitation = _imitated(S, fit)
+    return S - S[:, own] @ imitation
+
+
+def _imitated(S: np.ndarray, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Return which of the model's own parameters are free, and the changes of these that imitate each column; S = J' V^-1 [J, ...].
+
+    Rows of S after those of J are not looked at.
+    """
     own = np.flatnonzero(~fit.at_bound())
     JJ = S[np.ix_(own, own)] + np.diag(prior_weight(fit.model)[own] ** 2) + 1e-9 * np.eye(len(own))
-    return S - S[:, own] @ solve(JJ, S[own, :])
+    return own, solve(JJ, S[own, :])
 
 
 def gains(X: np.ndarray, VX: np.ndarray, fit: Fit, known: Dictionary, objective: Objective) -> list[float]:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import ClassVar
@@ -58,6 +58,12 @@ class FitStart:
     values: Mapping[str, float]
     free: tuple[str, ...]
     needs: frozenset[str] = frozenset()
+
+
+def each_then_all(single: Sequence[Mapping[str, float]]) -> Iterator[FitStart]:
+    """Yield a start with each of these values alone, such as those of one drive; of several, then also one with all of them."""
+    for values in (*single, *([{k: v for s in single for k, v in s.items()}] if len(single) > 1 else [])):
+        yield FitStart(values, tuple(values))
 
 
 class Effect(ABC):

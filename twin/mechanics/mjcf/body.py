@@ -44,11 +44,6 @@ SENSOR_UNITS = {
 }  # fmt: skip
 
 
-def joint_units(model: mujoco.MjModel, k: int) -> str:
-    """Return the SI unit of a joint's position."""
-    return "m" if slides(model, "joint", k) else "rad"
-
-
 def sensor_unit(model: mujoco.MjModel, k: int) -> str:
     """Return the SI unit of a sensor's readings: of what turns, or of what slides, where its element tells."""
     kind, element = _S(int(model.sensor_type[k])), int(model.sensor_objid[k])

@@ -28,7 +28,7 @@ import numpy as np
 
 from twin.foundation.compiled import jit_internal
 
-MUJOCO_PULLEY, MUJOCO_SITE = 2, 3  # mjtWrap
+MUJOCO_SITE = 3  # mjtWrap
 PULLEY_POINT, SITE_POINT = -2, -1  # of mjData.wrap_obj; others are geoms
 LARGEST_LOSS = 40.0  # exponents of a capstan: beyond it nothing is left of a pull
 # Of the damping that would make a step implicit in the springs of what sticks: steps are stable from a quarter on.

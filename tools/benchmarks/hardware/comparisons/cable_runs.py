@@ -11,18 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.benchmarks.hardware.comparisons.cable_tool import loops
+from tools.benchmarks.hardware.comparisons.cable_tool import loops, objective_of
 from tools.benchmarks.hardware.comparisons.row import Row
 from tools.benchmarks.hardware.importers import cable_tool
 from twin.diagnosis.calibration.fit import Fit, fit
 from twin.diagnosis.calibration.model import Free, Model
-from twin.diagnosis.calibration.objective import PARAMETER_DIFFERENCE, Objective
-from twin.diagnosis.noise.model import Noise
-from twin.diagnosis.noise.whitening import Whitener
+from twin.diagnosis.calibration.objective import PARAMETER_DIFFERENCE
 from twin.effects import effect_class
 from twin.measurements import Recording
 from twin.prediction.evaluate import evaluate
-from twin.prediction.prepared import prepare
 from twin.prediction.twin import Twin
 from twin.robots import load
 
@@ -142,11 +139,7 @@ def make() -> Twin:
 
 def refitted(twin: Twin, recording: Recording) -> Fit:
     """The robot's own numbers and those of its law fitted to a recording, each held by what is believed of it."""
-    bench = prepare(recording, twin.robot)
-    nothing = [np.zeros((*y.shape, bench.n_tendon)) for y in bench.measured]
-    noise = Noise(np.full(1, cable_tool.REPEATS), np.zeros(bench.n_tendon), np.zeros(1), "repeats")
-    whitener = Whitener(noise, bench.measured, nothing, [i.command for i in bench.inputs])
-    objective = Objective(bench, range(len(bench.inputs)), whitener, 1)
+    objective = objective_of(twin, recording)
     tables = {effect: {p.name: p for p in effect_class(effect).all_parameters(2)} for effect in MAKE}
     law = tuple(
         Free(effect, replace(tables[effect][name], value=value, std=spread))

@@ -77,14 +77,19 @@ def _others(folder: Path, found: Diagnosis) -> str:
     return ", ".join(told) + " deg"
 
 
-def _refitted(twin: Twin, recording: Recording) -> Twin:
-    """The twin with its pulley's radius and its encoder's zero fitted to a recording."""
+def objective_of(twin: Twin, recording: Recording) -> Objective:
+    """Return the objective of fits to all runs of a recording, whose noise is how the motors' encoders repeat."""
     bench = prepare(recording, twin.robot)
     nothing = [np.zeros((*y.shape, bench.n_tendon)) for y in bench.measured]
     noise = Noise(np.full(1, cable_tool.REPEATS), np.zeros(bench.n_tendon), np.zeros(1), "repeats")
     whitener = Whitener(noise, bench.measured, nothing, [i.command for i in bench.inputs])
+    return Objective(bench, range(len(bench.inputs)), whitener, 1)
+
+
+def _refitted(twin: Twin, recording: Recording) -> Twin:
+    """The twin with its pulley's radius and its encoder's zero fitted to a recording."""
     free = tuple(f for f in Model.base(twin.robot, twin).free if f.parameter.name in ("pulley.radius", "jaw.rest"))
-    return fit(Objective(bench, range(len(bench.inputs)), whitener, 1), Model(twin, free)).model.twin
+    return fit(objective_of(twin, recording), Model(twin, free)).model.twin
 
 
 def split(recording: Recording) -> tuple[Recording, Recording]:

@@ -6,8 +6,6 @@ sets with either are refused unless a rate is given.
 """
 
 import json
-import os
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from twin.foundation.errors import DataError, short_repr
+from twin.foundation.files import written_whole
 from twin.measurements.channels import Channel, Role
 from twin.measurements.logs.export.even_steps import at_even_steps
 from twin.measurements.recording import Recording, Trial
@@ -38,19 +37,11 @@ def write_lerobot(recording: Recording, folder: Path, rate: float | None = None)
         rate = _even_rate(recording)
     else:
         recording = at_even_steps(recording, rate)
-    draft = folder.absolute().parent / f".{folder.absolute().name}.{os.getpid()}.writing"
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise DataError(f"{folder}: holds something already and is not overwritten; name a new folder")
-        try:
-            draft.mkdir(parents=True)
+        with written_whole(folder) as draft:
             _write(recording, rate, draft)
-            if folder.exists():
-                folder.rmdir()
-            draft.rename(folder)
-        except BaseException:
-            shutil.rmtree(draft, ignore_errors=True)
-            raise
     except (OSError, pa.ArrowException) as fault:
         raise DataError(f"{folder}: cannot be written ({short_repr(str(fault))}); choose another place") from None
 
