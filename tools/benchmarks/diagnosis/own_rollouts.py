@@ -18,13 +18,13 @@ import numpy as np
 import tyro
 from joblib import delayed
 
-from tools.benchmarks.table import Row, append_row, markdown, read_rows, share
+from tools.benchmarks.diagnosis.answer import in_words, no_answer
+from tools.benchmarks.table import Row, kept_rows, markdown, share
 from twin.body import Drive
 from twin.diagnosis import Settings, diagnose
 from twin.effects import effect_class
 from twin.effects.base.scaling import scaled_effect
 from twin.foundation.errors import TwinError
-from twin.foundation.parallel import run_parallel
 from twin.prediction.evaluate import evaluate
 from twin.prediction.rollout import Drawing, draw_controls, rollout
 from twin.prediction.twin import Twin
@@ -53,6 +53,11 @@ class Case:
     rate: float
     effect: str
 
+    @property
+    def day(self) -> str:
+        """Its name among the rows."""
+        return f"{self.robot} {self.drive} {self.rate:g} Hz {self.effect}"
+
 
 def cases(robots: tuple[str, ...] = ROBOTS, rates: tuple[float, ...] = RATES) -> list[Case]:
     """Return the cases of these robots, each with the drives it has."""
@@ -69,20 +74,20 @@ def run(case: Case, seed: int) -> Row:
     robot = load(case.robot)
     laws = [(name, values) for name, values in EFFECTS[case.effect] if effect_class(name).needs <= robot.build().features]
     if case.effect != "none" and not laws:
-        return {**asdict(case), "not made": "no such effect acts on it"}
+        return {**asdict(case), "day": case.day, "not made": "no such effect acts on it"}
     described = Twin.of(robot)
     effects = [scaled_effect(effect_class(name), values, robot.n_tendon, robot.size) for name, values in laws[:1]]
     true = Twin(robot, {}, tuple(effects))
     drive = Drive(case.drive)
     drawing = Drawing(rate=case.rate) if drive is Drive.CONTROL else Drawing(rate=case.rate, drive=drive)
-    row: Row = {**asdict(case), "law": laws[0][0] if laws else ""}
+    row: Row = {**asdict(case), "day": case.day, "law": laws[0][0] if laws else ""}
     began = time.perf_counter()
     try:
         recording = rollout(true, draw_controls(described, TRIALS, seed, drawing), noise=NOISE, seed=seed).recording
         row["sigma"] = 1e-3 * float(evaluate(described, recording)["rmse"]) / (np.sqrt(3.0) * NOISE)
         found = diagnose(recording, described, Settings(seed=seed, jobs=1))
     except TwinError as error:
-        return {**row, "verdict": "no answer", "claims": [], "description": str(error)}
+        return {**row, **no_answer(error)}
     return {**row, "verdict": found.verdict, "claims": [c.effect for c in found.claims], "seconds": time.perf_counter() - began}
 
 
@@ -100,9 +105,7 @@ def table(rows: list[Row]) -> str:
         mine = [r for r in seen if (r["robot"], r["drive"]) == key]
         lines.append([*key, share([not right(r) for r in mine if not r["law"]]), share([right(r) for r in mine if r["law"]])])
     lines.append(["all", "", share([not right(r) for r in seen if not r["law"]]), share([right(r) for r in seen if r["law"]])])
-    wrong = [
-        f"  {r['robot']} {r['drive']} {r['rate']:g} Hz, {r['effect']}: {r['verdict']} {r['claims']}" for r in seen if not right(r)
-    ]
+    wrong = [f"  {r['day']}: {in_words(r)}" for r in seen if not right(r)]
     return "\n".join([markdown(["robot", "drive", "false", "right first"], lines), "", *wrong])
 
 
@@ -113,14 +116,9 @@ def main(out: Path, robots: tuple[str, ...] = ROBOTS, rates: tuple[float, ...] =
         out: folder of own_rollouts.jsonl
         jobs: cases side by side, each on one core
     """
-    out.mkdir(parents=True, exist_ok=True)
-    log = out / "own_rollouts.jsonl"
-    done = {(r["robot"], r["drive"], r["rate"], r["effect"]) for r in read_rows(log)}
-    left = [delayed(run)(c, seed) for c in cases(robots, rates) if (c.robot, c.drive, c.rate, c.effect) not in done]
-    for row in run_parallel(left, jobs):
-        append_row(log, row)
-        print({k: round(v, 1) if isinstance(v, float) else v for k, v in row.items()}, flush=True)
-    print(table(read_rows(log)))
+    work = {c.day: delayed(run)(c, seed) for c in cases(robots, rates)}
+    rows = kept_rows(out / "own_rollouts.jsonl", work, jobs, lambda row: f"{row['day']}: {row.get('not made') or in_words(row)}")
+    print(table(rows))
 
 
 if __name__ == "__main__":
