@@ -10,6 +10,7 @@ hand_task.py             the tasks of `twin.tasks`: twin/HandHold-v0, -Turn-, -P
 goals.py                 the same goal-conditioned: twin/ContinuumReachGoal-v0, twin/FingerShapeGoal-v0, twin/HandReorientGoal-v0
 episodes/                what all of them share: options, drawn twins, observations, saved states, frames
 batch.py                 many environments in threads, for `gymnasium.make_vec`
+sb3.py                   such a batch as Stable-Baselines3's VecEnv
 dm.py                    the continuum tasks as dm_env
 plants/                  robots stepped in time under commands, with their effects
 """

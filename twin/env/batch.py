@@ -4,7 +4,7 @@ Each environment has its own twin, random numbers and motion, so that its result
 threads.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -52,20 +52,18 @@ class ThreadedVectorEnv(VectorEnv):
         )
         if len(seeds) != self.num_envs:
             raise DataError(f"{len(seeds)} seeds came for {self.num_envs} environments; give one each, or one number")
-        results = list(
-            self._threads.map(lambda one: one[0].reset(seed=one[1], options=options), zip(self.envs, seeds, strict=True))
-        )
-        self._steps_taken[:], self._ended[:] = 0, False
-        return self._gather_observations([seen for seen, _ in results]), self._gather_info([info for _, info in results])
+        results = self.map(self.reset_one, range(self.num_envs), seeds, [options] * self.num_envs)
+        self._ended[:] = False
+        return self.gather_observations([seen for seen, _ in results]), self._gather_info([info for _, info in results])
 
     def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Step all environments. Raises DataError for actions of another shape or that are not finite."""
         if len(actions) != self.num_envs:
             raise DataError(f"{len(actions)} actions came for {self.num_envs} environments; one each is needed")
-        results = list(self._threads.map(self._step_one, range(self.num_envs), actions))
+        results = self.map(self._step_or_reset, range(self.num_envs), actions)
         observations, reward, terminated, truncated, infos = zip(*results, strict=True)
         self._ended = np.array(terminated) | np.array(truncated)
-        seen = self._gather_observations(observations)
+        seen = self.gather_observations(observations)
         return seen, np.array(reward, float), np.array(terminated), np.array(truncated), self._gather_info(infos)
 
     def render(self) -> tuple[Any, ...] | None:
@@ -78,17 +76,29 @@ class ThreadedVectorEnv(VectorEnv):
             env.close()
         self._threads.shutdown()
 
-    def _step_one(self, i: int, action: np.ndarray) -> StepResult:
-        """Step environment i, or reset it where its episode has ended."""
-        if self._ended[i]:
-            self._steps_taken[i] = 0
-            observation, info = self.envs[i].reset()
-            return observation, 0.0, False, False, info
+    def map(self, work: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
+        """Return what `work` returns for each of some arguments, as the built-in `map`, in the threads."""
+        return list(self._threads.map(work, *arguments))
+
+    def reset_one(self, i: int, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Reset environment i."""
+        self._steps_taken[i] = 0
+        return self.envs[i].reset(seed=seed, options=options)
+
+    def step_one(self, i: int, action: np.ndarray) -> StepResult:
+        """Step environment i, truncated after the steps of an episode."""
         observation, reward, terminated, truncated, info = self.envs[i].step(action)
         self._steps_taken[i] += 1
         return observation, float(reward), terminated, truncated or bool(self._steps_taken[i] >= self._max_steps), info
 
-    def _gather_observations(self, observations: Sequence[Any]) -> Any:
+    def _step_or_reset(self, i: int, action: np.ndarray) -> StepResult:
+        """Step environment i, or reset it where its episode has ended."""
+        if self._ended[i]:
+            observation, info = self.reset_one(i)
+            return observation, 0.0, False, False, info
+        return self.step_one(i, action)
+
+    def gather_observations(self, observations: Sequence[Any]) -> Any:
         """Gather the observations of all environments, an array or a Dict of them."""
         return concatenate(
             self.single_observation_space, observations, create_empty_array(self.single_observation_space, self.num_envs)
