@@ -62,6 +62,20 @@ def test_the_tip_comes_nearer_to_its_goal(capsys: pytest.CaptureFixture[str]) ->
     assert 1e3 * best < away
 
 
+def test_a_policy_s_learning_is_logged_for_tensorboard(tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3", reason="pip install '.[policy]'")
+    pytest.importorskip("tensorboard", reason="pip install '.[policy]'")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    environment.learn(tmp_path, steps=400)
+    (folder,) = tmp_path.iterdir()
+    log = EventAccumulator(str(folder))
+    log.Reload()
+    (earned,) = log.Scalars("rollout/ep_rew_mean")
+    assert earned.step == 400  # four episodes of a hundred steps
+    assert earned.value < 0.0
+
+
 def test_a_finger_feels_its_shape(capsys: pytest.CaptureFixture[str]) -> None:
     shape_from_strain.main(trials=1)
     assert "609 points" in capsys.readouterr().out

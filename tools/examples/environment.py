@@ -1,7 +1,11 @@
 """A gymnasium environment on a twin: bring the tip to a goal, with the effects that a diagnosis found.
 
-python -m tools.benchmarks.tasks.reach_policy trains a policy in it (extra `policy`).
+With a folder, as in `python -m tools.examples.environment logs/`, a policy learns in four at once as well (extra `policy`);
+`tensorboard --logdir logs/` shows it learning. python -m tools.benchmarks.tasks.reach_policy trains one to the end.
 """
+
+import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -27,5 +31,20 @@ def main(steps: int = 40) -> float:
     return best
 
 
+def learn(log: Path, steps: int = 20_000) -> None:
+    # %% The libraries are imported here, since the search above needs neither.
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from twin.env.sb3 import BatchVecEnv
+
+    batch = gymnasium.make_vec("twin.env:twin/ContinuumReach-v0", 4, twin="continuum", dynamic=False)
+    envs = VecMonitor(BatchVecEnv(batch), info_keywords=("is_success",))  # what an episode earned goes to the log
+    PPO("MlpPolicy", envs, n_steps=100, batch_size=100, tensorboard_log=str(log), seed=1, device="cpu").learn(steps)
+    envs.close()
+
+
 if __name__ == "__main__":
     main()
+    if len(sys.argv) > 1:
+        learn(Path(sys.argv[1]))
