@@ -9,11 +9,12 @@ from twin.foundation.parameters import Parameter
 
 
 class LoadDependentFriction(Effect):
-    """Each joint is held back by f = share |tau| z, tau the torque (N m; N of a slide) of the actuators on it, z its slip state,
+    """Each joint with a gear is held back by f = share |tau| z, tau its actuators' torque (N m; N of a slide), z its slip state,
 
         z' = s + (z - s) exp(-|turn| / presliding),    s the direction of the turn.
 
-    It grows with payload and outstretched poses, where `joint_friction` stays as it is.
+    It grows with payload and outstretched poses, where `joint_friction` stays as it is. A joint has a gear where an actuator turns
+    it by itself; what a tendon turns has none, and the tendon's own friction grows with its tension (`tendon_friction`).
 
     Source: geared servos, Duclusaud, Passault, Padois and Ly (BAM, ICRA 2025): 5-20 % of the torque through the gear; Dahl (1968).
 

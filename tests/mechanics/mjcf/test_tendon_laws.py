@@ -10,11 +10,12 @@ import pytest
 
 from tests.mechanics.mjcf.models import PENDULUM, robot
 from twin.body import Drive, Loads, Problem, Route, Signals, Start
+from twin.body.counts import joint_names
 from twin.diagnosis.calibration.model import Model
 from twin.effects import Effect, effect_class
 from twin.foundation.errors import DataError
 from twin.measurements import Channel, Recording, Trial
-from twin.mechanics.mjcf import ModelBody
+from twin.mechanics.mjcf import ModelBody, geared
 from twin.prediction.twin import Twin
 from twin.robots import Robot, load
 from twin.robots.schemas.mjcf import counts_of
@@ -215,3 +216,15 @@ def test_a_damped_winch_pulls_late_through_its_line(tmp_path: Path) -> None:
     # N: the lever still turns by 1e-4 rad, and so the path by 2 um
     assert np.abs(found.tension[:, 0] - wanted).max() < 0.01
     assert np.ptp(wanted) > 4.0
+
+
+def test_load_rubs_in_the_gears_of_joints_that_an_actuator_turns_by_itself() -> None:
+    """The leg's hip has a servo; its knee is pulled by a tendon and has no gear, however large the share."""
+    leg = load("tendon_leg")
+    body = leg.build()
+    assert isinstance(body, ModelBody)
+    assert dict(zip(joint_names(leg.n_tendon), geared(body.model), strict=True)) == {"hip": True, "knee": False}
+    assert "load friction" in body.features
+    spec = body.spec.copy()
+    spec.delete(spec.actuators[0])
+    assert not geared(spec.compile()).any()

@@ -14,7 +14,7 @@ from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
 from twin.mechanics.mjcf.poses import contacts_at_start
 from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
-from twin.mechanics.mjcf.routes import outward, winches_of
+from twin.mechanics.mjcf.routes import geared, outward, winches_of
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
 from twin.mechanics.mjcf.written import check_same, name_element, written_model
 
@@ -38,6 +38,7 @@ __all__ = [
     "copied",
     "element_senses",
     "exact_text",
+    "geared",
     "half_step",
     "load_model",
     "model_size",

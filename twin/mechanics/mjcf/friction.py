@@ -3,7 +3,7 @@
 A joint rubs with F z, z its slip state in [-1, 1] that follows Dahl's law over a turn dq,
 
     z' = s + (z - s) exp(-|dq| / presliding),    s = sign dq,
-    F = (torque + breakaway exp(-(v / stribeck)^2) + load |torque of its actuators|),
+    F = (torque + breakaway exp(-(v / stribeck)^2) + load |torque of its actuators|),    load of joints with a gear (`geared`)
 
 so that short of sliding it is a spring F / presliding. The step ahead is implicit in that spring: the joint's damping is raised by
 h F (1 - z s) / presliding for one step, which nothing is left of once it slides.

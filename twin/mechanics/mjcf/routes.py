@@ -42,6 +42,14 @@ def winches_of(loaded: LoadedModel) -> tuple[Winch, ...]:
     return tuple(found)
 
 
+def geared(model: mujoco.MjModel) -> np.ndarray:
+    """Return which joints (njnt,) an actuator turns by itself and not through a tendon: its torque goes through their gears."""
+    on_joints = np.isin(model.actuator_trntype, (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)))
+    driven = np.zeros(model.njnt, bool)
+    driven[model.actuator_trnid[on_joints, 0]] = True
+    return driven
+
+
 @lru_cache(maxsize=32)
 def outward(loaded: LoadedModel) -> Mapping[str, np.ndarray]:
     """Return, by the name of each tendon that crosses a hinge, its sites' unit shifts (nsite, 3) away from the nearest such hinge.

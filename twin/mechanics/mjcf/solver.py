@@ -12,6 +12,7 @@ from twin.body import DIRECT, NOT_FOUND, Loads, Problem, Route, Solution
 from twin.mechanics.mjcf.body import ModelBody, line_lag, payload_places
 from twin.mechanics.mjcf.friction import JointLaws, Paths, Slip, Tree
 from twin.mechanics.mjcf.poses import add_masses, set_start
+from twin.mechanics.mjcf.routes import geared
 from twin.mechanics.mjcf.stepping import LARGEST_RATE, Laws, Memory, Views, run
 
 LONGEST_STEP = 2e-3  # s: for a finger of 30 g on winches of 2 N/mm a hundredth of a degree from the limit of short steps
@@ -234,8 +235,9 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
     """Return the laws that effects put between the steps."""
     rub, model, n = route.rubbing, now.model, len(body.joints)
     each = [np.array(x, float) if x else np.zeros(n) for x in (rub.torque, rub.breakaway, rub.load, rub.viscous)]
-    rubs = np.flatnonzero(each[0] + each[1] + each[2] > 0.0)
     joints = np.array(body.joints, np.int64)
+    each[2] = each[2] * geared(model)[joints]
+    rubs = np.flatnonzero(each[0] + each[1] + each[2] > 0.0)
     dof, qpos = model.jnt_dofadr[joints].astype(np.int64), model.jnt_qposadr[joints].astype(np.int64)
     model.dof_damping[dof] = body.model.dof_damping[dof] + each[3]
     torque, breakaway, load = (x[rubs] for x in each[:3])

@@ -19,6 +19,7 @@ from twin.mechanics.mjcf import (
     control_span,
     control_unit,
     element_senses,
+    geared,
     load_model,
     outward,
     payload_places,
@@ -96,12 +97,12 @@ class _Known:
             "encoders",
             "drifting sensors",
             "friction of joints",
-            "load friction",
             "markers",
             "stops",
         }
         if np.linalg.norm(model.opt.gravity) > 0.0:
             features |= {"weight"}
+        features |= {"load friction"} if geared(model)[list(self.joints)].any() else set()
         features |= ({"lines"} if winches_of(loaded) else set()) | ({"holes"} if outward(loaded) else set())
         self.features = frozenset(features)
 
