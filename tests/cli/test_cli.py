@@ -42,9 +42,10 @@ def test_the_bundled_sample_is_diagnosed(diagnosed: tuple[Path, Done]) -> None:
     assert report["verdict"] == "explained"
     assert [e["id"] for e in report["effects"]] == ["tendon_friction"]
     error = report["error"]
-    # The effect is large in the sample (3.4 sigma): without it the error is over twice the floor, with it within a tenth of it.
-    assert error["calibrated"] > 2 * error["noise_floor"]
-    assert error["after"] < 1.1 * error["noise_floor"]
+    # The effect is large in the sample (3.4 sigma): without it the error is over three times the floor. With it, most trials are at
+    # the floor and wander_4, held out or not, at 1.35 of it, where a tendon slips: an RMS of 1.07 of six, and fast ones are at 1.1.
+    assert error["calibrated"] > 3 * error["noise_floor"]
+    assert error["after"] < 1.15 * error["noise_floor"]
     assert tomllib.loads((folder / "twin.toml").read_text())["format"] == "twin/1"
 
 

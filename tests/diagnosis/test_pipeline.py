@@ -10,17 +10,13 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.checks.test_design import bench
+from tests.report.small_diagnosis import diagnosis
 from tools.simulators.rod.design import bench_day
 from twin.diagnosis import Settings, pipeline
 from twin.diagnosis.budget import Budget
-from twin.diagnosis.conclusion import Conclusion
-from twin.diagnosis.diagnosis import Errors, Missed
+from twin.diagnosis.diagnosis import Missed
 from twin.diagnosis.pipeline import conclude
 from twin.diagnosis.split import blind
-from twin.diagnosis.verdict.judge import Judgement, VerdictInputs
-
-SIGNS = VerdictInputs(1.0, 0.0, 0.0, (0.0, 1.0), 0.0, True, False, ())
-JUDGED = Judgement("explained", None, (), (), (), None, SIGNS, None)  # type: ignore[arg-type]
 
 
 def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,26 +68,26 @@ def test_what_was_measured_on_sealed_trials_is_not_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "claims", "alone", "after"),
+    ("before", "claims", "folds", "after"),
     [
-        ("explained", ("friction",), True, "partly_explained"),
-        ("noise", (), True, "unexplained"),
-        ("explained", ("friction",), False, "explained"),
-        ("partly_explained", ("friction",), True, "partly_explained"),
+        ("explained", ("friction",), (), "partly_explained"),
+        ("noise", (), (), "unexplained"),
+        ("explained", ("friction",), ("each in turn",), "explained"),
+        ("partly_explained", ("friction",), (), "partly_explained"),
     ],
 )
-def test_a_missed_held_out_trial_bars_explained_and_noise(before: str, claims: tuple[str, ...], alone: bool, after: str) -> None:
+def test_a_missed_held_out_trial_bars_explained_and_noise(
+    before: str, claims: tuple[Any, ...], folds: tuple[Any, ...], after: str
+) -> None:
     """Where trials were held out in turn, the final twin was fitted to the one that a part of them misses; it is told all the same.
     Where the fitted trials are not explained either, it is nothing new."""
-    judged: Any = replace(JUDGED, verdict=before, claims=claims)
-    found: Any = Conclusion(*[None] * 4, judged, ())  # type: ignore[arg-type]
-    errors = Errors({}, {}, {}, {}, {}, {}, missed=(Missed(4, "marker", 1.2e-3, 0.44e-3),))
-    day = bench(bench_day("default", np.random.default_rng(0)))
+    d = replace(diagnosis(before), claims=claims, folds=folds)
+    missed = replace(d, errors=replace(d.errors, missed=(Missed(4, "marker", 1.2e-3, 0.44e-3),)))
     words = (
-        f"it misses held-out {day.recording.trials[4].label} by 1.2 mm in position (noise floor 0.44 mm): "
+        "it misses held-out circle_4 by 1.2 mm in position (noise floor 0.44 mm): "
         "the fitted trials do not show everything that happens there"
     )
-    doubted = pipeline._doubted(found, day, errors, alone).judged
+    doubted = pipeline._doubted(missed)
     assert doubted.verdict == after
-    assert doubted.signs.caveats == (() if before == "partly_explained" else (words,))
-    assert pipeline._doubted(found, day, replace(errors, missed=()), alone) is found
+    assert doubted.caveats == (d.caveats if before == "partly_explained" else (*d.caveats, words))
+    assert pipeline._doubted(d) is d

@@ -139,8 +139,7 @@ def _reported(
     held_out = HeldOut.of(preview.prepared, preview.nominal, parts)
     errors = held_out.errors(settings.seed)
     if not found.judged.claims or errors.improved:
-        found = _doubted(found, preview.prepared, errors, alone=len(parts) == 1)
-        return _diagnosis(recording, preview, found, parts, settings, (held_out, errors)), held_out
+        return _doubted(_diagnosis(recording, preview, found, parts, settings, (held_out, errors))), held_out
     words = _withdrawal_words(found, errors)
     found, parts = _withdrawn(found), [(_withdrawn(c), trials) for c, trials in parts]
     held_out = HeldOut.of(preview.prepared, preview.nominal, parts)
@@ -148,25 +147,23 @@ def _reported(
     return replace(calibrated, caveats=(words, *calibrated.caveats)), held_out
 
 
-def _doubted(found: Conclusion, prepared: PreparedRecording, errors: Errors, alone: bool) -> Conclusion:
-    """Return the conclusion with the held-out trials that it misses as a caveat; then the data are not explained.
+def _doubted(found: Diagnosis) -> Diagnosis:
+    """Return the diagnosis with the held-out trials that it misses as a caveat; then the data are not explained.
 
-    Unless others were held out in turn (not `alone`): the final twin was fitted to all of them. Where the fitted trials are not
-    explained either, a missed one says nothing new.
+    Unless each trial was held out in turn: the final twin was fitted to all of them. Where the fitted trials are not explained
+    either, a missed one says nothing new.
     """
-    judged = found.judged
-    if not errors.missed or judged.verdict not in ("noise", "explained"):
+    if not found.errors.missed or found.verdict not in ("noise", "explained"):
         return found
-    label = {t.name: t.label for t in prepared.recording.trials}
+    label = {t.name: t.label for t in found.prepared.recording.trials}
     each = []
-    for m in errors.missed:
+    for m in found.errors.missed:
         shown = OUTPUT_GROUPS[m.group]
         off, floor = (f"{shown.factor * x:.2g} {shown.unit}" for x in (m.error, m.floor))
-        each.append(f"{label[prepared.inputs[m.trial].name]} by {off} in {display_name(shown.kind)} (noise floor {floor})")
+        each.append(f"{label[found.prepared.inputs[m.trial].name]} by {off} in {display_name(shown.kind)} (noise floor {floor})")
     words = f"it misses held-out {', '.join(each)}: the fitted trials do not show everything that happens there"
-    lowered = "partly_explained" if judged.claims else "unexplained"
-    signs = replace(judged.signs, caveats=(*judged.signs.caveats, words))
-    return replace(found, judged=replace(judged, verdict=lowered if alone else judged.verdict, signs=signs))
+    lowered = "partly_explained" if found.claims else "unexplained"
+    return replace(found, verdict=found.verdict if found.folds else lowered, caveats=(*found.caveats, words))
 
 
 def _diagnosis(
