@@ -10,6 +10,7 @@ from small_diagnosis import diagnosis, recording
 
 from twin.diagnosis import Claim, Fold
 from twin.diagnosis.checks.loops import Loop, Loops
+from twin.diagnosis.diagnosis import Missed
 from twin.foundation.display_names import display_name
 from twin.foundation.parameters import FittedValue
 from twin.report import render_diagnosis, sentence
@@ -36,6 +37,16 @@ def test_a_twin_that_does_worse_on_held_out_trials_says_so():
     assert "the error changes from 0.78 to 0.86 mm" in words
     assert words.endswith("worse than the calibrated one in position, by 10 %.")
     assert "worse" not in sentence(d)
+
+
+def test_fitted_trials_without_a_structured_error_are_not_given_one():
+    """A held-out trial that is missed bars "noise", though the fitted trials leave nothing else."""
+    d = diagnosis("unexplained")
+    missed = replace(d.errors, missed=(Missed(4, "marker", 1.2e-3, 0.44e-3),))
+    clean = replace(d, structure_before=0.5 * d.limits.left, errors=missed)
+    assert "Unexplained: after calibration only noise is left of the fitted trials." in sentence(clean)
+    for other in (replace(clean, structure_before=2.0 * d.limits.left), replace(clean, errors=d.errors)):
+        assert "a structured error of" in sentence(other)
 
 
 def test_a_held_out_trial_without_equilibrium_is_named():

@@ -19,9 +19,7 @@ from twin.mechanics.mjcf.routes import outward
 
 LINE_LAG = 9  # of an actuator's dynprm, all of which MuJoCo leaves alone where it has no dynamics: s, `line_lag`
 LEAST_TRAVEL = 1e-4  # rad or m between a joint's stops
-FARTHEST_REST = (
-    1e3  # rad or m from the reference pose: a spring at rest there pushes with a constant torque, to some tenths of a per cent
-)
+FARTHEST_REST = 1e3  # rad or m: the push of a spring that rests so far away changes by a thousandth over a rad or m
 HARD_STOP = ((0.004, 1.0), (0.99, 0.999, 1e-4, 0.5, 2.0))  # solref, solimp: without bounce, milliradians soft under a light link
 SPRING_SWING = 0.5  # rad (or a tenth of that in m): the deflection of a spring that gives a joint its scale of torque
 # group of signals of what turns, of what slides or pulls, and their SI units
