@@ -129,3 +129,33 @@ def test_fits_of_motion_end_near_a_minimum_that_leaves_much(swung: tuple[Objecti
     assert at_noise[0] == at_noise[1] <= LARGEST_LAST_FALL
     assert far[0] <= LARGEST_LAST_FALL
     np.testing.assert_allclose(far[1], max(far[0], MISFIT_SHARE * 99.0 * objective.n))
+
+
+def test_derivatives_of_smooth_motion_are_those_of_small_differences(swung: tuple[Objective, Model]) -> None:
+    """Differences of half a standard deviation (2.5 % of kp) err by some per cent of a column, and weak directions by all of it."""
+    objective, model = swung
+    at, x = objective.evaluate(model), model.vector()
+    found = objective.jacobian(at, range(len(model.free)))
+    for i, column in enumerate(found.T):
+        ends = [objective.white(objective._raw(objective.predict(model.at(x + d * np.eye(x.size)[i]).twin, once=True)[1]))
+                for d in (-0.05, 0.05)]  # fmt: skip
+        right = (ends[1] - ends[0]) / 0.1
+        assert np.linalg.norm(column - right) < 2e-3 * np.linalg.norm(right)
+
+
+def test_how_motion_is_differenced_is_tried_again_with_effects_in_force(
+    swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Long steps that serve for a smooth swing do not serve for one that sticks at each turn."""
+    objective, model = swung
+    monkeypatch.setattr(solver, "COARSE_STEPS", 10.0)
+    objective.jacobian(objective.evaluate(model), range(len(model.free)))
+    rubbing = model.with_effect(
+        "joint_friction", {"torque_hinge": 1.0, "presliding": 1e-3}, ("torque_hinge",), objective.prepared.n_tendon
+    )
+    fresh = Objective(objective.prepared, objective.trials, objective.whitener, 1)
+    which = range(len(rubbing.free))
+    known, right = (of.jacobian(of.evaluate(rubbing), which) for of in (objective, fresh))
+    np.testing.assert_allclose(known, right, atol=1e-9)
+    assert objective._derived(objective.evaluate(model)).long_steps
+    assert not objective._derived(objective.evaluate(rubbing)).long_steps

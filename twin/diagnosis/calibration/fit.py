@@ -25,7 +25,8 @@ SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came
 MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit
 MOST_FIT_STEPS = 24  # at most, of a fit of motion or one that renewed them
 MOST_STEPS_WITH_KEPT = 12  # at most, of one that kept them
-FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
+# Of the Hessian's diagonal. Directions that only descriptions hold (a servo's strength against its gain) have a millionth of it.
+FIRST_DAMPING, LEAST_DAMPING = 1e-7, 1e-9
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
 # `tools.benchmarks.diagnosis.attribution` it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
@@ -193,7 +194,7 @@ def fit(
         if better is not None:
             at, now = better, penalty.cost(better)
             if fall > TRUSTED_FALL_SHARE * predicted:
-                damping = max(0.1 * damping, 1e-6)
+                damping = max(0.1 * damping, LEAST_DAMPING)
             if now - left * fall > stop.beat:
                 break
         slow = fall < SLOW_FALL_SHARE * promised or promised > SLOW_FALL_SHARE * before  # one good step leaves little to promise
@@ -250,7 +251,8 @@ class _Step:
             d, predicted = self.to(damping)
             if damping > whole and predicted < enough:
                 break
-            better = _improved(self.penalty.objective, self.at, self.x + d, now - self.penalty.besides(self.x + d))
+            x = self.penalty.moved(self.x, d)
+            better = _improved(self.penalty.objective, self.at, x, now - self.penalty.besides(x))
             if better is not None:
                 return better, damping, predicted
             damping *= 10.0
@@ -282,6 +284,14 @@ class _Penalty:
         cells = {e.id for e in model.twin.effects if "load cells" in e.needs}
         silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
         return _Penalty(objective, model, low, high, prior, prior_weight(model) ** 2, silencing)
+
+    def moved(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """Return where a step d from x leads: numbers that are positive by their range fall by the factor by which others rise.
+
+        So products of numbers (a servo's strength and its gain) that the data alone determine keep their value.
+        """
+        share = np.divide(d, x, out=np.zeros_like(d), where=(self.low > 0.0) & (x + d > self.low))
+        return np.where(share < 0.0, np.maximum(x / (1.0 - share), self.low), x + d)
 
     def believed(self, x: np.ndarray) -> float:
         return float(self.weight @ (x - self.prior) ** 2)

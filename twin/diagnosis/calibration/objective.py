@@ -26,8 +26,8 @@ from twin.prediction.twin import Twin
 
 DERIVATIVE_TOLERANCE = 1e-6  # rad, for derivatives: 1e-4 mm against a change of some 1e-2 mm
 PARAMETER_DIFFERENCE = 0.02  # of a parameter's step: small against curvature, large against the solver's tolerance
-# The same of motion. Where a joint comes to rest by friction jumps by hundredths of a sigma with any change of any number; half a
-# step moves predictions by about a sigma, and bends little.
+# The same of motion that jumps: where a joint comes to rest by friction moves by hundredths of a sigma with any change of any
+# number; half a step moves predictions by about a sigma, and bends little.
 MOTION_DIFFERENCE = 0.5
 # Of derivatives along a move of all parameters: with such an error each step still leaves a tenth of the last.
 COARSE_ERROR = 0.1
@@ -39,6 +39,14 @@ MISFIT_SHARE = 2e-3
 CHANGED_SHARE = 0.05  # of a derivative, by which it changed too much to be kept
 
 Unsolved = Literal["raise", "zeros"]
+
+
+@dataclass(frozen=True)
+class Differences:
+    """How derivatives of motion are computed: in long steps or in short ones, by which difference (in a parameter's steps)."""
+
+    long_steps: bool
+    size: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ class Objective:
     def __init__(self, prepared: PreparedRecording, trials: Sequence[int], whitener: Whitener, jobs: int) -> None:
         self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
-        self._coarse: bool | None = None  # whether derivatives of motion are computed with long steps; None: not yet tried
+        self._differences: dict[frozenset[str], Differences] = {}  # of motion, by the effects in force
 
     @property
     def bends(self) -> bool:
@@ -137,6 +145,8 @@ class Objective:
         `once` solves to first order in the difference; motion is simulated in long steps where these serve, else in short ones. A
         model without an equilibrium, or whose motion is lost, raises SolveError, or has a column of zeros with `unsolved` "zeros".
         """
+        if not models:
+            return np.zeros((at.z.size, 0))
         before = self._coarsely(at) if self.bends else None
 
         def column(model: Model, size: float) -> np.ndarray:
@@ -154,7 +164,7 @@ class Objective:
 
         with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
             done: Any = parallel(delayed(column)(m, s) for m, s in models)
-        return np.stack(list(done), axis=1) if models else np.zeros((at.z.size, 0))
+        return np.stack(list(done), axis=1)
 
     def _change(self, before: Sequence[np.ndarray], predicted: Sequence[np.ndarray], size: float) -> np.ndarray:
         """Return the whitened change (n,) per unit from the residuals `before` to those of `predicted`, `size` units away."""
@@ -164,32 +174,55 @@ class Objective:
     def _coarsely(self, at: Evaluation) -> list[np.ndarray] | None:
         """Return the residuals by the long steps that derivatives of motion are computed with, `at.raw` being by short ones.
 
-        None where long steps do not give the derivatives, which is tried once, along a move of all free parameters, and where this
-        motion is lost in them.
+        None where long steps do not give the derivatives, and where this motion is lost in them.
         """
-        if self._coarse is False:
+        if not self._derived(at).long_steps:
             return None
-        try:
-            before = self._raw(self.predict(at.model.twin, once=True)[1])
-        except SolveError:
-            return None
-        if self._coarse is None:
-            x, towards = at.model.vector(), MOTION_DIFFERENCE
-            try:
-                moved = at.model.at(x + towards).twin
-                fine = self._change(at.raw, self.predict(moved)[1], towards)
-                coarse = self._change(before, self.predict(moved, once=True)[1], towards)
-                self._coarse = bool(np.linalg.norm(coarse - fine) <= COARSE_ERROR * np.linalg.norm(fine))
-            except SolveError:
-                self._coarse = False
-        return before if self._coarse else None
+        with suppress(SolveError):
+            return self._raw(self.predict(at.model.twin, once=True)[1])
+        return None
+
+    def _derived(self, at: Evaluation, again: bool = False) -> Differences:
+        """Return how derivatives of this motion are computed, as tried once with the effects in force, or `again`.
+
+        Motion that is smooth without an effect may stick with it, and in less than a long step's way.
+        """
+        effects = frozenset(e.id for e in at.model.twin.effects if e.acts_on_robot)
+        if again or effects not in self._differences:
+            self._differences[effects] = self._tried(at)
+        return self._differences[effects]
+
+    def _tried(self, at: Evaluation) -> Differences:
+        """Return which steps and which difference give the derivative along a move of all free parameters.
+
+        Long steps serve where short ones give nearly the same. Of the two differences that serves which changes the derivative
+        less when it is halved: a large one errs by what bends, a small one by what jumps.
+        """
+        x, before, serve = at.model.vector(), at.raw, False
+
+        def change(size: float, raw: list[np.ndarray], long_steps: bool) -> np.ndarray:
+            return self._change(raw, self.predict(at.model.at(x + size).twin, once=long_steps)[1], size)
+
+        def halved(size: float) -> float:
+            return float(np.linalg.norm(change(size, before, serve) - change(0.5 * size, before, serve)))
+
+        with suppress(SolveError):
+            fine, raw = change(MOTION_DIFFERENCE, before, False), self._raw(self.predict(at.model.twin, once=True)[1])
+            if np.linalg.norm(change(MOTION_DIFFERENCE, raw, True) - fine) <= COARSE_ERROR * np.linalg.norm(fine):
+                before, serve = raw, True
+        with suppress(SolveError):
+            if halved(PARAMETER_DIFFERENCE) < halved(MOTION_DIFFERENCE):
+                return Differences(serve, PARAMETER_DIFFERENCE)
+        return Differences(serve, MOTION_DIFFERENCE)
 
     def _raw(self, predicted: Sequence[np.ndarray]) -> list[np.ndarray]:
         return [self.prepared.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
         """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
-        x, difference = at.model.vector(), MOTION_DIFFERENCE if self.bends else PARAMETER_DIFFERENCE
+        x, difference = at.model.vector(), PARAMETER_DIFFERENCE
+        if self.bends and len(which):
+            difference = self._derived(at, any(at.model.free[i].effect is None for i in which)).size
         neighbours = []
         for i in which:
             p = at.model.free[i].parameter
@@ -214,7 +247,7 @@ class Objective:
             trials = [self.trials[k] for k in part]
             there = Evaluation(at.model, {k: at.traces[k] for k in trials}, [at.raw[k] for k in part], at.z[rows])
             few = self.of(part.tolist())
-            few._coarse = self._coarse
+            few._differences = self._differences
             found = few.jacobian(there, wanted[changed].tolist())
             before = out[np.ix_(rows, changed)]
             out[np.ix_(rows, changed)] = found
