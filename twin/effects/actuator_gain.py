@@ -13,8 +13,8 @@ from twin.foundation.parameters import Parameter
 
 
 class ActuatorGain(Effect):
-    """The force (or torque) of each actuator is F' = gain F, which of a servo scales kp, kv and offset alike; d' = gain d of a
-    displacement, as of a spool of another radius.
+    """The force (or torque) of each actuator is F' = gain F, which of a servo scales kp, kv, offset and limit alike (a controller
+    limits the current); d' = gain d of a displacement, as of a spool of another radius.
 
     It does nothing to a tendon whose tension is given.
 

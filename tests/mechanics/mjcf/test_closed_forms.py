@@ -13,7 +13,7 @@ from tests.mechanics.mjcf.models import CAPSTAN, PENDULUM, robot, solved
 from twin.body import Drive, Loads, Problem, Route, Rubbing, Start
 from twin.effects import JointStop
 from twin.foundation.errors import DataError
-from twin.mechanics.mjcf import ModelBody, half_step
+from twin.mechanics.mjcf import ModelBody, longest_step
 from twin.robots import Robot
 
 G, LENGTH, MASS = 9.81, 0.2, 0.5  # m/s^2, m, kg of the pendulum
@@ -181,10 +181,12 @@ def test_derivatives_are_those_of_the_closed_form(tmp_path: Path) -> None:
     assert slope == pytest.approx(-0.4 / (0.8 * 0.801), rel=1e-3)
 
 
-def test_half_a_step_is_told_apart(tmp_path: Path) -> None:
+def test_steps_are_shorter_where_joints_rub(tmp_path: Path) -> None:
     body = robot(tmp_path, PENDULUM.format(joint="", key="")).build()
     assert isinstance(body, ModelBody)
-    assert half_step(body).longest_step == 0.5 * body.longest_step
+    assert longest_step(body, Route()) == body.longest_step
+    for rubbing in (Rubbing(torque=(0.1,)), Rubbing(load=(0.1,))):
+        assert longest_step(body, Route(rubbing=rubbing)) < body.longest_step
 
 
 def test_what_is_not_there_is_refused(tmp_path: Path) -> None:

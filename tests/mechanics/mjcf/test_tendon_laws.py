@@ -228,3 +228,12 @@ def test_load_rubs_in_the_gears_of_joints_that_an_actuator_turns_by_itself() -> 
     spec = body.spec.copy()
     spec.delete(spec.actuators[0])
     assert not geared(spec.compile()).any()
+
+
+def test_a_weak_winch_delivers_a_share_of_what_it_delivered_at_its_limit_too(tmp_path: Path) -> None:
+    """Its controller limits the current, so that F' = gain F whatever F is."""
+    made = lever(tmp_path, low=-0.5)
+    weak = (effect_class("actuator_gain")({"gain_1": 0.4}, made.n_tendon),)
+    full, found = at_rest(made, 0.09, ()), at_rest(made, 0.09, weak)
+    assert full["actuator.winch.force"] == pytest.approx(-0.5, rel=1e-9)
+    assert found["actuator.winch.force"] == pytest.approx(0.4 * -0.5, rel=1e-9)

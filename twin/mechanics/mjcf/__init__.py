@@ -15,7 +15,7 @@ from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit,
 from twin.mechanics.mjcf.poses import contacts_at_start
 from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
 from twin.mechanics.mjcf.routes import geared, outward, winches_of
-from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, half_step
+from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, longest_step
 from twin.mechanics.mjcf.written import check_same, name_element, written_model
 
 __all__ = [
@@ -39,8 +39,8 @@ __all__ = [
     "element_senses",
     "exact_text",
     "geared",
-    "half_step",
     "load_model",
+    "longest_step",
     "model_size",
     "name_element",
     "outward",

@@ -153,6 +153,10 @@ class ModelBody(Body):
                 model.jnt_solref[joint], model.jnt_solimp[joint] = HARD_STOP
 
     def scale_actuators(self, share: np.ndarray) -> None:
+        self._scale_gains(share)
+        self.model.actuator_forcerange[:] *= share[:, None]
+
+    def _scale_gains(self, share: np.ndarray) -> None:
         muscle = self.model.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_MUSCLE)
         for numbers in (self.model.actuator_gainprm, self.model.actuator_biasprm):
             numbers[~muscle, :3] *= share[~muscle, None]
@@ -173,7 +177,7 @@ class ModelBody(Body):
     def stretch_lines(self, give: np.ndarray) -> None:
         model, stiff = self.model, 1.0 / (1.0 - self.model.actuator_biasprm[:, 1] * give)
         late = np.where(_without_dynamics(model), np.maximum(-stiff * give * model.actuator_biasprm[:, 2], 0.0), 0.0)
-        self.scale_actuators(stiff)
+        self._scale_gains(stiff)
         model.actuator_biasprm[late > 0.0, 2] *= stiff[late > 0.0]
         model.actuator_dynprm[late > 0.0, LINE_LAG] = late[late > 0.0]
 

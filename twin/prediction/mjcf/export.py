@@ -19,6 +19,7 @@ from twin.mechanics.mjcf import (
     WrittenModel,
     check_same,
     exact_text,
+    longest_step,
     name_element,
     with_comments,
     written_model,
@@ -77,7 +78,7 @@ def export_mjcf(twin: Twin, origins: Origins) -> WrittenModel:
     chain = twin.effect_chain
     wanted = ModelSolver(body).loaded_model(chain.surround(Loads(twin.robot.gravity)))
     spec, described = written_model(body.loaded, wanted)
-    spec.option.timestep = body.longest_step
+    spec.option.timestep = longest_step(body, chain.route)
     comments = element_comments(twin, body, origins)
     for kind, name in comments:
         name_element(spec, body.loaded, kind, name)

@@ -14,7 +14,7 @@ from twin.body import Drive, Loads, Problem, Signals, Start
 from twin.effects import Effect, effect_class
 from twin.effects.base.chain import EffectChain
 from twin.foundation.errors import DataError, SolveError, TwinError, short_repr
-from twin.mechanics.mjcf import LoadedModel, ModelBody, ModelSolver
+from twin.mechanics.mjcf import LoadedModel, ModelBody, ModelSolver, longest_step
 from twin.prediction.mjcf.natives import erase_friction
 from twin.prediction.twin import Twin
 from twin.robots.families.mjcf import body_of
@@ -103,7 +103,7 @@ class TwinStepper(Stepper):
         body = twin.body()
         if not isinstance(body, ModelBody):
             raise DataError(f"robot {twin.robot.name!r} is no MJCF, which is what is stepped here; give a twin of one")
-        self.steps = max(1, int(np.ceil(interval / body.longest_step - STEP_ROUNDING)))
+        self.steps = max(1, int(np.ceil(interval / longest_step(body, twin.effect_chain.route) - STEP_ROUNDING)))
         own = twin.effect_chain.surround(loads or Loads(twin.robot.gravity))
         self._take(twin.effects, replace(body, longest_step=interval / self.steps), own)
 
