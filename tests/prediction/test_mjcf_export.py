@@ -87,12 +87,15 @@ def predicted(twin: Twin) -> np.ndarray:
 
 
 def stepped(path: Path) -> np.ndarray:
-    """The exported model stepped along the same commands."""
+    """The exported model stepped along the same commands, straight between rows."""
     stepper, rows = ModelStepper(path), []
     stepper.reset(COMMANDS[0], SETTLE)
-    for command in COMMANDS:
-        seen = stepper.readings()
-        rows.append([seen[name] for name in OUTPUTS])
+    each = round(STEP / stepper.step_length)
+    fine = np.arange(each * (len(TIME) - 1) + 1) * STEP / each
+    for k, command in enumerate(np.stack([np.interp(fine, TIME, u) for u in COMMANDS.T], axis=1)):
+        if k % each == 0:
+            seen = stepper.readings()
+            rows.append([seen[name] for name in OUTPUTS])
         stepper.step(command)
     return np.array(rows)
 
