@@ -9,7 +9,7 @@ from twin.foundation.parameters import Parameter
 
 
 class LoadDependentFriction(Effect):
-    """Each joint with a gear is held back by f = share |tau| z, tau its actuators' torque (N m; N of a slide), z its slip state,
+    """Each joint with a gear is held back by f = share |tau| z, tau the torque through it (N m; N of a slide), z its slip state,
 
         z' = s + (z - s) exp(-|turn| / presliding),    s the direction of the turn.
 

@@ -102,6 +102,21 @@ def test_load_friction_grows_with_the_torque_of_the_drive(tmp_path: Path) -> Non
     assert k * angle[-1] == pytest.approx(0.6 * (1 - c), rel=0.02)
 
 
+def test_what_a_tendon_does_to_a_joint_goes_past_its_gear(tmp_path: Path) -> None:
+    """With a tendon's torque w beside the motor's u, a rod stands up to k q = u (1 - c) + w: only u rubs."""
+    k, c, w = 0.8, 0.2, 0.5
+    both = PENDULUM.format(joint=f' stiffness="{k}" damping="0.05"', key="").replace(
+        '<actuator><motor name="push" joint="hinge"/>',
+        '<tendon><fixed name="line"><joint joint="hinge" coef="0.1"/></fixed></tendon>'
+        '<actuator><motor name="push" joint="hinge"/><motor name="pull" tendon="line"/>',
+    )
+    time = np.arange(0.0, 8.0, 0.02)
+    rub = Route(rubbing=Rubbing(load=(c,), presliding=1e-4))
+    u = np.stack([np.interp(time, [0, 6, 8], [0.0, 0.6, 0.6]), np.full(len(time), w / 0.1)], axis=1)
+    found = solved(robot(tmp_path, both), time, u, rub, loads=Loads(np.zeros(3)), start=Start(5.0))
+    assert k * found.others["joint angle"][-1, 0] == pytest.approx(0.6 * (1 - c) + w, rel=0.01)  # with w c it would be 0.1 less
+
+
 def stopped(rod: Robot, time: np.ndarray, u: np.ndarray, start: Start, **stops: float) -> np.ndarray:
     """The angle (n,) rad of a rod without weight under a torque u (n,) N m, with stops."""
     body = rod.build()

@@ -3,7 +3,7 @@
 A joint rubs with F z, z its slip state in [-1, 1] that follows Dahl's law over a turn dq,
 
     z' = s + (z - s) exp(-|dq| / presliding),    s = sign dq,
-    F = (torque + breakaway exp(-(v / stribeck)^2) + load |torque of its actuators|),    load of joints with a gear (`geared`)
+    F = (torque + breakaway exp(-(v / stribeck)^2) + load |torque through its gear (`geared`)|),
 
 so that short of sliding it is a spring F / presliding. The step ahead is implicit in that spring: the joint's damping is raised by
 h F (1 - z s) / presliding for one step, which nothing is left of once it slides.
@@ -43,6 +43,7 @@ class JointLaws(NamedTuple):
     torque: np.ndarray
     breakaway: np.ndarray
     load: np.ndarray
+    gears: np.ndarray  # (n, nu) torque per force of the actuators that turn a joint by itself
     stribeck: float
     presliding: float
 
@@ -84,13 +85,19 @@ class Slip(NamedTuple):
 
 
 @jit_internal
-def joint_forces(laws, z, h, qvel, effort, applied, damping):
-    """Set the forces (nv,) and the damping (nv,) of joints that rub for one step of h s; `damping` is raised in place."""
+def joint_forces(laws, z, h, qvel, force, applied, damping):
+    """Set the forces (nv,) and the damping (nv,) of joints that rub for one step of h s, under the actuators' `force` (nu,).
+
+    `damping` is raised in place.
+    """
     for j in range(laws.dof.size):
         i = laws.dof[j]
         v = qvel[i]
         r = v / laws.stribeck
-        F = laws.torque[j] + laws.breakaway[j] * math.exp(-r * r) + laws.load[j] * abs(effort[i])
+        geared = 0.0
+        for k in range(force.size):
+            geared += laws.gears[j, k] * force[k]
+        F = laws.torque[j] + laws.breakaway[j] * math.exp(-r * r) + laws.load[j] * abs(geared)
         s = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
         applied[i] -= F * z[j]
         damping[i] += JOINT_SHARE * h * F * (1.0 - z[j] * s) / laws.presliding

@@ -43,11 +43,15 @@ def winches_of(loaded: LoadedModel) -> tuple[Winch, ...]:
 
 
 def geared(model: mujoco.MjModel) -> np.ndarray:
-    """Return which joints (njnt,) an actuator turns by itself and not through a tendon: its torque goes through their gears."""
+    """Return the torque on each joint (njnt, nu) per force of an actuator that turns it by itself, and so through its gear.
+
+    What a tendon does to a joint, whether it is wound for that or only crosses it, goes through no gear.
+    """
     on_joints = np.isin(model.actuator_trntype, (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)))
-    driven = np.zeros(model.njnt, bool)
-    driven[model.actuator_trnid[on_joints, 0]] = True
-    return driven
+    own = np.flatnonzero(on_joints)
+    torque = np.zeros((model.njnt, model.nu))
+    torque[model.actuator_trnid[own, 0], own] = model.actuator_gear[own, 0]
+    return torque
 
 
 @lru_cache(maxsize=32)

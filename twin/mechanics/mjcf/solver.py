@@ -199,7 +199,7 @@ def _compile(model: mujoco.MjModel, data: mujoco.MjData) -> _Compiled:
     affine = (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)) & (model.actuator_delay <= 0.0)
     limits = np.where(model.actuator_forcelimited[:, None] != 0, model.actuator_forcerange, [-np.inf, np.inf])
     views = Views(
-        data.ctrl, data.qpos, data.qvel, data.qfrc_applied, data.qfrc_actuator, data.actuator_force, model.dof_damping, shown,
+        data.ctrl, data.qpos, data.qvel, data.qfrc_applied, data.actuator_force, model.dof_damping, shown,
         rates, before, np.where(affine, model.actuator_biasprm[:, 2], 0.0), limits,
         (data.moment_rownnz, data.moment_rowadr, data.moment_colind, data.actuator_moment.reshape(-1)),
         (-0.5, 0.5 if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_EULER) else -0.5),
@@ -239,12 +239,13 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
     rub, model, n = route.rubbing, now.model, len(body.joints)
     each = [np.array(x, float) if x else np.zeros(n) for x in (rub.torque, rub.breakaway, rub.load, rub.viscous)]
     joints = np.array(body.joints, np.int64)
-    each[2] = each[2] * geared(model)[joints]
+    gears = geared(model)[joints]
+    each[2] = each[2] * gears.any(axis=1)
     rubs = np.flatnonzero(each[0] + each[1] + each[2] > 0.0)
     dof, qpos = model.jnt_dofadr[joints].astype(np.int64), model.jnt_qposadr[joints].astype(np.int64)
     model.dof_damping[dof] = body.model.dof_damping[dof] + each[3]
     torque, breakaway, load = (x[rubs] for x in each[:3])
-    law = JointLaws(qpos[rubs], dof[rubs], torque, breakaway, load, float(rub.stribeck), float(rub.presliding))
+    law = JointLaws(qpos[rubs], dof[rubs], torque, breakaway, load, gears[rubs], float(rub.stribeck), float(rub.presliding))
     mu = route.mu * np.ones(model.ntendon) * (route.mu_shares or 1.0)
     return Laws(law, mu, float(route.presliding), now.tree, now.paths, now.pull, line_lag(model))
 

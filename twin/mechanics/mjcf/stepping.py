@@ -23,7 +23,6 @@ class Views(NamedTuple):
     qpos: np.ndarray
     qvel: np.ndarray
     applied: np.ndarray  # qfrc_applied
-    effort: np.ndarray  # qfrc_actuator
     force: np.ndarray  # actuator_force
     damping: np.ndarray  # dof_damping of the model
     shown: tuple  # arrays that are recorded in every row, in the order of the solver's columns
@@ -150,7 +149,7 @@ def run(engine, views, laws, memory, commands, rows, out):
             views.applied[k] = 0.0
             views.damping[k] = own[k] + raised[k]
             raised[k] = 0.0
-        joint_forces(laws.joints, memory.z, h, views.qvel, views.effort, views.applied, views.damping)
+        joint_forces(laws.joints, memory.z, h, views.qvel, views.force, views.applied, views.damping)
         hear(commands[i], laws.lag, h, memory.heard, views.ctrl)
         mj_step1(model, data)
         if last >= 0:
