@@ -461,8 +461,8 @@ def test_a_fit_from_elsewhere_ends_at_the_posterior_and_within_the_ranges() -> N
 
 
 def test_a_linear_bench_on_which_two_numbers_are_all_but_alike_is_fitted_to_the_end() -> None:
-    """Of two patterns that differ in 5e-5 of their square damping of 1e-4 would leave two thirds of what parts them, in a step; the
-    first damping leaves a thousandth."""
+    """Of two patterns that differ in 5e-5 of their square damping of 1e-4 leaves two thirds of what parts them, in a step. As long
+    as the cost falls as foretold damping falls too, and twelve steps are enough; with the same damping they would leave 0.8 %."""
     rng = np.random.default_rng(6)
     one, other = np.linalg.qr(rng.normal(size=(100, 2)))[0].T
     A = 30.0 * np.stack([one, np.sqrt(1.0 - 1e-4) * one + 1e-2 * other], axis=1)  # 1 - cosine: 5e-5
@@ -476,10 +476,10 @@ def test_a_linear_bench_on_which_two_numbers_are_all_but_alike_is_fitted_to_the_
     assert 0.1 > rough.cost > 4.0 * found.cost
 
 
-@pytest.mark.parametrize(("worth", "tried"), [(0.0, 11), (0.5, 8), (0.9, 7)])
+@pytest.mark.parametrize(("worth", "tried"), [(0.0, 8), (0.5, 5), (0.9, 4)])
 def test_a_step_that_failed_is_shortened_only_as_long_as_it_may_be_worth_it(worth: float, tried: int) -> None:
     """With damping m a step is 1 / (1 + m) of the whole and foretells 1 - (m / (1 + m))^2 of its fall, here 1. As m goes up tenfold
-    from 1e-7 this is 0.99 at 0.1, 0.75 at 1, 0.17 at 10, and 2e-3 at 1000, the last."""
+    from 1e-4 this is 0.99 at 0.1, 0.75 at 1, 0.17 at 10, and 2e-3 at 1000, the last."""
 
     class Stuck(Linear):
         steps = 0
@@ -519,7 +519,11 @@ def test_derivatives_that_have_changed_are_renewed_or_the_fit_ends_elsewhere(mon
 
 
 class Product(Linear):
-    """Outputs A (x_0 x_1): data know the product of two numbers alone, as of a servo's gain and its strength."""
+    """Outputs A (x_0 x_1) of a motion: data know the product of two numbers alone, as of a servo's gain and its strength."""
+
+    @property
+    def bends(self) -> bool:
+        return True
 
     def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
         z = self.y - self.A @ np.prod(model.vector(), keepdims=True)

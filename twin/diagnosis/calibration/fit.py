@@ -25,8 +25,10 @@ SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came
 MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit
 MOST_FIT_STEPS = 24  # at most, of a fit of motion or one that renewed them
 MOST_STEPS_WITH_KEPT = 12  # at most, of one that kept them
-# Of the Hessian's diagonal. Directions that only descriptions hold (a servo's strength against its gain) have a millionth of it.
-FIRST_DAMPING, LEAST_DAMPING = 1e-7, 1e-9
+FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
+# The same of motion: of directions that only descriptions hold (a servo's strength against its gain) it is a millionth.
+MOTION_DAMPING = 1e-7
+LEAST_DAMPING = 1e-2  # of the first
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
 # Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
 # `tools.benchmarks.diagnosis.attribution` it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
@@ -175,7 +177,7 @@ def fit(
     if J is not None:
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
-    now, damping = penalty.cost(at), FIRST_DAMPING
+    now, damping = penalty.cost(at), penalty.first_damping
     before = np.inf  # what derivatives promised a step earlier
     since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
     for left in range(MOST_FIT_STEPS - 1, -1, -1):
@@ -183,18 +185,18 @@ def fit(
             break
         columns[:, moving] = objective.jacobian(at, moving)
         step = _Step.of(penalty, at, columns)
-        promised = step.to(FIRST_DAMPING)[1] if renewals or objective.bends else 0.0
+        promised = step.to(penalty.first_damping)[1] if renewals or objective.bends else 0.0
         least, near_least = objective.smallest_fall(stop.tolerance, now)
         far = renewals and promised > FAR_SHARE * now
         enough = max(least if far else near_least, stop.tolerance * now if kept else 0.0, stop.worth)
         better, damping, predicted = step.taken(now, damping, enough)
         if better is None and own and moving:  # an effect may have a kink here; the robot need not
-            better, damping, predicted = step.holding(moving).taken(now, FIRST_DAMPING, enough)
+            better, damping, predicted = step.holding(moving).taken(now, penalty.first_damping, enough)
         fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
             at, now = better, penalty.cost(better)
             if fall > TRUSTED_FALL_SHARE * predicted:
-                damping = max(0.1 * damping, LEAST_DAMPING)
+                damping = max(0.1 * damping, LEAST_DAMPING * penalty.first_damping)
             if now - left * fall > stop.beat:
                 break
         slow = fall < SLOW_FALL_SHARE * promised or promised > SLOW_FALL_SHARE * before  # one good step leaves little to promise
@@ -203,7 +205,7 @@ def fit(
             continue
         worth_it = since > now and since - now >= enough and now <= stop.beat
         if renewals and left and worth_it and (objective.bends or (slow and promised >= enough)):
-            columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, FIRST_DAMPING
+            columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, penalty.first_damping
             since, before = now, np.inf
         elif fall < enough or now > stop.beat:
             break
@@ -285,13 +287,20 @@ class _Penalty:
         silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
         return _Penalty(objective, model, low, high, prior, prior_weight(model) ** 2, silencing)
 
+    @property
+    def first_damping(self) -> float:
+        """The damping with which steps begin."""
+        return MOTION_DAMPING if self.objective.bends else FIRST_DAMPING
+
     def moved(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return where a step d from x leads: numbers that are positive by their range fall by the factor by which others rise.
+        """Return where a step d from x leads: numbers of motion that are positive by their range fall by the factor others rise by.
 
         So products of numbers (a servo's strength and its gain) that the data alone determine keep their value.
         """
+        if not self.objective.bends:
+            return x + d
         share = np.divide(d, x, out=np.zeros_like(d), where=(self.low > 0.0) & (x + d > self.low))
-        return np.where(share < 0.0, np.maximum(x / (1.0 - share), self.low), x + d)
+        return np.where(share < 0.0, np.maximum(x / (1.0 - np.minimum(share, 0.0)), self.low), x + d)
 
     def believed(self, x: np.ndarray) -> float:
         return float(self.weight @ (x - self.prior) ** 2)
