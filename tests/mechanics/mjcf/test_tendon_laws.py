@@ -10,7 +10,6 @@ import pytest
 
 from tests.mechanics.mjcf.models import PENDULUM, robot
 from twin.body import Drive, Loads, Problem, Route, Signals, Start
-from twin.body.counts import joint_names
 from twin.diagnosis.calibration.model import Model
 from twin.effects import Effect, effect_class
 from twin.foundation.errors import DataError
@@ -223,7 +222,7 @@ def test_load_rubs_in_the_gears_of_joints_that_an_actuator_turns_by_itself() -> 
     leg = load("tendon_leg")
     body = leg.build()
     assert isinstance(body, ModelBody)
-    assert dict(zip(joint_names(leg.n_tendon), geared(body.model).any(axis=1), strict=True)) == {"hip": True, "knee": False}
+    assert [bool(row.any()) for row in geared(body.model)] == [True, False]  # hip, knee
     assert "load friction" in body.features
     spec = body.spec.copy()
     spec.delete(spec.actuators[0])
