@@ -132,7 +132,8 @@ def test_fits_of_motion_end_near_a_minimum_that_leaves_much(swung: tuple[Objecti
 
 
 def test_derivatives_of_smooth_motion_are_those_of_small_differences(swung: tuple[Objective, Model]) -> None:
-    """Differences of half a standard deviation (2.5 % of kp) err by some per cent of a column, and weak directions by all of it."""
+    """Differences of half a standard deviation err by 2e-3 of a column and more here, and in directions that data hardly show by
+    all of it; those of 2 % of one by a twentieth of that."""
     objective, model = swung
     at, x = objective.evaluate(model), model.vector()
     found = objective.jacobian(at, range(len(model.free)))
@@ -140,7 +141,7 @@ def test_derivatives_of_smooth_motion_are_those_of_small_differences(swung: tupl
         ends = [objective.white(objective._raw(objective.predict(model.at(x + d * np.eye(x.size)[i]).twin, once=True)[1]))
                 for d in (-0.05, 0.05)]  # fmt: skip
         right = (ends[1] - ends[0]) / 0.1
-        assert np.linalg.norm(column - right) < 2e-3 * np.linalg.norm(right)
+        assert np.linalg.norm(column - right) < 1e-3 * np.linalg.norm(right)
 
 
 def test_how_motion_is_differenced_is_tried_again_with_effects_in_force(
@@ -157,5 +158,5 @@ def test_how_motion_is_differenced_is_tried_again_with_effects_in_force(
     which = range(len(rubbing.free))
     known, right = (of.jacobian(of.evaluate(rubbing), which) for of in (objective, fresh))
     np.testing.assert_allclose(known, right, atol=1e-9)
-    assert objective._derived(objective.evaluate(model)).long_steps
-    assert not objective._derived(objective.evaluate(rubbing)).long_steps
+    assert objective._differences_at(objective.evaluate(model)).long_steps
+    assert not objective._differences_at(objective.evaluate(rubbing)).long_steps

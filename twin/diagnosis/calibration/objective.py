@@ -176,23 +176,23 @@ class Objective:
 
         None where long steps do not give the derivatives, and where this motion is lost in them.
         """
-        if not self._derived(at).long_steps:
+        if not self._differences_at(at).long_steps:
             return None
         with suppress(SolveError):
             return self._raw(self.predict(at.model.twin, once=True)[1])
         return None
 
-    def _derived(self, at: Evaluation, again: bool = False) -> Differences:
+    def _differences_at(self, at: Evaluation, again: bool = False) -> Differences:
         """Return how derivatives of this motion are computed, as tried once with the effects in force, or `again`.
 
         Motion that is smooth without an effect may stick with it, and in less than a long step's way.
         """
         effects = frozenset(e.id for e in at.model.twin.effects if e.acts_on_robot)
         if again or effects not in self._differences:
-            self._differences[effects] = self._tried(at)
+            self._differences[effects] = self._choose_differences(at)
         return self._differences[effects]
 
-    def _tried(self, at: Evaluation) -> Differences:
+    def _choose_differences(self, at: Evaluation) -> Differences:
         """Return which steps and which difference give the derivative along a move of all free parameters.
 
         Long steps serve where short ones give nearly the same. Of the two differences that serves which changes the derivative
@@ -222,7 +222,7 @@ class Objective:
         """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
         x, difference = at.model.vector(), PARAMETER_DIFFERENCE
         if self.bends and len(which):
-            difference = self._derived(at, any(at.model.free[i].effect is None for i in which)).size
+            difference = self._differences_at(at, any(at.model.free[i].effect is None for i in which)).size
         neighbours = []
         for i in which:
             p = at.model.free[i].parameter
