@@ -43,6 +43,7 @@ EFFECTS: dict[str, tuple[str, Mapping[str, float]]] = {
     "joint_friction, all its law": ("joint_friction", {"torque_hip": 0.05, "breakaway": 0.5, "viscous": 0.3}),
     "joint_stiffness": ("joint_stiffness", {"stiffness_hip": 0.3, "preload_hip": -0.1, "preload_knee": 0.05}),
     "joint_stop": ("joint_stop", {"upper_hip": 0.1, "lower_knee": 0.2}),
+    "joint_stop, all its law": ("joint_stop", {"upper_hip": 0.1, "lower_knee": 0.2, "give": 0.05}),
     "load_dependent_friction": ("load_dependent_friction", {"share": 0.1}),
     "reflected_inertia": ("reflected_inertia", {"inertia_hip": 0.003}),
     "sensor_drift": ("sensor_drift", {"angle_hip": 0.01, "position_2": 1e-3, "levelling": 0.02}),

@@ -11,7 +11,7 @@ drive_train.py   motors that wind tendons
 from twin.body.body import ROPE_FEATURES, Body, Frame, Port, Sense, marker_senses, tendon_ports, tendon_senses, turn_senses
 from twin.body.counts import Counts
 from twin.body.loads import Loads, Push
-from twin.body.route import Bearing, Creep, Route, Rubbing
+from twin.body.route import Bearing, Bumpers, Creep, Route, Rubbing
 from twin.body.signals import Drive, Drives, Signals, drive_mask, interpolate_commands
 from twin.body.solver import (
     BY_CONTINUATION,
@@ -34,6 +34,7 @@ __all__ = [
     "SOLVE_TOLERANCE",
     "Bearing",
     "Body",
+    "Bumpers",
     "Counts",
     "Creep",
     "Drive",

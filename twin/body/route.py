@@ -52,6 +52,15 @@ class Rubbing:
 
 
 @dataclass(frozen=True)
+class Bumpers:
+    """Soft stops of the joints of an MJCF: at a joint's end they push by tau = (r + loss r') / give, r >= 0 the way into it."""
+
+    give: float = 0.0  # rad/(N m); 0: as the model has its stops
+    loss: float = 2e-3  # s
+    joints: tuple[bool, ...] = ()  # which are soft
+
+
+@dataclass(frozen=True)
 class Route:
     """The properties of the tendons between drive and body, as the effects in force set them."""
 
@@ -66,6 +75,7 @@ class Route:
     initial_stretch_share: float = 0.0  # of the stretch under the springs' first tension that was there when they were put on
     mu_shares: tuple[float, ...] = ()  # of the tendons of an MJCF, in shares of mu; () is 1 for all
     rubbing: Rubbing = field(default_factory=Rubbing)
+    bumpers: Bumpers = field(default_factory=Bumpers)
     backlash: tuple[float, ...] = ()  # m each way of each tendon before its SMA spring follows
     crossing_travel: tuple[float, ...] = (1e-4,)  # m over which the backlash is crossed: each tendon's, or one for all
 

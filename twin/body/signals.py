@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -94,6 +95,20 @@ class Signals:
     def with_changes(self, **changes: Any) -> Signals:
         """Return a copy with some fields replaced."""
         return replace(self, **changes)
+
+    def between_rows(self, longest: float) -> Signals:
+        """Return the signals, straight between rows, with more rows: equal parts of each interval, the usual one in `longest` s."""
+        rows = np.arange(len(self.time), dtype=float)
+        parts = max(1, math.ceil(float(np.median(np.diff(self.time))) / longest - 1e-9))
+        at = np.arange((len(rows) - 1) * parts + 1) / parts
+
+        def straight(x: np.ndarray) -> np.ndarray:
+            below = np.minimum(at.astype(int), len(rows) - 2)
+            share = (at - below).reshape(-1, *(1,) * (x.ndim - 1))
+            return x[below] + share * (x[below + 1] - x[below]) if len(x) == len(rows) else x
+
+        arrays = ("time", "clock", "tension", "displacement", "markers", "temperature", "current", "control")
+        return replace(self, **{name: straight(getattr(self, name)) for name in arrays}, others={})
 
     def group(self, name: str) -> np.ndarray:
         """Return a group by its name: "marker", "turn", "angles" and IMUs' (n, n_place, 3), others (n, n_port, 1)."""

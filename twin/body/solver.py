@@ -67,6 +67,7 @@ class Problem:
     tolerance: float = SOLVE_TOLERANCE
     seen: Patches | None = None  # patches of skin seen by a camera, for a body that predicts them
     start: Start = field(default_factory=Start)
+    course: tuple[np.ndarray, np.ndarray] | None = None  # (m,) s and (m, n_tendon): commands that are not straight between rows
 
     def drive_mask(self, kind: Drive) -> np.ndarray:
         """Return (n_tendon,) whether each tendon has this kind of drive."""

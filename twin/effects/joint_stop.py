@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.body import Body, Signals
+from twin.body import Body, Bumpers, Route, Signals
 from twin.body.counts import joint_names
 from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
@@ -21,7 +21,10 @@ class JointStop(Effect):
 
         tau >= 0,    tau (upper - q) = 0,
 
-    tau the torque (N m; N of a slide) by which the stop pushes back. It neither gives way nor throws back.
+    tau the torque (N m; N of a slide) by which the stop pushes back. It neither gives way nor throws back. The extended law has
+    bumpers, alike at all of its stops (Kelvin and Voigt):
+
+        tau = max(0, (r + loss r') / give),    r = q - upper >= 0.
 
     Where the description has a stop as well, the nearer one holds. The drive does not give way: a servo pushes on.
 
@@ -33,10 +36,16 @@ class JointStop(Effect):
     """
 
     id = "joint_stop"
+    parameters = (
+        Parameter("give", 0.0, "rad/(N*m)", 0.0, 10.0, "of bumpers and brackets: a degree under a usual load; ours", scale=0.02),
+        Parameter("loss", 2e-3, "s", 1e-4, 0.1, "damping over stiffness: bumpers ring a few times; ours", scale=1e-3),
+    )
     per_joint = (
         Parameter("upper", NO_STOP, "rad", -NO_STOP, NO_STOP, "where it ends on the positive side", scale=0.02),
         Parameter("lower", -NO_STOP, "rad", -NO_STOP, NO_STOP, "where it ends on the negative side", scale=0.02),
     )
+    inactive_when_off = ("loss",)
+    extended_parameters = ("give", "loss")
     needs = frozenset({"stops"})
     moves_with = "the ends of the joints' travel"
     plot_against = "position"
@@ -58,3 +67,9 @@ class JointStop(Effect):
     def edit(self, body: Body) -> None:
         if joint_names(self.n_tendon):
             body.limit_joints(np.array(self.per_joint_values("lower")), np.array(self.per_joint_values("upper")))
+
+    def route(self) -> Route:
+        if self["give"] == 0.0:
+            return Route()
+        ends = zip(self.per_joint_values("lower"), self.per_joint_values("upper"), strict=True)
+        return Route(bumpers=Bumpers(self["give"], self["loss"], tuple(low > -NO_STOP or high < NO_STOP for low, high in ends)))

@@ -18,7 +18,7 @@ SMALLEST_POSITIVE = 5e-324  # the least number above zero
 # Powers of a robot's length and force with which a quantity of this unit grows. Weights are forces; units not listed do not grow.
 SIZE_EXPONENTS = {
     "m": (1, 0), "1/m": (-1, 0), "N": (0, 1), "kg": (0, 1), "N/s": (0, 1), "m/N": (1, -1), "N/m": (-1, 1), "N*m": (1, 1),
-    "N*m*s/rad": (1, 1), "N*m/rad": (1, 1), "kg*m^2": (2, 1),
+    "N*m*s/rad": (1, 1), "rad/(N*m)": (-1, -1), "N*m/rad": (1, 1), "kg*m^2": (2, 1),
 }  # fmt: skip
 
 

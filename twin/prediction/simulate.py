@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 LEAST_EXCITATION = 30.0  # resolutions of a drive (`Drive.reading`); a smaller range of commands does not excite a robot
 
+CORNERS = 1e-3  # s, by which corners of a late command are rounded
+MIN_ROWS = 2  # that have anything between them
+
 UNEVEN_STEPS = 0.5  # of the mean step, by which the median step is off it where rows come in bursts
 
 
@@ -83,7 +86,7 @@ class TrialSimulator:
         problem = Problem(
             inputs.time, felt.command, chain.surround(inputs.loads), chain.route, inputs.drives, chain.creep, delayed,
             chain.stiffness(inputs.temperature, inputs.clock), heating, near, options.keep, options.once, options.tolerance,
-            inputs.clouds, inputs.start,
+            inputs.clouds, inputs.start, self._course(inputs, driven),
         )  # fmt: skip
         solution = self.solver.solve(problem)
         if not solution.status.all():
@@ -98,6 +101,13 @@ class TrialSimulator:
         markers = self.body.frame.to_marker_frame(solution.markers)
         others = {**solution.others, **(self._orientations(inputs.time, solution, problem.loads) if inputs.turned else {})}
         return Trace(driven.with_changes(tension=tension, displacement=travel, markers=markers, others=others), solution)
+
+    def _course(self, inputs: Inputs, driven: Signals) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return times and commands between rows where effects change controls: late or filtered, these have other corners."""
+        if driven.control is inputs.signals.control or not driven.driven_by_control.all() or len(inputs.time) < MIN_ROWS:
+            return None
+        finer, chain = inputs.signals.between_rows(CORNERS), self.twin.effect_chain
+        return finer.time, chain.drive(chain.command(finer)).control
 
     def _orientations(self, time: np.ndarray, solution: Solution, loads: Loads) -> dict[str, np.ndarray]:
         """Return the rotation vectors (n, n_marker, 3) rad of markers in their frame, and what IMUs read."""

@@ -147,13 +147,12 @@ def test_derivatives_of_smooth_motion_are_those_of_small_differences(swung: tupl
 def test_how_motion_is_differenced_is_tried_again_with_effects_in_force(
     swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Long steps that serve for a smooth swing do not serve for one that sticks at each turn."""
+    """Long steps that serve for a smooth swing do not serve for one that slips off at each turn."""
     objective, model = swung
     monkeypatch.setattr(solver, "COARSE_STEPS", 20.0)  # as long as a row, with friction too
     objective.jacobian(objective.evaluate(model), range(len(model.free)))
-    rubbing = model.with_effect(
-        "joint_friction", {"torque_hinge": 1.0, "presliding": 1e-3}, ("torque_hinge",), objective.prepared.n_tendon
-    )
+    greased = {"torque_hinge": 1.0, "presliding": 1e-3, "breakaway": 1.0, "stribeck": 0.05}
+    rubbing = model.with_effect("joint_friction", greased, ("torque_hinge",), objective.prepared.n_tendon)
     fresh = Objective(objective.prepared, objective.trials, objective.whitener, 1)
     which = range(len(rubbing.free))
     known, right = (of.jacobian(of.evaluate(rubbing), which) for of in (objective, fresh))

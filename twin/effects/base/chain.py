@@ -13,7 +13,7 @@ from functools import reduce
 
 import numpy as np
 
-from twin.body import ROPE_FEATURES, Bearing, Body, Creep, Loads, Route, Rubbing, Signals
+from twin.body import ROPE_FEATURES, Bearing, Body, Bumpers, Creep, Loads, Route, Rubbing, Signals
 from twin.body.drive_train import DriveTrain
 from twin.body.spring import Spring
 from twin.effects import Effect
@@ -96,6 +96,7 @@ class EffectChain:
             bedding_tension=bedding.bedding_tension,
             bearing=next((r.bearing for r in routes if r.bearing != Bearing()), Bearing()),
             rubbing=reduce(Rubbing.beside, (r.rubbing for r in routes), Rubbing()),
+            bumpers=next((r.bumpers for r in routes if r.bumpers.give > 0.0), Bumpers()),
             rest_bend_share=max((r.rest_bend_share for r in routes), default=0.0),
             stall_tension=min((r.stall_tension for r in routes), default=np.inf),
             initial_stretch_share=max((r.initial_stretch_share for r in routes), default=0.0),

@@ -5,16 +5,20 @@ A joint rubs with F z, z its slip state in [-1, 1] that follows Dahl's law over 
     z' = s + (z - s) exp(-|dq| / presliding),    s = sign dq,
     F = (torque + breakaway exp(-(v / stribeck)^2) + load |torque through its gear (`geared`)|),
 
-so that short of sliding it is a spring F / presliding. The step ahead is implicit in that spring: the joint's damping is raised by
-h F (1 - z s) / presliding for one step, which nothing is left of once it slides.
+so that short of sliding it is a spring F / presliding, in which a light joint swings many times in one of MuJoCo's steps. What rubs
+is therefore followed in short steps d between the rates before and after a step, all other forces f standing still,
+
+    (M + d^2 / 4 F / presliding) dv = d (f - D (v - v_0) - F z),    dq = d v,
+
+D the joints' damping; MuJoCo then steps under the mean of F z. The inertia that is added keeps any spring stable.
 
 A tendon that its actuator pulls with T_0 at its first point loses tension where it turns by theta_k at its points (capstan),
 
     T_k = T_0 exp(-mu sum_(j<=k) z_j theta_j),    z_k = clip(z_k + travel_k / presliding, -1, 1),
 
 travel_k towards the first point being how much shorter the path beyond point k became. MuJoCo applies T_0 all along; here
-sum_k (T_0 - T_k) dl_k/dq comes on top, l_k the length between two points. The steps are implicit likewise, by a damping of each
-joint that is h T_0 mu theta_k / presliding |dD_k/dq_i| sum_j |dD_k/dq_j| at most, D_k the path beyond k.
+sum_k (T_0 - T_k) dl_k/dq comes on top, l_k the length between two points. The steps are implicit in what sticks, by a damping of
+each joint that is h T_0 mu theta_k / presliding |dD_k/dq_i| sum_j |dD_k/dq_j| at most, D_k the path beyond k.
 
 Source: Dahl (1968); Stribeck (1902); Euler-Eytelwein; all as in `twin.effects`.
 """
@@ -31,18 +35,18 @@ from twin.foundation.compiled import jit_internal
 MUJOCO_SITE = 3  # mjtWrap
 PULLEY_POINT, SITE_POINT = -2, -1  # of mjData.wrap_obj; others are geoms
 LARGEST_LOSS = 40.0  # exponents of a capstan: beyond it nothing is left of a pull
-# Of the damping that would make a step implicit in the springs of what sticks: steps are stable from a quarter on.
-JOINT_SHARE, TENDON_SHARE = 1.0, 0.4
+TENDON_SHARE = 0.4  # of the damping that would make a step implicit in what sticks: steps are stable from a quarter on
+SHORT_STEP = 2.5e-4  # s, in which joints rub: light fingers swing in what sticks at some 1,000 rad/s
 
 
 class JointLaws(NamedTuple):
-    """Joints that rub: numbers in qpos and dof, and the law of each, (n,)."""
+    """Joints that rub: their number in dof, and the law of each, (n,)."""
 
-    qpos: np.ndarray
     dof: np.ndarray
     torque: np.ndarray
     breakaway: np.ndarray
     load: np.ndarray
+    level: np.ndarray  # room to work in
     gears: np.ndarray  # (n, nu) torque per force of the actuators that turn a joint by itself
     stribeck: float
     presliding: float
@@ -85,34 +89,55 @@ class Slip(NamedTuple):
 
 
 @jit_internal
-def joint_forces(laws, z, h, qvel, force, applied, damping):
-    """Set the forces (nv,) and the damping (nv,) of joints that rub for one step of h s, under the actuators' `force` (nu,).
+def joint_forces(laws, z, h, smooth, motion, applied):
+    """Add the mean friction (nv,) of joints over a step of h s, found in short steps that begin and end between two angles.
 
-    `damping` is raised in place.
+    `smooth` is (force without friction (nv,), mass matrix (nv, nv), which is overwritten, damping (nv,), actuators' forces (nu,)),
+    `motion` (rates before the step (nv,), rates after it and their mean (nv,), which are written). Advances the slip states z (n,).
     """
+    (free, M, damping, force), (rate, after, mean) = smooth, motion
+    nv, parts = rate.size, max(1, math.ceil(h / SHORT_STEP - 1e-6))
+    d = h / parts
     for j in range(laws.dof.size):
-        i = laws.dof[j]
-        v = qvel[i]
-        r = v / laws.stribeck
         geared = 0.0
         for k in range(force.size):
             geared += laws.gears[j, k] * force[k]
-        F = laws.torque[j] + laws.breakaway[j] * math.exp(-r * r) + laws.load[j] * abs(geared)
-        s = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
-        applied[i] -= F * z[j]
-        damping[i] += JOINT_SHARE * h * F * (1.0 - z[j] * s) / laws.presliding
+        laws.level[j] = laws.torque[j] + laws.load[j] * abs(geared)
+        M[laws.dof[j], laws.dof[j]] += 0.25 * d * d * (laws.level[j] + laws.breakaway[j]) / laws.presliding
+    pushed, turned, W = np.empty(nv), np.zeros(laws.dof.size), np.linalg.inv(M)
+    for k in range(nv):
+        after[k], mean[k] = rate[k], 0.0
+    for _ in range(parts):
+        for k in range(nv):
+            pushed[k] = free[k] - damping[k] * (after[k] - rate[k])
+        for j in range(laws.dof.size):
+            r = after[laws.dof[j]] / laws.stribeck
+            rubbed = (laws.level[j] + laws.breakaway[j] * math.exp(-r * r)) * z[j]
+            pushed[laws.dof[j]] -= rubbed
+            turned[j] += rubbed
+        for i in range(nv):
+            mean[i] += 0.5 * after[i] / parts
+            for k in range(nv):
+                after[i] += d * W[i, k] * pushed[k]
+            mean[i] += 0.5 * after[i] / parts
+        for j in range(laws.dof.size):
+            z[j] = slid(z[j], d * after[laws.dof[j]], laws.presliding)
+    for j in range(laws.dof.size):
+        applied[laws.dof[j]] -= turned[j] / parts
 
 
 @jit_internal
-def slide_joints(laws, z, before, qpos):
-    """Advance the slip states (n,) by the turns since `before` (n,), which becomes now."""
+def slid(z, dq, presliding):
+    """Return the slip state after a turn dq."""
+    s = 1.0 if dq > 0.0 else -1.0
+    return s + (z - s) * math.exp(-abs(dq) / presliding)
+
+
+@jit_internal
+def follow_joints(laws, z, h, after, rate):
+    """Advance the slip states (n,) by what a step turned more than `joint_forces` foresaw: it ended at `rate`, not at `after`."""
     for j in range(laws.dof.size):
-        q = qpos[laws.qpos[j]]
-        dq = q - before[j]
-        before[j] = q
-        if dq != 0.0:
-            s = 1.0 if dq > 0.0 else -1.0
-            z[j] = s + (z[j] - s) * math.exp(-abs(dq) / laws.presliding)
+        z[j] = slid(z[j], 0.5 * h * (rate[laws.dof[j]] - after[laws.dof[j]]), laws.presliding)
 
 
 @jit_internal

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.foundation.compiled import jit, jit_internal
-from twin.mechanics.mjcf.friction import joint_forces, slide_joints, tendon_forces
-from twin.mechanics.mujoco_symbols import mj_fwd_actuation, mj_step1, mj_step2
+from twin.mechanics.mjcf.friction import follow_joints, joint_forces, tendon_forces
+from twin.mechanics.mujoco_symbols import mj_full_m, mj_fwd_actuation, mj_step1, mj_step2
 
 RATE_AT_REST = 1e-7  # rad/s or m/s: slower than this in all coordinates for `REST_STEPS` steps a body has settled
 REST_STEPS = 30
@@ -20,10 +20,10 @@ class Views(NamedTuple):
     """Views of a data's and a model's arrays."""
 
     ctrl: np.ndarray
-    qpos: np.ndarray
     qvel: np.ndarray
     applied: np.ndarray  # qfrc_applied
     force: np.ndarray  # actuator_force
+    smooth: tuple  # qfrc_passive, qfrc_actuator, qfrc_constraint, qfrc_bias
     damping: np.ndarray  # dof_damping of the model
     shown: tuple  # arrays that are recorded in every row, in the order of the solver's columns
     rates: tuple  # (qvel, velocities of actuators, of tendons), recorded after those
@@ -31,7 +31,7 @@ class Views(NamedTuple):
     slope: np.ndarray  # (nu,) of an actuator's force over its velocity
     forcerange: np.ndarray  # (nu, 2), infinite where it is not limited
     moment: tuple  # of actuators: rownnz, rowadr, colind, values
-    centring: tuple  # share of the last change of joints' damping, and of actuators', that is added ahead
+    implicit: bool  # whether actuators' damping acts at the rates after a step
 
 
 class Laws(NamedTuple):
@@ -50,55 +50,62 @@ class Memory(NamedTuple):
     """What is remembered from step to step: the states of the laws, and the rates and the added damping of the step before."""
 
     z: np.ndarray  # (n_joint,)
-    before: np.ndarray  # (n_joint,)
     slip: object
     started: np.ndarray  # (1,) whether tendons' paths are those of a step before
     raised: np.ndarray  # (nv,) N m s/rad, by what sticks
     rate: np.ndarray  # (nv,)
-    act_rate: np.ndarray  # (nu,)
     moving: np.ndarray  # (1,) whether these rates are those of a step before
+    late: np.ndarray  # (2, nu) rates of actuators behind their lines, before and after the last step
     heard: np.ndarray  # (2, nu) controls after the lag, and the controls before it; NaN before the first
 
 
 @jit_internal
-def center_damping(views, own, before, before_act, started, applied):
-    """Add to the forces (nv,) what makes damping act at the mean of the rates before and after a step.
+def center_damping(views, own, ahead, behind, applied, lines):
+    """Add to the forces (nv,) what makes damping act at the mean of the rates in a step.
 
-    Else it acts at those after it (implicit integrators) or before it (Euler). It is half of the change in the step before;
-    steps become of second order by it.
-
-    `before` (nv,) and `before_act` (nu,) are the rates a step before. An actuator at its limit has no damping.
+    Else it acts at those after it (implicit integrators), which are `ahead` (nv,) of the mean, or, of actuators, at those before it
+    (Euler), which are `behind` (nv,) it. Steps become of second order by it. An actuator at its limit has no damping. `lines` is
+    (lag (nu,) in s, step in s, rates that drums follow (2, nu)): a line that stretches hands on its rate late (`stretch_lines`).
     """
+    lag, h, late = lines
     rownnz, rowadr, colind, values = views.moment
-    av = views.rates[1]
-    for k in range(before.size):
-        if started:
-            applied[k] -= views.centring[0] * own[k] * (views.qvel[k] - before[k])
-        before[k] = views.qvel[k]
-    for k in range(av.size):
-        f = views.centring[1] * views.slope[k] * (av[k] - before_act[k])
-        before_act[k] = av[k]
+    for k in range(ahead.size):
+        applied[k] += own[k] * ahead[k]
+    for k in range(views.force.size):
         low, high, force = views.forcerange[k, 0], views.forcerange[k, 1], views.force[k]
-        if started and f != 0.0 and low < force < high:
+        if views.slope[k] != 0.0 and low < force < high:
+            change, mean = 0.0, views.rates[1][k]
             for e in range(rowadr[k], rowadr[k] + rownnz[k]):
-                applied[colind[e]] += values[e] * f
+                change += values[e] * (-ahead[colind[e]] if views.implicit else behind[colind[e]])
+                mean += values[e] * behind[colind[e]]
+            if lag[k] > 0.0:
+                left = math.exp(-h / lag[k])
+                change += (late[1, k] - mean) * (1.0 - left) * lag[k] / h
+                late[0, k], late[1, k] = late[1, k], mean + (late[1, k] - mean) * left
+            for e in range(rowadr[k], rowadr[k] + rownnz[k]):
+                applied[colind[e]] += values[e] * views.slope[k] * change
 
 
 @jit_internal
-def center_rates(views, out):
-    """Replace the rates of a row, those before it, by the mean with those now, and its actuators' forces by those at that mean."""
+def center_rates(views, lag, late, out):
+    """Replace the rates of a row, those before it, by the mean with those now, and its actuators' forces by those at that mean.
+
+    Behind a line that stretches (`lag` > 0) it is the mean of the rates that its drum follows, `late` (2, nu).
+    """
     at = 0
     for array in views.shown:
         at += array.size
     for j in range(3):
         array = views.rates[j]
         for k in range(array.size):
-            change = 0.5 * (array[k] - out[at])
+            before = out[at]
+            change = 0.5 * (array[k] - before)
             out[at] += change
             if j == 1:
                 force, low, high = out[views.force_column + k], views.forcerange[k, 0], views.forcerange[k, 1]
+                felt = 0.5 * (late[0, k] + late[1, k]) - before if lag[k] > 0.0 else change
                 if low < force < high:
-                    out[views.force_column + k] = min(high, max(low, force + views.slope[k] * change))
+                    out[views.force_column + k] = min(high, max(low, force + views.slope[k] * felt))
             at += 1
 
 
@@ -140,6 +147,8 @@ def run(engine, views, laws, memory, commands, rows, out):
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), memory.raised, np.zeros(nv), 0
     mu = laws.mu.max() if nt else 0.0
+    rubs, free, mass = laws.joints.dof.size > 0, np.zeros(nv), np.zeros((nv, nv))
+    after, mean, ahead, behind = np.zeros(nv), np.zeros(nv), np.zeros(nv), np.zeros(nv)
     settling, last, limited = rows.size == 0, -1, False
     for k in range(views.force.size):
         limited = limited or math.isfinite(views.forcerange[k, 0]) or math.isfinite(views.forcerange[k, 1])
@@ -149,14 +158,13 @@ def run(engine, views, laws, memory, commands, rows, out):
             views.applied[k] = 0.0
             views.damping[k] = own[k] + raised[k]
             raised[k] = 0.0
-        joint_forces(laws.joints, memory.z, h, views.qvel, views.force, views.applied, views.damping)
         hear(commands[i], laws.lag, h, memory.heard, views.ctrl)
         mj_step1(model, data)
         if last >= 0:
-            center_rates(views, out[last])
+            center_rates(views, laws.lag, memory.late, out[last])
         row = -1 if settling else rows[i]
         last = row
-        if mu > 0.0 or row >= 0 or limited:  # which actuator is at its limit is asked below
+        if mu > 0.0 or row >= 0 or limited or rubs:  # which actuator is at its limit is asked below
             mj_fwd_actuation(model, data)
         if mu > 0.0:
             for t in range(nt):
@@ -166,15 +174,29 @@ def run(engine, views, laws, memory, commands, rows, out):
                 law, work = (laws.mu[t], laws.presliding, h), (gradient, views.applied, raised)
                 tendon_forces((t, T), law, laws.tree, laws.paths, memory.slip, memory.started[0], work)
             memory.started[0] = True
-        center_damping(views, own, memory.rate, memory.act_rate, memory.moving[0], views.applied)
+        for k in range(nv):  # as in the step before
+            behind[k] = ahead[k] = 0.5 * (views.qvel[k] - memory.rate[k]) if memory.moving[0] else 0.0
+            memory.rate[k] = views.qvel[k]
         memory.moving[0] = True
+        if rubs:
+            mj_full_m(model, data, mass.ctypes)
+            for k in range(nv):
+                free[k] = views.applied[k] - views.smooth[3][k]
+                for f in range(3):
+                    free[k] += views.smooth[f][k]
+            smooth, motion = (free, mass, views.damping, views.force), (views.qvel, after, mean)
+            joint_forces(laws.joints, memory.z, h, smooth, motion, views.applied)
+            for k in range(nv):
+                ahead[k], behind[k] = after[k] - mean[k], mean[k] - views.qvel[k]
+        center_damping(views, own, ahead, behind, views.applied, (laws.lag, h, memory.late))
         if row >= 0:
             write_row(views, out[row])
         mj_step2(model, data)
         fastest = 0.0
         for k in range(nv):
             fastest = max(fastest, abs(views.qvel[k])) if math.isfinite(views.qvel[k]) else np.inf
-        slide_joints(laws.joints, memory.z, memory.before, views.qpos)
+        if rubs:
+            follow_joints(laws.joints, memory.z, h, after, views.qvel)
         if not fastest < LARGEST_RATE:
             done = i
             break

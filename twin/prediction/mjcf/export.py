@@ -7,7 +7,7 @@ from pathlib import Path
 
 import mujoco
 
-from twin.body import Loads, Route, Rubbing
+from twin.body import Bumpers, Loads, Route, Rubbing
 from twin.body.hinge_chain import HingeChain
 from twin.effects import Effect
 from twin.foundation.atomic_write import write_all_atomically
@@ -107,7 +107,7 @@ def _twin_file(twin: Twin, folder: Path, origins: Origins) -> bytes:
 
 def _has_place(effect: Effect) -> bool:
     """Return whether an effect's law can be written or stepped."""
-    route = replace(effect.route(), mu=0.0, presliding=Route().presliding, mu_shares=(), rubbing=Rubbing())
+    route = replace(effect.route(), mu=0.0, presliding=Route().presliding, mu_shares=(), rubbing=Rubbing(), bumpers=Bumpers())
     return (
         not effect.acts_in("soften", "spring", "deform")
         and route == Route()
