@@ -76,7 +76,7 @@ def trial_of(time: np.ndarray, commands: np.ndarray) -> Recording:
         Channel("knee", "input", "m", quantity="actuator.knee_winch.ctrl"),
     )
     outputs = tuple(Channel(f"o{i}", "output", unit, 1e-4, name) for i, (name, unit) in enumerate(OUTPUTS.items()))
-    values = {"hip": commands[:, 0], "knee": commands[:, 1], **{c.name: np.zeros(len(time)) for c in outputs}}
+    values = {"hip": commands[:, 0], "knee": commands[:, 1], **{c.name: np.full(len(time), np.nan) for c in outputs}}
     trials = (Trial("a.csv", time, values, {"settle": SETTLE}, start=0.0),)
     return Recording("tendon_leg", "made", "simulation", None, (*inputs, *outputs), trials)
 

@@ -37,10 +37,14 @@ class Heating:
 
 @dataclass(frozen=True)
 class Start:
-    """How a trial of an MJCF begins: from a keyframe (or, if empty, where its springs and servos rest), held for `settle` s."""
+    """How a trial of an MJCF begins: from a keyframe (or, if empty, where its springs and servos rest), held for `settle` s.
+
+    Joints that rub stay anywhere: they then stand where they were `seen` (n_joint,) rad or m, NaN where they were not.
+    """
 
     settle: float = 2.0
     pose: str = ""
+    seen: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from twin.env.episodes.validation import ActionBounds
 from twin.env.plants.model_plant import ModelPlant
 from twin.foundation.errors import DataError, SolveError, UnknownNameError
 from twin.measurements import Recording, read
+from twin.prediction.first_pose import true_start
 from twin.prediction.prepared import Inputs, prepare
 from twin.prediction.rollout import Drawing, draw_controls
 from twin.prediction.twin import Twin
@@ -178,7 +179,7 @@ class MJCFTrack(TwinEnv):
                 raise DataError(f"{inputs.name}: {name} was never measured; choose another trial by `trial`, or leave it out")
             targets.append(np.interp(time, inputs.time[seen], column[seen]))
         controls = np.stack([np.interp(time, inputs.time, u) for u in inputs.command.T], axis=1)
-        return Motion(controls, np.stack(targets, axis=1), inputs.loads, inputs.start)
+        return Motion(controls, np.stack(targets, axis=1), inputs.loads, true_start(inputs, self.described.effect_chain))
 
     def _bound_controls(self, names: list[str]) -> None:
         """Widen the controls' ranges to the log's. Raises DataError for one that nothing bounds."""

@@ -14,6 +14,7 @@ from twin.body.lag import damped
 from twin.body.orientation import angles, followed, rates_and_forces, turned_by
 from twin.body.spring import Spring
 from twin.foundation.errors import SolveError
+from twin.prediction.first_pose import true_start
 from twin.prediction.prepared import Inputs, PreparedRecording
 from twin.robots import load_family
 
@@ -86,7 +87,7 @@ class TrialSimulator:
         problem = Problem(
             inputs.time, felt.command, chain.surround(inputs.loads), chain.route, inputs.drives, chain.creep, delayed,
             chain.stiffness(inputs.temperature, inputs.clock), heating, near, options.keep, options.once, options.tolerance,
-            inputs.clouds, inputs.start, self._course(inputs, driven),
+            inputs.clouds, true_start(inputs, chain), self._course(inputs, driven),
         )  # fmt: skip
         solution = self.solver.solve(problem)
         if not solution.status.all():

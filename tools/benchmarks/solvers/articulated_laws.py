@@ -2,8 +2,8 @@
 
     python -m tools.benchmarks.solvers.articulated_laws [--robot leg] [--effect joint_friction]
 
-Nothing is fitted: a difference beyond the steps' own is an error of a law, here or there. Both robots are let go where springs
-rest. The table has the difference and what the effect moves, each as the root mean square over all channels in their noise.
+Nothing is fitted: a difference beyond the steps' own is an error of a law, here or there. The table has the
+difference and what the effect moves, each as the root mean square over all channels in their noise.
 """
 
 from __future__ import annotations
@@ -103,8 +103,7 @@ class Compared:
 
 def compare(name: str, only: str = "", each: int = 2, seed: int = 5) -> Iterator[Compared]:
     """Yield the comparisons of one robot, as described and with each effect (or `only` one), on so many trials of `each` kind."""
-    described = ROBOTS[name]()
-    robot = replace(described, joints=tuple(replace(j, start=j.rest if j.stiffness else j.start) for j in described.joints))
+    robot = ROBOTS[name]()
     day = session(robot, np.random.default_rng(seed), camera=True)
     trials = [t for kind in TRIALS for t in [t for t in day.measured if t.name.startswith(kind)][:each]]
     known = [e for e in all_effects().values() if e.in_catalogue and e.fits(robot) and e.id not in NOT_COMPARED]

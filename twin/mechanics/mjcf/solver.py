@@ -112,7 +112,7 @@ class ModelSolver:
         Most trials of a session begin alike.
         """
         start = problem.start
-        key = repr((first.tolist(), h, start, problem.route)).encode()
+        key = repr((first.tolist(), h, start.settle, start.pose, problem.route)).encode()
         if key not in now.settled:
             set_start(now.model, now.data, first[0], start.pose)
             memory = _memory(now, laws)
@@ -131,6 +131,8 @@ class ModelSolver:
         slip = memory.slip._replace(z=memory.slip.z.copy(), beyond=memory.slip.beyond.copy())  # type: ignore[attr-defined]
         copied = memory._replace(z=memory.z.copy(), slip=slip, started=memory.started.copy(),
                                  heard=memory.heard.copy(), **_at_rest(now.model))  # fmt: skip
+        if start.seen and laws.joints.dof.size:  # type: ignore[attr-defined]
+            _stand(now, self.body, laws.joints, copied.z, start.seen)
         rates = now.data.qvel
         return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
 
@@ -266,6 +268,19 @@ def _memory(now: _Compiled, laws: Laws) -> Memory:
     rubs = len(laws.joints.dof)  # type: ignore[attr-defined]
     heard = np.full((2, now.model.nu), np.nan)
     return Memory(np.zeros(rubs), slip, np.zeros(1, bool), heard=heard, **_at_rest(now.model))
+
+
+def _stand(now: _Compiled, body: ModelBody, joints: JointLaws, z: np.ndarray, seen: tuple[float, ...]) -> None:
+    """Put a body at rest where its joints were `seen`; those that rub hold what is out of balance there, as far as they can."""
+    model, data = now.model, now.data
+    for joint in body.joints:
+        if joint < len(seen) and np.isfinite(seen[joint]):
+            data.qpos[model.jnt_qposadr[joint]] = seen[joint]
+    data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)
+    most = joints.torque + joints.breakaway + joints.load * np.abs(joints.gears @ data.actuator_force)
+    held = data.qfrc_smooth[joints.dof] + data.qfrc_constraint[joints.dof]
+    z[:] = np.clip(held / np.maximum(most, 1e-12), -1.0, 1.0)
 
 
 def _at_rest(model: mujoco.MjModel) -> dict[str, np.ndarray]:

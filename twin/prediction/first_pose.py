@@ -1,0 +1,49 @@
+"""Where a trial's joints stand before it begins, as its encoders show them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from twin.body import Body, Start
+from twin.effects.base.chain import EffectChain
+from twin.measurements import Trial
+
+if TYPE_CHECKING:
+    from twin.prediction.prepared import Inputs, Output
+
+JOINTS = ("joint angle", "joint shift")
+
+
+def seen_joints(trial: Trial, outputs: Sequence[Output], command: np.ndarray, body: Body) -> tuple[float, ...]:
+    """Return the mean positions (n_joint,) of a body's joints that encoders show while the first command (n, n_tendon) holds.
+
+    NaN where none does.
+    """
+    measured = {o.index: trial.values[o.channel.name] for o in outputs if o.group in JOINTS}
+    moved = np.flatnonzero(np.any(command != command[0], axis=1))
+    held = int(moved[0]) if moved.size else len(command)
+    seen = np.full(max((sense.index + 1 for sense in body.senses.values() if sense.group in JOINTS), default=0), np.nan)
+    for joint, position in measured.items():
+        known = position[:held][np.isfinite(position[:held])]
+        seen[joint] = known.mean() if known.size else np.nan
+    return tuple(map(float, seen)) if np.isfinite(seen).any() else ()
+
+
+def true_start(inputs: Inputs, chain: EffectChain) -> Start:
+    """Return where a trial begins, its joints without what effects of their encoders add."""
+    if not inputs.start.seen:
+        return inputs.start
+    shown = np.array([inputs.start.seen])
+    first = inputs.signals
+    row = first.with_changes(
+        time=first.time[:1], clock=first.clock[:1], tension=first.tension[:1], displacement=first.displacement[:1],
+        markers=first.markers[:1], temperature=first.temperature[:1], current=first.current[:1], control=first.control[:1],
+        others=dict.fromkeys(JOINTS, shown),
+    )  # fmt: skip
+    sensed = chain.sense(row).others
+    turned, shifted = (sensed[group] - shown for group in JOINTS)  # of a joint that turns, and of one that slides
+    return replace(inputs.start, seen=tuple(map(float, (shown - np.where(turned != 0.0, turned, shifted))[0])))
