@@ -40,10 +40,11 @@ def predicted(folder: Path, angle: np.ndarray, *effects: str) -> np.ndarray:
 def test_the_mean_of_what_is_seen_before_the_command_moves_is_taken(tmp_path: Path) -> None:
     angle = np.concatenate([0.1 + 1e-3 * (-1.0) ** np.arange(HELD), np.full(20, 0.7)])
     twin, recording = made(tmp_path, angle, ())
-    assert prepare(recording, twin.robot).inputs[0].start.seen == pytest.approx((0.1,))
-    angle[:HELD] = np.nan
+    start = prepare(recording, twin.robot).inputs[0].start
+    assert (start.seen, start.doubt) == (pytest.approx((0.1,)), pytest.approx((10.0 * 1e-3 / np.sqrt(HELD),)))
+    angle[: HELD - 2] = np.nan  # two rows say nothing of their scatter
     twin, recording = made(tmp_path, angle, ())
-    assert prepare(recording, twin.robot).inputs[0].start.seen == ()
+    assert np.isnan(prepare(recording, twin.robot).inputs[0].start.seen).all()
 
 
 @pytest.mark.parametrize("seen", [-0.2, 0.0, 0.15])
@@ -53,6 +54,15 @@ def test_a_joint_that_rubs_stays_where_it_was_seen(seen: float, tmp_path: Path) 
     assert np.abs(stays[:HELD] - seen).max() < 1e-6  # rad
     assert np.abs(stays - seen).max() < 5e-4  # rad: a push of a hundredth of that load is less than half the presliding
     assert np.abs(predicted(tmp_path, np.full(100, seen))[:HELD]).max() < 1e-6  # without friction the spring takes it home
+
+
+def test_what_noise_explains_is_not_seen(tmp_path: Path) -> None:
+    """Let go where its spring rests it stays at 0; seen d = 0.5 or 50 standard errors off it moves by d^3 / (d^2 + 10^2)."""
+    noise = 1e-3 * (-1.0) ** np.arange(100)
+    for errors in (0.5, 50.0):
+        off = errors * 1e-3 / np.sqrt(HELD)
+        began = predicted(tmp_path, off + noise, "joint_friction")[0]
+        assert began == pytest.approx(off * errors**2 / (errors**2 + 100.0), rel=1e-6)
 
 
 def test_it_slides_to_where_friction_holds_it(tmp_path: Path) -> None:

@@ -39,12 +39,14 @@ class Heating:
 class Start:
     """How a trial of an MJCF begins: from a keyframe (or, if empty, where its springs and servos rest), held for `settle` s.
 
-    Joints that rub stay anywhere: they then stand where they were `seen` (n_joint,) rad or m, NaN where they were not.
+    Joints that rub stay anywhere: they then stand where they were `seen` (n_joint,) rad or m, NaN where they were not, if that is
+    off by more than `doubt` (n_joint,).
     """
 
     settle: float = 2.0
     pose: str = ""
     seen: tuple[float, ...] = ()
+    doubt: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -16,21 +16,27 @@ if TYPE_CHECKING:
     from twin.prediction.prepared import Inputs, Output
 
 JOINTS = ("joint angle", "joint shift")
+LEAST_ROWS = 3  # whose scatter says how well a position is known
+DOUBTED = 10.0  # standard errors: a pose that is that far off is half believed, one at three of them by a tenth
 
 
-def seen_joints(trial: Trial, outputs: Sequence[Output], command: np.ndarray, body: Body) -> tuple[float, ...]:
-    """Return the mean positions (n_joint,) of a body's joints that encoders show while the first command (n, n_tendon) holds.
+def with_seen(start: Start, trial: Trial, outputs: Sequence[Output], command: np.ndarray, body: Body) -> Start:
+    """Return a start with the mean positions (n_joint,) of joints that encoders show while the first command (n, n_tendon) holds.
 
-    NaN where none does.
+    They are NaN where no encoder does, and doubted by `DOUBTED` times their standard error. A trial that names a pose keeps it.
     """
     measured = {o.index: trial.values[o.channel.name] for o in outputs if o.group in JOINTS}
     moved = np.flatnonzero(np.any(command != command[0], axis=1))
     held = int(moved[0]) if moved.size else len(command)
-    seen = np.full(max((sense.index + 1 for sense in body.senses.values() if sense.group in JOINTS), default=0), np.nan)
+    if start.pose or not measured or held < LEAST_ROWS:
+        return start
+    n_joint = max(sense.index + 1 for sense in body.senses.values() if sense.group in JOINTS)
+    seen, doubt = np.full(n_joint, np.nan), np.full(n_joint, np.nan)
     for joint, position in measured.items():
         known = position[:held][np.isfinite(position[:held])]
-        seen[joint] = known.mean() if known.size else np.nan
-    return tuple(map(float, seen)) if np.isfinite(seen).any() else ()
+        if known.size >= LEAST_ROWS:
+            seen[joint], doubt[joint] = known.mean(), DOUBTED * max(float(known.std()), 1e-9) / np.sqrt(known.size)
+    return replace(start, seen=tuple(map(float, seen)), doubt=tuple(map(float, doubt)))
 
 
 def true_start(inputs: Inputs, chain: EffectChain) -> Start:

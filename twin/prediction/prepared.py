@@ -14,7 +14,7 @@ from twin.measurements.channels import parse_channel_name
 from twin.measurements.conditions import PAYLOAD_AT
 from twin.measurements.patches import N_PATCHES, SHARED_NOISE_SHARE, Patches, camera_direction, cut_patches, point_scatter
 from twin.measurements.recording import EXTERNAL_CONTACT, START_POSE
-from twin.prediction.first_pose import seen_joints
+from twin.prediction.first_pose import with_seen
 from twin.prediction.orientations import Orientation, measured_columns, orientations
 from twin.prediction.pushes import check_pushes
 from twin.robots import Robot
@@ -178,7 +178,7 @@ def prepare(recording: Recording, robot: Robot) -> PreparedRecording:
         loads = _loads(recording, trial, robot, body)
         seen = cut_patches(trial.clouds, camera) if skin else None
         command = readings @ pull
-        start = start if start.pose else replace(start, seen=seen_joints(trial, read, command, body))
+        start = with_seen(start, trial, read, command, body)
         inputs.append(
             Inputs(
                 trial.name, trial.time, clocks[k], command, drives, _temperature(recording, trial), loads, seen,

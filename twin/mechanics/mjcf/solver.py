@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from twin.body import DIRECT, NOT_FOUND, Loads, Problem, Route, Solution
+from twin.body import DIRECT, NOT_FOUND, Loads, Problem, Route, Solution, Start
 from twin.mechanics.mjcf.body import ModelBody, line_lag, payload_places
 from twin.mechanics.mjcf.friction import JointLaws, Paths, Slip, Tree
 from twin.mechanics.mjcf.poses import add_masses, set_start
@@ -132,7 +132,7 @@ class ModelSolver:
         copied = memory._replace(z=memory.z.copy(), slip=slip, started=memory.started.copy(),
                                  heard=memory.heard.copy(), **_at_rest(now.model))  # fmt: skip
         if start.seen and laws.joints.dof.size:  # type: ignore[attr-defined]
-            _stand(now, self.body, laws.joints, copied.z, start.seen)
+            _stand(now, self.body, laws.joints, copied.z, start)
         rates = now.data.qvel
         return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
 
@@ -270,17 +270,23 @@ def _memory(now: _Compiled, laws: Laws) -> Memory:
     return Memory(np.zeros(rubs), slip, np.zeros(1, bool), heard=heard, **_at_rest(now.model))
 
 
-def _stand(now: _Compiled, body: ModelBody, joints: JointLaws, z: np.ndarray, seen: tuple[float, ...]) -> None:
-    """Put a body at rest where its joints were `seen`; those that rub hold what is out of balance there, as far as they can."""
-    model, data = now.model, now.data
+def _stand(now: _Compiled, body: ModelBody, joints: JointLaws, z: np.ndarray, start: Start) -> None:
+    """Put a body at rest where its joints were seen; those that rub hold what is out of balance there, as far as they can.
+
+    A joint that is d off where it was let go moves by d^2 / (d^2 + doubt^2) of that, and slip states by the largest such share.
+    """
+    model, data, share = now.model, now.data, 0.0
     for joint in body.joints:
-        if joint < len(seen) and np.isfinite(seen[joint]):
-            data.qpos[model.jnt_qposadr[joint]] = seen[joint]
-    data.qvel[:] = 0.0
+        if joint < len(start.seen) and np.isfinite(start.seen[joint]):
+            off = start.seen[joint] - data.qpos[model.jnt_qposadr[joint]]
+            believed = off * off / (off * off + start.doubt[joint] ** 2)
+            data.qpos[model.jnt_qposadr[joint]] += believed * off
+            share = max(share, believed)
+    data.qvel[:] *= 1.0 - share
     mujoco.mj_forward(model, data)
     most = joints.torque + joints.breakaway + joints.load * np.abs(joints.gears @ data.actuator_force)
     held = data.qfrc_smooth[joints.dof] + data.qfrc_constraint[joints.dof]
-    z[:] = np.clip(held / np.maximum(most, 1e-12), -1.0, 1.0)
+    z += share * (np.clip(held / np.maximum(most, 1e-12), -1.0, 1.0) - z)
 
 
 def _at_rest(model: mujoco.MjModel) -> dict[str, np.ndarray]:

@@ -135,6 +135,32 @@ def write_row(views, out):
             at += 1
 
 
+@jit_internal
+def foresee_rates(engine, views, laws, memory, room):
+    """Foresee the rates of the step ahead, and let joints rub in it.
+
+    `room` is (rates after the step, their mean, how far ahead of the mean those after it are, how far behind those before it, and
+    room to work in): each (nv,), the last (nv, nv). Where nothing rubs rates change as in the step before.
+    """
+    model, data, h = engine
+    after, mean, ahead, behind, free, mass = room
+    for k in range(after.size):
+        behind[k] = ahead[k] = 0.5 * (views.qvel[k] - memory.rate[k]) if memory.moving[0] else 0.0
+        memory.rate[k] = views.qvel[k]
+    memory.moving[0] = True
+    if laws.joints.dof.size == 0:
+        return
+    mj_full_m(model, data, mass.ctypes)
+    for k in range(after.size):
+        free[k] = views.applied[k] - views.smooth[3][k]
+        for f in range(3):
+            free[k] += views.smooth[f][k]
+    smooth, motion = (free, mass, views.damping, views.force), (views.qvel, after, mean)
+    joint_forces(laws.joints, memory.z, h, smooth, motion, views.applied)
+    for k in range(after.size):
+        ahead[k], behind[k] = after[k] - mean[k], mean[k] - views.qvel[k]
+
+
 @jit
 def run(engine, views, laws, memory, commands, rows, out):
     """Step through commands (n, nu), the state before step i being that at command i. `engine` is (model, data, step in s).
@@ -147,8 +173,10 @@ def run(engine, views, laws, memory, commands, rows, out):
     nv, nt = views.qvel.size, laws.pull.shape[0]
     own, raised, gradient, slow = views.damping.copy(), memory.raised, np.zeros(nv), 0
     mu = laws.mu.max() if nt else 0.0
-    rubs, free, mass = laws.joints.dof.size > 0, np.zeros(nv), np.zeros((nv, nv))
-    after, mean, ahead, behind = np.zeros(nv), np.zeros(nv), np.zeros(nv), np.zeros(nv)
+    rubs, room = (
+        laws.joints.dof.size > 0,
+        (np.zeros(nv), np.zeros(nv), np.zeros(nv), np.zeros(nv), np.zeros(nv), np.zeros((nv, nv))),
+    )
     settling, last, limited = rows.size == 0, -1, False
     for k in range(views.force.size):
         limited = limited or math.isfinite(views.forcerange[k, 0]) or math.isfinite(views.forcerange[k, 1])
@@ -174,21 +202,8 @@ def run(engine, views, laws, memory, commands, rows, out):
                 law, work = (laws.mu[t], laws.presliding, h), (gradient, views.applied, raised)
                 tendon_forces((t, T), law, laws.tree, laws.paths, memory.slip, memory.started[0], work)
             memory.started[0] = True
-        for k in range(nv):  # as in the step before
-            behind[k] = ahead[k] = 0.5 * (views.qvel[k] - memory.rate[k]) if memory.moving[0] else 0.0
-            memory.rate[k] = views.qvel[k]
-        memory.moving[0] = True
-        if rubs:
-            mj_full_m(model, data, mass.ctypes)
-            for k in range(nv):
-                free[k] = views.applied[k] - views.smooth[3][k]
-                for f in range(3):
-                    free[k] += views.smooth[f][k]
-            smooth, motion = (free, mass, views.damping, views.force), (views.qvel, after, mean)
-            joint_forces(laws.joints, memory.z, h, smooth, motion, views.applied)
-            for k in range(nv):
-                ahead[k], behind[k] = after[k] - mean[k], mean[k] - views.qvel[k]
-        center_damping(views, own, ahead, behind, views.applied, (laws.lag, h, memory.late))
+        foresee_rates(engine, views, laws, memory, room)
+        center_damping(views, own, room[2], room[3], views.applied, (laws.lag, h, memory.late))
         if row >= 0:
             write_row(views, out[row])
         mj_step2(model, data)
@@ -196,7 +211,7 @@ def run(engine, views, laws, memory, commands, rows, out):
         for k in range(nv):
             fastest = max(fastest, abs(views.qvel[k])) if math.isfinite(views.qvel[k]) else np.inf
         if rubs:
-            follow_joints(laws.joints, memory.z, h, after, views.qvel)
+            follow_joints(laws.joints, memory.z, h, room[0], views.qvel)
         if not fastest < LARGEST_RATE:
             done = i
             break
