@@ -3,7 +3,7 @@
 import numpy as np
 
 from twin.diagnosis.calibration.fit import Fit
-from twin.diagnosis.thresholds import LEAST_CONTRIBUTION, UNLIKELY_PARAMETER_DISTANCE
+from twin.diagnosis.thresholds import UNLIKELY_PARAMETER_DISTANCE
 
 
 def unlikely(found: Fit) -> list[str]:
@@ -32,42 +32,15 @@ def unlikely(found: Fit) -> list[str]:
 
 
 def far_from_description(found: Fit) -> str:
-    """Return all of them in one sentence, for the verdict; empty where there are none, or where they hardly move the prediction.
-
-    With many readings an error of a tenth of the noise, of the integration say, drives numbers far that no reading tells apart.
-    """
+    """Return all of them in one sentence, for the verdict; empty where there are none."""
     names = [words.partition(" ")[0] for words in unlikely(found)]
-    if not names or (not any(_at_own_bound(found)) and _moved_by_unlikely(found) < LEAST_CONTRIBUTION):
+    if not names:
         return ""
     which = names[0] if len(names) == 1 else f"{len(names)} numbers of the robot ({names[0]}, ...)"
     return (
         f"{which} ended at a bound or {UNLIKELY_PARAMETER_DISTANCE:.0f} standard deviations off the description, so the effects "
         "may imitate a wrong description (see the notices)"
     )
-
-
-def _at_own_bound(found: Fit) -> list[bool]:
-    """Return which free parameters are the robot's own at an end of their range."""
-    return [
-        bool(ended and f.effect is None and f.parameter.std) for f, ended in zip(found.model.free, found.at_bound(), strict=True)
-    ]
-
-
-def _moved_by_unlikely(found: Fit) -> float:
-    """Return by how much (sigma, root mean square) the prediction moves with the robot's own parameters back at a likely distance.
-
-    All others follow: d being the way back of those that are unlikely, in steps, and H = J'J and the priors'
-    information, the cost rises by d' (H_dd - H_do H_oo^-1 H_od) d.
-    """
-    free, steps = found.model.free, np.array([f.parameter.step for f in found.model.free])
-    off = np.array([0.0 if f.effect or not f.parameter.std else found.model.value(f) - f.parameter.value for f in free])
-    likely = UNLIKELY_PARAMETER_DISTANCE * np.hypot([f.parameter.std or np.inf for f in free], found.std())
-    back = np.sign(off) * np.maximum(np.abs(off) - likely, 0.0) / steps
-    far, H = back != 0.0, found.information()
-    others = H[np.ix_(~far, ~far)]
-    followed = np.linalg.lstsq(others, H[np.ix_(~far, far)] @ back[far], rcond=None)[0]
-    rise = back[far] @ (H[np.ix_(far, far)] @ back[far] - H[np.ix_(far, ~far)] @ followed)
-    return float(np.sqrt(max(rise, 0.0) / max(found.z.size, 1)))
 
 
 def strained(found: Fit) -> list[str]:
