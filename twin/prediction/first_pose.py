@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from twin.prediction.prepared import Inputs, Output
 
 JOINTS = ("joint angle", "joint shift")
+AT_REST = 1.5  # times the scatter from row to row: a joint whose readings scatter more on the whole moves
 LEAST_ROWS = 3  # whose scatter says how well a position is known
 DOUBTED = 10.0  # standard errors: a pose that is that far off is half believed, one at three of them by a tenth
 
@@ -23,7 +24,8 @@ DOUBTED = 10.0  # standard errors: a pose that is that far off is half believed,
 def with_seen(start: Start, trial: Trial, outputs: Sequence[Output], command: np.ndarray, body: Body) -> Start:
     """Return a start with the mean positions (n_joint,) of joints that encoders show while the first command (n, n_tendon) holds.
 
-    They are NaN where no encoder does, and doubted by `DOUBTED` times their standard error. A trial that names a pose keeps it.
+    They are NaN where no encoder does or the joint moves, and doubted by `DOUBTED` times their standard error. A trial that names a
+    pose keeps it.
     """
     measured = {o.index: trial.values[o.channel.name] for o in outputs if o.group in JOINTS}
     moved = np.flatnonzero(np.any(command != command[0], axis=1))
@@ -34,8 +36,8 @@ def with_seen(start: Start, trial: Trial, outputs: Sequence[Output], command: np
     seen, doubt = np.full(n_joint, np.nan), np.full(n_joint, np.nan)
     for joint, position in measured.items():
         known = position[:held][np.isfinite(position[:held])]
-        if known.size >= LEAST_ROWS:
-            seen[joint], doubt[joint] = known.mean(), DOUBTED * max(float(known.std()), 1e-9) / np.sqrt(known.size)
+        if known.size >= LEAST_ROWS and known.std() <= AT_REST * (noise := max(float(np.diff(known).std()) / np.sqrt(2.0), 1e-9)):
+            seen[joint], doubt[joint] = known.mean(), DOUBTED * noise / np.sqrt(known.size)
     return replace(start, seen=tuple(map(float, seen)), doubt=tuple(map(float, doubt)))
 
 
