@@ -132,7 +132,7 @@ class ModelSolver:
         copied = memory._replace(z=memory.z.copy(), slip=slip, started=memory.started.copy(),
                                  heard=memory.heard.copy(), **_at_rest(now.model))  # fmt: skip
         if start.seen and laws.joints.dof.size:  # type: ignore[attr-defined]
-            _stand(now, self.body, laws.joints, copied.z, start)
+            _stand(now, self.body, laws.joints, copied.z, start)  # type: ignore[arg-type]
         rates = now.data.qvel
         return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
 
