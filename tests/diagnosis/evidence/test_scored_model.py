@@ -12,17 +12,9 @@ from twin.diagnosis.budget import Budget
 from twin.diagnosis.calibration.fit import StopRule
 from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.evidence import scored_model as stage
-from twin.diagnosis.evidence.scored_model import (
-    ScoredModel,
-    _without_idle,
-    refit_without,
-    score_model,
-    with_effect_added,
-    with_extended_law,
-)
+from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, score_model, with_effect_added, with_extended_law
 from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue, effect_class
-from twin.effects.joint_stop import NO_STOP
 from twin.foundation.errors import SolveError
 from twin.prediction.twin import Twin
 from twin.robots import load
@@ -70,7 +62,6 @@ class Fits:
         self.asked: list[tuple[Model, dict[str, Any]]] = []
         self.score, self.fails = score, fails
         monkeypatch.setattr(stage, "fit", self.fit)
-        monkeypatch.setattr(stage, "_without_idle", lambda study, found, effect: found)
         monkeypatch.setattr(stage, "score_model", lambda study, model: weighed(model, self.score))
 
     def fit(self, objective: Any, model: Model, **how: Any) -> Model:
@@ -100,26 +91,6 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     assert how == {"near": HERE, "J": member.fit.J, "stop": StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, 7.0)}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
-
-
-@pytest.mark.parametrize("reached", [("upper_hip",), ("upper_hip", "upper_knee"), ()])
-def test_a_stop_that_no_fitted_trial_reaches_is_taken_away(reached: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """It has no column of derivatives; where none is reached nothing changes, as the search then drops them all."""
-    leg, stops = load("tendon_leg"), {"upper_hip": 0.2, "upper_knee": 0.9}
-    model = Model.base(leg, Twin.of(leg)).with_effect("joint_stop", stops, tuple(stops), leg.n_tendon)
-    J = np.stack(
-        [np.full(3, float(f.effect is None or f.parameter.name in reached) * (k + 1)) for k, f in enumerate(model.free)], 1
-    )
-    found: Any = SimpleNamespace(model=model, J=J, evaluation=HERE)
-    asked: list[tuple[Model, dict[str, Any]]] = []
-    monkeypatch.setattr(stage, "fit", lambda objective, model, **how: asked.append((model, how)))
-    context: Any = SimpleNamespace(objective=None, prepared=SimpleNamespace(n_tendon=leg.n_tendon))
-    _without_idle(context, found, "joint_stop")
-    assert len(asked) == (len(reached) == 1)
-    for rest, how in asked:
-        assert rest.twin.effects[0]["upper_knee"] == NO_STOP
-        assert [f.parameter.name for f in rest.free if f.effect] == ["upper_hip"]
-        np.testing.assert_array_equal(how["J"], J[:, : len(rest.free)])
 
 
 @pytest.mark.parametrize(("ended", "anew"), [("backbone.youngs_modulus", True), ("about_x", False), ("", False)])

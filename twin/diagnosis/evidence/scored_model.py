@@ -76,27 +76,9 @@ def with_effect_added(
             model, near = begun.model.without_effect(effect), begun.evaluation
         model = model.with_effect(effect, values, start.free, n_tendon)
         stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
-        return score_model(context, _without_idle(context, fit(context.objective, model, near=near, J=J, stop=stop), effect))
+        return score_model(context, fit(context.objective, model, near=near, J=J, stop=stop))
     except SolveError:
         return None
-
-
-def _without_idle(context: FitContext, found: Fit, effect: str) -> Fit:
-    """Return the fit with those numbers of an effect OFF that no fitted reading hangs on, as of a stop that is never reached.
-
-    Trials that nobody fitted may reach it.
-    """
-    model, law = found.model, next(e for e in found.model.twin.effects if e.id == effect)
-    free = [(f.parameter, bool(column.any())) for f, column in zip(model.free, found.J.T, strict=True) if f.effect == effect]
-    off = [p for p, used in free if not used and p.name not in law.inactive_when_off and law[p.name] != p.value]
-    if not off or len(off) == len(free):
-        return found
-    values, names = {**law.values, **{p.name: p.value for p in off}}, {p.name for p in off}
-    kept = tuple(p.name for p, _ in free if p.name not in names)
-    rest = model.without_effect(effect).with_effect(effect, values, kept, context.prepared.n_tendon)
-    columns = {(f.effect, f.parameter.name): column for f, column in zip(model.free, found.J.T, strict=True)}
-    J = np.stack([columns[f.effect, f.parameter.name] for f in rest.free], axis=1)
-    return fit(context.objective, rest, near=found.evaluation, J=J, stop=StopRule(worth=np.inf))
 
 
 def _as_described(model: Model) -> Model:
