@@ -147,9 +147,9 @@ def test_a_bumper_gives_way_and_rings(give: float, tmp_path: Path) -> None:
 
     reference = solve_ivp(turning, (0.0, time[-1]), [0.0, 0.0], "RK45", time, rtol=1e-8, atol=1e-10, max_step=1e-3).y[0]
     assert reference.max() > upper + 0.5 * give  # it bumps
-    # rad: it meets the bumper at 4 rad/s between two steps of 1 ms, and swings on by 5 % with what is lost of that
+    # rad: it meets the bumper at 4.5 rad/s somewhere between two steps of 1 ms
     angle = stopped(rod, time, u, Start(0.1), upper_hinge=upper, give=give, loss=loss)
-    assert np.abs(angle - reference).max() < 4e-3
+    assert np.abs(angle - reference).max() < 4.5e-3
 
 
 def test_a_joint_ends_at_its_stops(tmp_path: Path) -> None:

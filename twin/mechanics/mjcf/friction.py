@@ -46,7 +46,6 @@ class JointLaws(NamedTuple):
     torque: np.ndarray
     breakaway: np.ndarray
     load: np.ndarray
-    level: np.ndarray  # room to work in
     gears: np.ndarray  # (n, nu) torque per force of the actuators that turn a joint by itself
     stribeck: float
     presliding: float
@@ -97,13 +96,13 @@ def joint_forces(laws, z, h, smooth, motion, applied):
     """
     (free, M, damping, force), (rate, after, mean) = smooth, motion
     nv, parts = rate.size, max(1, math.ceil(h / SHORT_STEP - 1e-6))
-    d = h / parts
+    d, level = h / parts, np.empty(laws.dof.size)
     for j in range(laws.dof.size):
         geared = 0.0
         for k in range(force.size):
             geared += laws.gears[j, k] * force[k]
-        laws.level[j] = laws.torque[j] + laws.load[j] * abs(geared)
-        M[laws.dof[j], laws.dof[j]] += 0.25 * d * d * (laws.level[j] + laws.breakaway[j]) / laws.presliding
+        level[j] = laws.torque[j] + laws.load[j] * abs(geared)
+        M[laws.dof[j], laws.dof[j]] += 0.25 * d * d * (level[j] + laws.breakaway[j]) / laws.presliding
     pushed, turned, W = np.empty(nv), np.zeros(laws.dof.size), np.linalg.inv(M)
     for k in range(nv):
         after[k], mean[k] = rate[k], 0.0
@@ -112,7 +111,7 @@ def joint_forces(laws, z, h, smooth, motion, applied):
             pushed[k] = free[k] - damping[k] * (after[k] - rate[k])
         for j in range(laws.dof.size):
             r = after[laws.dof[j]] / laws.stribeck
-            rubbed = (laws.level[j] + laws.breakaway[j] * math.exp(-r * r)) * z[j]
+            rubbed = (level[j] + laws.breakaway[j] * math.exp(-r * r)) * z[j]
             pushed[laws.dof[j]] -= rubbed
             turned[j] += rubbed
         for i in range(nv):

@@ -131,8 +131,8 @@ class ModelSolver:
         slip = memory.slip._replace(z=memory.slip.z.copy(), beyond=memory.slip.beyond.copy())  # type: ignore[attr-defined]
         copied = memory._replace(z=memory.z.copy(), slip=slip, started=memory.started.copy(),
                                  heard=memory.heard.copy(), **_at_rest(now.model))  # fmt: skip
-        if start.seen and laws.joints.dof.size:  # type: ignore[attr-defined]
-            _stand(now, self.body, laws.joints, copied.z, start)  # type: ignore[arg-type]
+        if start.seen and laws.joints.dof.size:
+            _stand(now, self.body, laws.joints, copied.z, start)
         rates = now.data.qvel
         return copied, bool(np.isfinite(rates).all() and np.abs(rates).max(initial=0.0) < LARGEST_RATE)
 
@@ -251,8 +251,7 @@ def _laws(now: _Compiled, body: ModelBody, route: Route) -> Laws:
     dof = model.jnt_dofadr[joints].astype(np.int64)
     model.dof_damping[dof] = body.model.dof_damping[dof] + each[3]
     torque, breakaway, load = (x[rubs] for x in each[:3])
-    room = np.zeros(len(rubs))
-    law = JointLaws(dof[rubs], torque, breakaway, load, room, gears[rubs], float(rub.stribeck), float(rub.presliding))
+    law = JointLaws(dof[rubs], torque, breakaway, load, gears[rubs], float(rub.stribeck), float(rub.presliding))
     mu = route.mu * np.ones(model.ntendon) * (route.mu_shares or 1.0)
     return Laws(law, mu, float(route.presliding), now.tree, now.paths, now.pull, line_lag(model))
 
@@ -265,9 +264,8 @@ def _memory(now: _Compiled, laws: Laws) -> Memory:
         (np.empty(points, np.int64), np.empty((points, 3)), np.empty(points), np.empty(points)),
     )
     slip = Slip(np.zeros(each), np.zeros(each), *room)
-    rubs = len(laws.joints.dof)  # type: ignore[attr-defined]
     heard = np.full((2, now.model.nu), np.nan)
-    return Memory(np.zeros(rubs), slip, np.zeros(1, bool), heard=heard, **_at_rest(now.model))
+    return Memory(np.zeros(len(laws.joints.dof)), slip, np.zeros(1, bool), heard=heard, **_at_rest(now.model))
 
 
 def _stand(now: _Compiled, body: ModelBody, joints: JointLaws, z: np.ndarray, start: Start) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.foundation.compiled import jit, jit_internal
-from twin.mechanics.mjcf.friction import follow_joints, joint_forces, tendon_forces
+from twin.mechanics.mjcf.friction import JointLaws, follow_joints, joint_forces, tendon_forces
 from twin.mechanics.mujoco_symbols import mj_full_m, mj_fwd_actuation, mj_step1, mj_step2
 
 RATE_AT_REST = 1e-7  # rad/s or m/s: slower than this in all coordinates for `REST_STEPS` steps a body has settled
@@ -37,7 +37,7 @@ class Views(NamedTuple):
 class Laws(NamedTuple):
     """All laws between the steps; `pull` (ntendon, nu) is the tension per force of each actuator."""
 
-    joints: object
+    joints: JointLaws
     mu: np.ndarray  # (ntendon,) of capstan friction
     presliding: float  # m, of tendons
     tree: object

@@ -113,9 +113,9 @@ class ModelStepper(Stepper):
 
     `model` and `data` are MuJoCo's, to be read, drawn or put into an environment; `model` is the file's without what stands there
     in place of laws that are stepped here. Steps are as long as the file's timestep. As in the twin, damping acts at the mean of
-    the rates before and after a step, bristles of friction are stepped implicitly, and commands run straight from step to step:
+    the rates before and after a step, what rubs is followed in short steps, and commands run straight from step to step:
     along a trial whose rows are steps it gives the twin's own prediction to rounding. Where rows are further apart, give the
-    commands straight between rows; a lag is then exact, where a twin's prediction is straight between rows.
+    commands straight between rows; a twin's prediction rounds the corners of late and filtered ones by a millisecond.
 
         stepper = ModelStepper("robot.xml")
         stepper.reset(control)
