@@ -1,4 +1,4 @@
-"""Derivatives of motion by long steps: near those by short ones, and not used where they are not."""
+"""Fits of motion: derivatives by long steps, near those by short ones and not used where they are not; and errors above noise."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from twin.diagnosis.noise.model import Noise
 from twin.diagnosis.noise.whitening import Whitener
 from twin.foundation.errors import SolveError
 from twin.mechanics.mjcf import solver
-from twin.prediction.prepared import prepare
+from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.twin import Twin
 from twin.robots import load
 
@@ -26,11 +26,16 @@ from twin.robots import load
 @pytest.fixture
 def swung(tmp_path: Path) -> tuple[Objective, Model]:
     robot(tmp_path, ARM, UNCERTAIN)
-    prepared, trials = prepare(day(tmp_path, 0.0), load(str(tmp_path))), [0, 1, 2, 3]
+    prepared = prepare(day(tmp_path, 0.0), load(str(tmp_path)))
+    return with_noise(prepared, 1e-3), Model.base(prepared.robot)
+
+
+def with_noise(prepared: PreparedRecording, sigma: float) -> Objective:
+    trials = [0, 1, 2, 3]
     measured, command = ([of[k] for k in trials] for of in (prepared.measured, [i.command for i in prepared.inputs]))
-    noise = Noise(np.array([1e-3]), np.zeros(1), np.zeros(1), "start")
+    noise = Noise(np.array([sigma]), np.zeros(1), np.zeros(1), "start")
     none = [np.zeros((*y.shape, 1)) for y in measured]
-    return Objective(prepared, trials, Whitener(noise, measured, none, command), 1), Model.base(prepared.robot)
+    return Objective(prepared, trials, Whitener(noise, measured, none, command), 1)
 
 
 def test_long_steps_give_the_derivatives(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,3 +164,22 @@ def test_how_motion_is_differenced_is_tried_again_with_effects_in_force(
     np.testing.assert_allclose(known, right, atol=1e-9)
     assert objective._differences_at(objective.evaluate(model)).long_steps
     assert not objective._differences_at(objective.evaluate(rubbing)).long_steps
+
+
+def test_an_error_above_the_noise_counts_as_noise_of_that_size(swung: tuple[Objective, Model]) -> None:
+    """Beside a swing of 30 noises that no number explains, whose root mean square is s noises.
+
+    With noise declared s times as large, the usual cost |z|^2 / s^2 + priors has its minimum where n (1 + ln |z|^2 / n) + priors
+    has it. Both fits end within a tenth of the standard deviations of the description, where derivatives of half of one are known
+    by as much; with the small noise the usual cost leads farther than that from here.
+    """
+    objective, model = swung
+    for y in objective.prepared.measured:
+        y += 0.03 * np.sin(0.7 * np.arange(len(y)))[:, None]
+    found = fit(objective, model, refresh=True)
+    s = float(np.sqrt(found.z @ found.z / objective.n))
+    assert s > 10.0
+    alike = fit(with_noise(objective.prepared, 1e-3 * s), model, refresh=True)
+    np.testing.assert_allclose(found.model.vector(), alike.model.vector(), atol=0.1)
+    overtrusted = model.vector() - np.linalg.solve(found.information(), found.J.T @ found.z)
+    assert np.abs(overtrusted - model.vector()).max() > 0.3

@@ -12,7 +12,14 @@ from twin.diagnosis.budget import Budget
 from twin.diagnosis.calibration.fit import StopRule
 from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.evidence import scored_model as stage
-from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, score_model, with_effect_added, with_extended_law
+from twin.diagnosis.evidence.scored_model import (
+    ScoredModel,
+    refit_without,
+    score_model,
+    with_effect_added,
+    with_extended_law,
+    without_idle_numbers,
+)
 from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue, effect_class
 from twin.foundation.errors import SolveError
@@ -144,6 +151,41 @@ def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: p
         plain = Fits(monkeypatch)
         assert with_effect_added(study(), member, effect, begun) is not None
         assert len(plain.asked) == 1
+
+
+@pytest.mark.parametrize(
+    ("worth", "kept"),
+    [
+        ((50.0, 0.0, -20.0), ["bias_1"]),  # one fits as well without, one better
+        ((50.0, 4.0, 50.0), ["bias_1", "bias_2", "bias_3"]),
+        ((0.0, 0.0, 0.0), ["bias_3"]),  # an effect without numbers would be none
+        ((50.0, None, 50.0), ["bias_1", "bias_2", "bias_3"]),  # without it there is no equilibrium
+    ],
+)
+def test_numbers_of_tendons_without_which_an_effect_fits_no_worse_are_off(
+    worth: tuple[float | None, ...], kept: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """|z|^2 rises by what each number that is OFF is worth; what a fit's last step may fall by is no loss."""
+    names = [f"bias_{i}" for i in (1, 2, 3)]
+    model = Model.base(ROBOT, Twin.of(ROBOT)).with_effect("load_cell_bias", dict.fromkeys(names, 0.02), names, 3)
+
+    def within(most: float, model: Model, near: Any) -> Any:
+        off = [w for n, w in zip(names, worth, strict=True) if model.twin.effects[-1][n] == 0.0]
+        if None in off:
+            raise SolveError("slack")
+        square = 100.0 + sum(w for w in off if w is not None)
+        return SimpleNamespace(model=model, z=np.array([np.sqrt(square)]), traces={}) if square <= most else None
+
+    told = study()
+    told.objective.within = within
+    start = within(np.inf, model, None)
+    begun: Any = SimpleNamespace(model=model, J=np.zeros((1, len(model.free))), z=start.z, evaluation=start, cost=107.0)
+    monkeypatch.setattr(stage, "score_model", lambda study, fitted: ScoredModel(fitted, 0.0, None))  # type: ignore[arg-type]
+    found = without_idle_numbers(told, ScoredModel(begun, 0.0, None)).fit  # type: ignore[arg-type]
+    assert [f.parameter.name for f in found.model.free if f.effect] == kept
+    assert found.J.shape == (1, len(found.model.free))
+    assert found.cost == pytest.approx(7.0 + float(found.z @ found.z))
+    assert [found.model.twin.effects[-1][n] for n in names] == [0.02 if n in kept else 0.0 for n in names]
 
 
 def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,6 +48,7 @@ class World:
         monkeypatch.setattr(stage, "with_effect_added", self.extended)
         monkeypatch.setattr(stage, "catalogue", lambda: dict.fromkeys(worth, SimpleNamespace(confusable_with=())))
         monkeypatch.setattr(stage, "with_extended_law", lambda study, w, accept: w)
+        monkeypatch.setattr(stage, "without_idle_numbers", lambda study, w: w)
         monkeypatch.setattr(stage, "noise_credit", lambda study, with_it, without: self.paid.get("+".join(with_it.effects), 0.0))
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e: self.of(*(x for x in best.effects if x != e)))
 

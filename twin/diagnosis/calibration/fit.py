@@ -178,7 +178,7 @@ def fit(
         columns[:, : J.shape[1]] = J
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping = penalty.cost(at), penalty.first_damping
-    before = np.inf  # what derivatives promised a step earlier
+    beat, before = penalty.scaled(stop.beat), np.inf  # `before`: what derivatives promised a step earlier
     since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
     for left in range(MOST_FIT_STEPS - 1, -1, -1):
         if not objective.bends and renewals == allowed and left < MOST_FIT_STEPS - MOST_STEPS_WITH_KEPT:
@@ -197,17 +197,17 @@ def fit(
             at, now = better, penalty.cost(better)
             if fall > TRUSTED_FALL_SHARE * predicted:
                 damping = max(0.1 * damping, LEAST_DAMPING * penalty.first_damping)
-            if now - left * fall > stop.beat:
+            if now - left * fall > beat:
                 break
         slow = fall < SLOW_FALL_SHARE * promised or promised > SLOW_FALL_SHARE * before  # one good step leaves little to promise
         before = promised
         if better is not None and fall >= enough and not slow:
             continue
-        worth_it = since > now and since - now >= enough and now <= stop.beat
+        worth_it = since > now and since - now >= enough and now <= beat
         if renewals and left and worth_it and (objective.bends or (slow and promised >= enough)):
             columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, penalty.first_damping
             since, before = now, np.inf
-        elif fall < enough or now > stop.beat:
+        elif fall < enough or now > beat:
             break
     if refresh:
         stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]
@@ -254,7 +254,7 @@ class _Step:
             if damping > whole and predicted < enough:
                 break
             x = self.penalty.moved(self.x, d)
-            better = _improved(self.penalty.objective, self.at, x, now - self.penalty.besides(x))
+            better = _improved(self.penalty.objective, self.at, x, self.penalty.square(now - self.penalty.besides(x)))
             if better is not None:
                 return better, damping, predicted
             damping *= 10.0
@@ -312,7 +312,24 @@ class _Penalty:
         return self.believed(x) + float(np.sum(self.cut_off(x) ** 2))
 
     def cost(self, e: Evaluation) -> float:
-        return float(e.z @ e.z) + self.besides(e.model.vector())
+        return self.scaled(float(e.z @ e.z)) + self.besides(e.model.vector())
+
+    def scaled(self, square: float) -> float:
+        """Return what |z|^2 costs: itself, and of motion above the noise n (1 + ln |z|^2 / n), as for noise of unknown size.
+
+        Where a fit is far from the data, or lacks an effect, it claims no more against the description than its error allows.
+        """
+        n = float(self.objective.n)
+        return square if square <= n or not self.objective.bends else n * (1.0 + float(np.log(square / n)))
+
+    def square(self, scaled: float) -> float:
+        """Return the |z|^2 that costs so much."""
+        n = float(self.objective.n)
+        return scaled if scaled <= n or not self.objective.bends else n * float(np.exp(scaled / n - 1.0))
+
+    def _trust(self, z: np.ndarray) -> float:
+        """Return the derivative of what |z|^2 costs: n / |z|^2 where it is more than the noise."""
+        return min(1.0, float(self.objective.n) / max(float(z @ z), 1.0)) if self.objective.bends else 1.0
 
     def normal_equations(self, x: np.ndarray, columns: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return half the Gauss-Newton Hessian (n_free, n_free) of the cost, and half its gradient (n_free,)."""
@@ -320,8 +337,9 @@ class _Penalty:
         D = np.zeros((cut.size, x.size))
         for i in self.silencing:
             D[:, i] = (self.cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
-        H = columns.T @ columns + D.T @ D + np.diag(self.weight)
-        return H, columns.T @ z + D.T @ cut + self.weight * (x - self.prior)
+        trust = self._trust(z)
+        H = trust * (columns.T @ columns) + D.T @ D + np.diag(self.weight)
+        return H, trust * (columns.T @ z) + D.T @ cut + self.weight * (x - self.prior)
 
 
 def _bounded_step(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

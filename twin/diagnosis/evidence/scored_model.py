@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnosis.calibration.fit import Fit, StopRule, fit
-from twin.diagnosis.calibration.model import Model
+from twin.diagnosis.calibration.model import Free, Model
+from twin.diagnosis.checks.fit_warnings import unlikely
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.evidence.discrepancy import Discrepancy
 from twin.diagnosis.fit_context import FitContext
@@ -65,7 +66,7 @@ def with_effect_added(
     the effect is fitted from the numbers as described.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
-    if any(ended and f.effect is None for f, ended in zip(model.free, member.fit.at_bound(), strict=True)):
+    if _bent(context, member.fit):
         model, near, J = _as_described(model), None, None
     values = dict(start.values)
     try:
@@ -79,6 +80,12 @@ def with_effect_added(
         return score_model(context, fit(context.objective, model, near=near, J=J, stop=stop))
     except SolveError:
         return None
+
+
+def _bent(context: FitContext, fitted: Fit) -> bool:
+    """Return whether numbers of the robot were bent for want of an effect: one is at its bound, or, of motion, unlikely."""
+    ended = any(ended and f.effect is None for f, ended in zip(fitted.model.free, fitted.at_bound(), strict=True))
+    return ended or (context.objective.bends and bool(unlikely(fitted)))
 
 
 def _as_described(model: Model) -> Model:
@@ -120,15 +127,50 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
         context.progress(f"extended equation of {effect}")
         for start in starts:
             values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
-            model = plain.fit.model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
+            model, J = plain.fit.model, _own(plain.fit)
+            if context.objective.bends and _bent(context, plain.fit):
+                model, J = _as_described(model), None
+            model = model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
                 stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE)
-                extended = score_model(context, fit(context.objective, model, J=_own(plain.fit), stop=stop))
+                extended = score_model(context, fit(context.objective, model, J=J, stop=stop))
             except SolveError:
                 continue
             if extended.score > max(found.score, plain.score + accept):
                 found = extended
     return found
+
+
+def without_idle_numbers(context: FitContext, found: ScoredModel) -> ScoredModel:
+    """Return the model with those numbers of joints and tendons OFF without which its effects fit no worse.
+
+    A stop just beyond what the fitted trials reach takes nothing off their error; trials that nobody fitted may run into it. A
+    fit does not see this where the numbers stand: derivatives there are those of a last touch, or zero.
+    """
+    for effect in found.effects:
+        law = catalogue()[effect]
+        each = {p.name for p in law.all_parameters(context.prepared.n_tendon)} - {p.name for p in law.parameters}
+        many = [f for f in found.fit.model.free if f.effect == effect and f.parameter.name in each - set(law.inactive_when_off)]
+        for number in many:
+            if sum(f in many for f in found.fit.model.free) > 1:
+                found = _with_off(context, found, number)
+    return found
+
+
+def _with_off(context: FitContext, found: ScoredModel, number: Free) -> ScoredModel:
+    """Return the model with one of its free numbers OFF, if it fits no worse, else the model itself."""
+    fitted, i = found.fit, found.fit.model.free.index(number)
+    x = fitted.model.vector()
+    x[i] = number.parameter.value / number.parameter.step
+    model = Model(fitted.model.at(x).twin, tuple(f for f in fitted.model.free if f is not number))
+    try:
+        off = context.objective.within(float(fitted.z @ fitted.z) + REFIT_SCORE_TOLERANCE, model, fitted.evaluation.traces)
+    except SolveError:
+        return found
+    if off is None:
+        return found
+    cost = fitted.cost - float(fitted.z @ fitted.z) + float(off.z @ off.z)
+    return score_model(context, Fit(off, np.delete(fitted.J, i, axis=1), cost))
 
 
 def refit_without(

@@ -18,6 +18,7 @@ from twin.diagnosis.evidence.scored_model import (
     refit_without,
     with_effect_added,
     with_extended_law,
+    without_idle_numbers,
 )
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.friction import noise_credit
@@ -72,9 +73,7 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
                 more, half = best_before + limits.accept, WHITER_MODEL_LEAVES * _leaves(context, base, member)
                 fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(context, base, w) < half}
         leading = max((w.score for w in fresh.values()), default=0.0) - LARGEST_SCORE_GAP
-        fresh = {
-            k: with_extended_law(context, w, limits.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()
-        }
+        fresh = {k: _whole(context, w, limits.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
         if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > LEFT_FOR_THIRD_EFFECT):
@@ -83,6 +82,11 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
     best = exchanged(context, best, known)
     best = _leaner(context, base, best, known, limits.accept)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+
+
+def _whole(context: FitContext, found: ScoredModel, accept: float) -> ScoredModel:
+    """Return the model with the extended laws that the data support, and without numbers of its effects that do nothing."""
+    return without_idle_numbers(context, with_extended_law(context, without_idle_numbers(context, found), accept))
 
 
 def carried(
