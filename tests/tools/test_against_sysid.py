@@ -34,6 +34,8 @@ def test_both_predict_a_trial_alike(tmp_path: Path) -> None:
     few = Model(whole.twin, tuple(f for f in whole.free if f.parameter.name in NUMBERS))
     x = against_sysid.by_sysid(prepared, [0], few, 1)
     assert (np.abs(x) < 5.0).all()
-    found = few.at(np.array([(f.parameter.value + f.parameter.std * d) / f.parameter.step for f, d in zip(few.free, x, strict=True)]))
+    found = few.at(
+        np.array([(f.parameter.value + f.parameter.std * d) / f.parameter.step for f, d in zip(few.free, x, strict=True)])
+    )
     before, after = (against_sysid._misfit(m.twin, prepared, [0]) for m in (few, found))
     assert after < before

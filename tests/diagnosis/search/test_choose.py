@@ -16,7 +16,7 @@ from twin.diagnosis.search.search import Search
 from twin.diagnosis.thresholds import SETS_FITTED_TO_HALVES
 from twin.foundation.errors import SolveError
 
-STUDY = cast(Any, SimpleNamespace(accuracy=0.0))
+STUDY = cast(Any, SimpleNamespace(accuracy=0.0, objective=SimpleNamespace(bends=False)))
 
 
 def weighed(
@@ -89,6 +89,16 @@ def test_what_halves_the_structure_is_gone_on_with_as_the_evidence_ranks_it() ->
 def test_where_nothing_predicts_the_evidence_has_the_word() -> None:
     found = searched(weighed(score=0.0, size=6.0, unseen=4.0), weighed("routing", score=40.0, size=5.5, unseen=3.8))
     assert choose(STUDY, found, AcceptanceLimits()) == found
+
+
+def test_the_chosen_fit_of_motion_goes_on_to_its_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
+    closer = weighed("drift", score=55.0, size=1.0, unseen=8.0)
+    monkeypatch.setattr(stage, "_converged", lambda study, rough: closer)
+    moving = cast(Any, SimpleNamespace(accuracy=0.0, objective=SimpleNamespace(bends=True)))
+    assert choose(moving, searched(base, best), AcceptanceLimits()) == Search(base, closer, (closer, base))
+    alone = searched(base)
+    assert choose(moving, alone, AcceptanceLimits()) == alone  # the calibrated robot is at its minimum already
 
 
 def test_a_twin_solves_a_set_unless_a_trial_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -143,12 +143,13 @@ class StopRule:
     """The rule that ends a fit before its last step.
 
     A fit ends where a step reduces its cost by less than `tolerance` of it or by less than `worth`, and where it would not `beat` a
-    cost even if all further steps gained as much as the last.
+    cost even if all further steps gained as much as the last. `renews`: whether given derivatives may be computed again.
     """
 
     tolerance: float = 1e-5
     worth: float = 0.0
     beat: float = np.inf
+    renews: bool = True
 
 
 USUAL_STOP = StopRule()
@@ -170,7 +171,7 @@ def fit(
     # Derivatives of the same model, of more trials than these, are near enough.
     kept = J is not None and (not objective.bends or (near is not None and near.model is model))
     own = [i for i, f in enumerate(model.free) if f.effect is None]
-    renewals = allowed = MOST_RENEWALS if own and not (kept or np.isinf(stop.worth)) else 0
+    renewals = allowed = MOST_RENEWALS if own and stop.renews and not (kept or np.isinf(stop.worth)) else 0
     fixed = [i for i in own if J is None or i >= J.shape[1]]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))

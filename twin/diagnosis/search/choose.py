@@ -25,17 +25,22 @@ def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Sear
     smooth error no more than a small one, so that it hardly separates the effects. Prediction errors do not have this flaw.
     """
     best = predicting(context, found, limits.accept)
-    if _smaller(context, found.base, best):
-        return Search(found.base, best, found.all)
-    core = most_predictive(context, found)
+    core = None if _smaller(context, found.base, best) else most_predictive(context, found)
     if core is None:
-        return Search(found.base, best, found.all)
+        if context.objective.bends and best is not found.base:  # refits of motion end far from where their numbers do
+            best = _converged(context, best)
+        return Search(found.base, best, _with(found, best))
     core = _converged(context, core)
     alone = len(core.effects) == len(found.base.effects) + 1
     if alone and context.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
         core = add_one_effect(context, core, found, limits)
-    known = {w.forms: w for w in (*found.all, core)}
-    return Search(found.base, core, tuple(sorted(known.values(), key=lambda w: -w.score)), predicted=True)
+    return Search(found.base, core, _with(found, core), predicted=True)
+
+
+def _with(found: Search, chosen: ScoredModel) -> tuple[ScoredModel, ...]:
+    """Return all candidates with the chosen one as it is, best first."""
+    known = {w.forms: w for w in (*found.all, chosen)}
+    return tuple(sorted(known.values(), key=lambda w: -w.score))
 
 
 def predicting(context: FitContext, found: Search, accept: float) -> ScoredModel:
