@@ -26,7 +26,7 @@ def linear(rng: np.random.Generator, rows: tuple[int, ...] = TRIALS, off: float 
     x = solved(J, z0, np.ones(sum(rows), bool)) + off
     free = [SimpleNamespace(parameter=SimpleNamespace(std=std, step=1.0, value=0.0)) for std in (STD, None)]
     model = SimpleNamespace(free=free, vector=lambda: x)
-    fit = SimpleNamespace(J=J, z=z0 + J @ x, model=model, at_bound=lambda: np.zeros(2, bool))
+    fit = SimpleNamespace(J=J, z=z0 + J @ x, model=model, trust=1.0, at_bound=lambda: np.zeros(2, bool))
     outputs = [SimpleNamespace(group="marker")]
     bench = SimpleNamespace(inputs=[SimpleNamespace(time=np.arange(n)) for n in rows], outputs=outputs)
     objective = SimpleNamespace(n=sum(rows))

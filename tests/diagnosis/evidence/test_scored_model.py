@@ -179,7 +179,7 @@ def test_numbers_of_tendons_without_which_an_effect_fits_no_worse_are_off(
     told = study()
     told.objective.within = within
     start = within(np.inf, model, None)
-    begun: Any = SimpleNamespace(model=model, J=np.zeros((1, len(model.free))), z=start.z, evaluation=start, cost=107.0)
+    begun: Any = SimpleNamespace(model=model, J=np.zeros((1, len(model.free))), z=start.z, evaluation=start, cost=107.0, trust=1.0)
     monkeypatch.setattr(stage, "score_model", lambda study, fitted: ScoredModel(fitted, 0.0, None))  # type: ignore[arg-type]
     found = without_idle_numbers(told, ScoredModel(begun, 0.0, None)).fit  # type: ignore[arg-type]
     assert [f.parameter.name for f in found.model.free if f.effect] == kept

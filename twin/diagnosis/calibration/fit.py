@@ -1,7 +1,9 @@
 """The fit of the robot's own uncertain parameters, and those of effects in force, to the fitted trials.
 
-Minimise sum |W (y - f(x))|^2 + sum ((x_i - prior_i) / std_i)^2 over x, the parameters in units of their `step`, within bounds, by
-Gauss-Newton steps on finite-difference derivatives.
+Minimise C(|z|^2) + sum ((x_i - prior_i) / std_i)^2 over x, the parameters in units of their `step`, z = W (y - f(x)), within bounds,
+by Gauss-Newton steps on finite-difference derivatives. C is |z|^2 itself; of n readings of motion it is n (1 + ln |z|^2 / n) above n,
+as for noise of unknown size: motion that is far from the data, or lacks an effect, is no evidence against descriptions to within its
+noise, and its derivatives are known to a tenth at best.
 """
 
 from __future__ import annotations
@@ -41,13 +43,14 @@ class Fit:
     """A fitted model.
 
     `J` (n, n_free): whitened derivatives at the solution, x in steps. `cost` = |z|^2 + prior terms. `systematic` (n_free,) SI:
-    possible errors of the parameters from effects that the model lacks, where estimated.
+    possible errors of the parameters from effects that the model lacks, where estimated. `trust`: dC / d|z|^2 at the solution.
     """
 
     evaluation: Evaluation
     J: np.ndarray
     cost: float
     systematic: np.ndarray | None = None
+    trust: float = 1.0
 
     @property
     def model(self) -> Model:
@@ -58,8 +61,8 @@ class Fit:
         return self.evaluation.z
 
     def information(self) -> np.ndarray:
-        """Return the posterior information (n_free, n_free) in steps: J'J plus that of the priors."""
-        return self.J.T @ self.J + np.diag(prior_weight(self.model) ** 2)
+        """Return the posterior information (n_free, n_free) in steps: J'J as far as it is trusted, plus that of the priors."""
+        return self.trust * (self.J.T @ self.J) + np.diag(prior_weight(self.model) ** 2)
 
     def std(self) -> np.ndarray:
         """Return standard errors (n_free,) in SI: by the noise, or by the disagreement of trials, whichever is larger.
@@ -68,15 +71,15 @@ class Fit:
         """
         noise, free = self._by_noise(), ~self.at_bound()
         step = np.array([f.parameter.step for f in self.model.free])
-        J, each = self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
+        J, each = self.trust * self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
         if len(each) > 1 and free.any():
-            parts = [(J[a:b].T @ J[a:b], J[a:b].T @ self.z[a:b]) for a, b in each]
+            parts = [(J[a:b].T @ self.J[a:b, free], J[a:b].T @ self.z[a:b]) for a, b in each]
             noise[free] = np.maximum(noise[free], np.sqrt(scatter(parts, self.information()[np.ix_(free, free)])) * step[free])
         return noise
 
     def _by_noise(self) -> np.ndarray:
         """Return standard errors (n_free,) in SI by the noise, enlarged where the residual exceeds that noise."""
-        inflation = max(1.0, float(self.z @ self.z) / max(self.z.size - len(self.model.free), 1))
+        inflation = max(1.0, self.trust * float(self.z @ self.z) / max(self.z.size - len(self.model.free), 1))
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information())), 0.0) * inflation)
         return spread * np.array([f.parameter.step for f in self.model.free])
 
@@ -92,7 +95,7 @@ class Fit:
 
     def effective_parameters(self) -> float:
         """Return the number of parameters that the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
-        data = self.J.T @ self.J
+        data = self.trust * (self.J.T @ self.J)
         return float(np.trace(solve(self.information(), data)))
 
     def fitted(self, effect: str | None) -> dict[str, FittedValue]:
@@ -143,7 +146,7 @@ class StopRule:
     """The rule that ends a fit before its last step.
 
     A fit ends where a step reduces its cost by less than `tolerance` of it or by less than `worth`, and where it would not `beat` a
-    cost even if all further steps gained as much as the last. `renews`: whether given derivatives may be computed again.
+    cost even if all further steps gained as much as the last; and, unless it `renews` the robot's derivatives, where that is due.
     """
 
     tolerance: float = 1e-5
@@ -208,13 +211,13 @@ def fit(
         if renewals and left and worth_it and (objective.bends or (slow and promised >= enough)):
             columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, penalty.first_damping
             since, before = now, np.inf
-        elif fall < enough or now > beat:
+        elif not stop.renews or fall < enough or now > beat:
             break
     if refresh:
         stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]
         which = range(len(model.free)) if stale else moving
         columns[:, which] = objective.jacobian(at, which)
-    return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()))
+    return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()), trust=penalty.trust(at.z))
 
 
 @dataclass(frozen=True)
@@ -328,7 +331,7 @@ class _Penalty:
         n = float(self.objective.n)
         return scaled if scaled <= n or not self.objective.bends else n * float(np.exp(scaled / n - 1.0))
 
-    def _trust(self, z: np.ndarray) -> float:
+    def trust(self, z: np.ndarray) -> float:
         """Return the derivative of what |z|^2 costs: n / |z|^2 where it is more than the noise."""
         return min(1.0, float(self.objective.n) / max(float(z @ z), 1.0)) if self.objective.bends else 1.0
 
@@ -338,7 +341,7 @@ class _Penalty:
         D = np.zeros((cut.size, x.size))
         for i in self.silencing:
             D[:, i] = (self.cut_off(x + PARAMETER_DIFFERENCE * (np.arange(x.size) == i)) - cut) / PARAMETER_DIFFERENCE
-        trust = self._trust(z)
+        trust = self.trust(z)
         H = trust * (columns.T @ columns) + D.T @ D + np.diag(self.weight)
         return H, trust * (columns.T @ z) + D.T @ cut + self.weight * (x - self.prior)
 

@@ -74,16 +74,16 @@ def left_out(context: FitContext, fitted: Fit, groups: Sequence[Sequence[int]] |
 
     With g_k = J_k'z_k and p the priors' gradient, one step from the fit leads the others of trial k to d_k = -(sum_(j != k) J_j'J_j
     + P)^-1 (sum_(j != k) g_j + p), less the step that all together would still take; z_k becomes z_k + J_k d_k and no fit is
-    repeated. What trial k alone determines stays unchanged, as do parameters at an end of their range. Allen (1974), PRESS, by
-    trials.
+    repeated. J'J and g count as far as the fit trusts them. What trial k alone determines stays unchanged, as do parameters at an
+    end of their range. Allen (1974), PRESS, by trials.
     """
     moving = np.flatnonzero(~fitted.at_bound())
     J, z = fitted.J[:, moving], fitted.z.ravel()
     prior = np.diag(prior_weight(fitted.model)[moving] ** 2) + 1e-9 * np.eye(len(moving))
     pull = prior_pull(fitted.model)[moving]
     parts = list(pairwise(_ends(context)))
-    H = np.stack([J[a:b].T @ J[a:b] for a, b in parts])
-    g = np.stack([J[a:b].T @ z[a:b] for a, b in parts])
+    H = fitted.trust * np.stack([J[a:b].T @ J[a:b] for a, b in parts])
+    g = fitted.trust * np.stack([J[a:b].T @ z[a:b] for a, b in parts])
     together = solve(H.sum(axis=0) + prior, g.sum(axis=0) + pull)
     out = z.copy()
     for group in groups or [[k] for k in range(len(parts))]:

@@ -61,7 +61,7 @@ def with_effect_added(
 ) -> ScoredModel | None:
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
-    Unless `renews`, derivatives for the robot's own numbers stay the member's: `refined` goes on from there.
+    Unless `renews`, the fit ends where derivatives for the robot's own numbers are due again: `refined` goes on from there.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
     and from a drift of the wrong sign the first step could reach any shape. Motion whose numbers went to their bounds for want of
@@ -85,7 +85,7 @@ def with_effect_added(
 
 
 def refined(context: FitContext, rough: ScoredModel, beat: float) -> ScoredModel:
-    """Return a model that was fitted with its robot's derivatives as they were, fitted on with derivatives of its own."""
+    """Return a model whose fit ended where derivatives were due, fitted on with these."""
     stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
     try:
         found = score_model(context, fit(context.objective, rough.fit.model, J=_own(rough.fit), stop=stop))
@@ -182,7 +182,7 @@ def _with_off(context: FitContext, found: ScoredModel, number: Free) -> ScoredMo
     if off is None:
         return found
     cost = fitted.cost - float(fitted.z @ fitted.z) + float(off.z @ off.z)
-    return score_model(context, Fit(off, np.delete(fitted.J, i, axis=1), cost))
+    return score_model(context, Fit(off, np.delete(fitted.J, i, axis=1), cost, trust=fitted.trust))
 
 
 def refit_without(
