@@ -280,15 +280,16 @@ def test_standard_errors_widen_where_the_residual_is_larger_than_its_noise() -> 
     model = Model(Twin.of(ROBOT), (Free(None, p),))
     J = rng.normal(size=(400, 1))
 
-    def spread(size: float) -> float:
+    def spread(size: float, trust: float = 1.0) -> float:
         z = rng.normal(size=400)
         z *= size * np.sqrt(399) / np.linalg.norm(z)  # mean square size^2 over 399 degrees of freedom
-        return float(Fit(Evaluation(model, [], [], z), J, 0.0).std()[0])
+        return float(Fit(Evaluation(model, [], [], z), J, 0.0, trust=trust).std()[0])
 
     noise = 0.5 / float(np.linalg.norm(J))  # SI: a step over the root of J'J
     assert spread(1.0) == pytest.approx(noise)
     assert spread(3.0) == pytest.approx(3.0 * noise)
     assert spread(0.5) == pytest.approx(noise)
+    assert spread(3.0, trust=1.0 / 9.0) == pytest.approx(3.0 * noise)  # what a fit took for noise is not counted twice
 
 
 def test_a_model_that_is_too_far_off_is_seen_at_the_first_trials(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -520,6 +521,10 @@ def test_derivatives_that_have_changed_are_renewed_or_the_fit_ends_elsewhere(mon
 
 class Product(Linear):
     """Outputs A (x_0 x_1) of a motion: data know the product of two numbers alone, as of a servo's gain and its strength."""
+
+    def __init__(self, A: np.ndarray, y: np.ndarray) -> None:
+        super().__init__(A, y)
+        self.n = y.size
 
     @property
     def bends(self) -> bool:

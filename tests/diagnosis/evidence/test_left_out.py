@@ -58,6 +58,15 @@ def test_it_is_what_refits_without_each_trial_give() -> None:
     assert found.square > float(np.mean(fit.z**2)), "what is left out is predicted worse than what is fitted"
 
 
+def test_readings_that_a_fit_trusts_less_count_as_with_larger_noise() -> None:
+    """To a ninth: as with three times the noise, by which residuals and derivatives are divided (1e-7, as above)."""
+    study, fit, _, _ = linear(np.random.default_rng(3))
+    fit.trust = 1.0 / 9.0
+    found = left_out(study, fit)
+    fit.J, fit.z, fit.trust = fit.J / 3.0, fit.z / 3.0, 1.0
+    np.testing.assert_allclose(found.z, 3.0 * left_out(study, fit).z, rtol=0, atol=1e-7)
+
+
 def test_trials_a_step_throws_far_off_are_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The second trial, five times its square to first order, is predicted by a fit to the others; the third, which has no
     equilibrium under that, stays; the first, which doubles at most, is not asked for."""

@@ -112,9 +112,7 @@ def by_sysid(prepared: PreparedRecording, trials: list[int], model: Model, threa
         return (shown.data - measured.data)[:, at] / noise, shown, shown  # it compares what it was told of both
 
     def residual(x: np.ndarray, params: sysid.ParameterDict, **more: Any) -> tuple[list[np.ndarray], Any, Any]:
-        found, *rest = sysid.residual(
-            x, params, [day], build_model=model_of, modify_residual=in_noise, n_threads=threads, **more
-        )
+        found, *rest = sysid.residual(x, params, [day], build_model=model_of, modify_residual=in_noise, n_threads=threads, **more)
         return [*found, np.asarray(x)], *rest
 
     best, _ = sysid.optimize(params, residual, verbose=False, eps=DIFFERENCE)
@@ -157,7 +155,8 @@ def main(days: int = 3, seed: int = 71000, threads: int = 2) -> None:
             cells = [f"{o.seconds:.0f} s, {o.misfit:.4f}" for o in (mine, theirs)]
             lines.append([f"{robot} {seed + k}", len(std), *cells, f"{theirs.seconds / mine.seconds:.1f}", f"{apart:.2f}"])
             print(lines[-1], flush=True)
-    print(markdown(["day", "numbers", "twin: time, misfit", "sysid: time, misfit", "ratio of times", "apart, standard errors"], lines))
+    head = ["day", "numbers", "twin: time, misfit", "sysid: time, misfit", "ratio of times", "apart, standard errors"]
+    print(markdown(head, lines))
 
 
 if __name__ == "__main__":

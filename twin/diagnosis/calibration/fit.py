@@ -1,9 +1,9 @@
 """The fit of the robot's own uncertain parameters, and those of effects in force, to the fitted trials.
 
-Minimise C(|z|^2) + sum ((x_i - prior_i) / std_i)^2 over x, the parameters in units of their `step`, z = W (y - f(x)), within bounds,
-by Gauss-Newton steps on finite-difference derivatives. C is |z|^2 itself; of n readings of motion it is n (1 + ln |z|^2 / n) above n,
-as for noise of unknown size: motion that is far from the data, or lacks an effect, is no evidence against descriptions to within its
-noise, and its derivatives are known to a tenth at best.
+Minimise C(|z|^2) + sum ((x_i - prior_i) / std_i)^2 over x, the parameters in units of their `step`, z = W (y - f(x)), within
+bounds, by Gauss-Newton steps on finite-difference derivatives. C is |z|^2 itself; of n readings of motion it is
+n (1 + ln |z|^2 / n) above n, as for noise of unknown size: motion that is far from the data, or lacks an effect, is no evidence
+against descriptions to within its noise, and its derivatives are known to a tenth at best.
 """
 
 from __future__ import annotations

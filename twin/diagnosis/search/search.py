@@ -134,7 +134,7 @@ def extend(
 
 
 def _refined(context: FitContext, rough: Known, fresh: Known) -> Known:
-    """Return the models with those fitted closer, by derivatives of their own, that may lead: by evidence, or by what they leave."""
+    """Return the models, fitted closer where they may lead: by evidence, or by what they leave."""
     out, done = dict(rough), set[EffectForms]()
     while out:
         lead, least = max(w.score for w in out.values()) - LARGEST_SCORE_GAP, min(w.fit.cost for w in out.values())
