@@ -63,7 +63,7 @@ class World:
         fit = SimpleNamespace(effects=effects, z=z, model=model, cost=-score)
         return told(effects, score, fit, "")
 
-    def extended(self, study: Any, member: Any, effect: str, start: Any, beat: float = 0.0, renews: bool = True) -> Any:
+    def extended(self, study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
         return self.of(*member.effects, effect)
 
     def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
@@ -295,7 +295,7 @@ def test_a_set_is_weighed_with_each_law_of_a_name(monkeypatch: pytest.MonkeyPatc
         left = [e for e in world.worth if e not in fit.effects]
         return [SimpleNamespace(effect=e, start=f, gain=1e6) for e in left for f in (("stretch", "toe") if e == "ropes" else ("",))]
 
-    def extended(study: Any, member: Any, effect: str, start: Any, beat: float = 0.0, renews: bool = True) -> Any:
+    def extended(study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
         form = start or dict(member.forms).get("ropes", "")
         made = world.of(*member.effects, effect)
         worth = {("stretch", 1): 50.0, ("toe", 2): 80.0}.get((form, len(made.effects)), 0.0)
@@ -310,27 +310,3 @@ def test_a_set_is_weighed_with_each_law_of_a_name(monkeypatch: pytest.MonkeyPatc
     assert found.best.forms == (("creep", ""), ("ropes", "toe"))
     assert found.best.score == 880.0
     assert scores[("creep", ""), ("ropes", "stretch")] == 800.0
-
-
-def test_of_motion_all_are_fitted_roughly_and_closer_only_those_that_may_lead(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those are the best by evidence and all near it, and the one that leaves least."""
-
-    def model(name: str, score: float, cost: float) -> Any:
-        return SimpleNamespace(effects=(name,), forms=((name, ""),), score=score, fit=SimpleNamespace(cost=cost))
-
-    rough = {"a": (1000.0, 50.0), "b": (700.0, 60.0), "c": (100.0, 40.0), "d": (0.0, 90.0)}
-    closer, asked = {"a": (1100.0, 45.0), "b": (720.0, 58.0), "c": (400.0, 20.0)}, []
-
-    def refined(study: Any, w: Any, beat: float) -> Any:
-        asked.append((w.effects[0], beat))
-        return model(w.effects[0], *closer[w.effects[0]])
-
-    monkeypatch.setattr(stage, "refined", refined)
-    known = {((n, ""),): model(n, *x) for n, x in rough.items()}
-    found = stage._refined(SimpleNamespace(**vars(STUDY) | {"budget": Budget()}), known, {})  # type: ignore[arg-type]
-    assert asked == [("a", 80.0), ("b", 80.0), ("c", 80.0)]
-    assert [w.score for w in found.values()] == [1100.0, 720.0, 400.0, 0.0]
-    late: Any = SimpleNamespace(**vars(STUDY) | {"budget": Budget(-1.0)})
-    assert stage._refined(late, known, {}) == known
-    assert late.budget.untried == ["a closer fit of a"]
-    assert stage._refined(late, {}, {}) == {}

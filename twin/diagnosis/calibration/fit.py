@@ -146,13 +146,12 @@ class StopRule:
     """The rule that ends a fit before its last step.
 
     A fit ends where a step reduces its cost by less than `tolerance` of it or by less than `worth`, and where it would not `beat` a
-    cost even if all further steps gained as much as the last; and, unless it `renews` the robot's derivatives, where that is due.
+    cost even if all further steps gained as much as the last.
     """
 
     tolerance: float = 1e-5
     worth: float = 0.0
     beat: float = np.inf
-    renews: bool = True
 
 
 USUAL_STOP = StopRule()
@@ -174,7 +173,7 @@ def fit(
     # Derivatives of the same model, of more trials than these, are near enough.
     kept = J is not None and (not objective.bends or (near is not None and near.model is model))
     own = [i for i, f in enumerate(model.free) if f.effect is None]
-    renewals = allowed = MOST_RENEWALS if own and stop.renews and not (kept or np.isinf(stop.worth)) else 0
+    renewals = allowed = MOST_RENEWALS if own and not (kept or np.isinf(stop.worth)) else 0
     fixed = [i for i in own if J is None or i >= J.shape[1]]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
@@ -211,7 +210,7 @@ def fit(
         if renewals and left and worth_it and (objective.bends or (slow and promised >= enough)):
             columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, penalty.first_damping
             since, before = now, np.inf
-        elif not stop.renews or fall < enough or now > beat:
+        elif fall < enough or now > beat:
             break
     if refresh:
         stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]

@@ -57,11 +57,9 @@ def score_model(context: FitContext, fitted: Fit) -> ScoredModel:
 
 
 def with_effect_added(
-    context: FitContext, member: ScoredModel, effect: str, start: FitStart, beat: float = np.inf, renews: bool = True
+    context: FitContext, member: ScoredModel, effect: str, start: FitStart, beat: float = np.inf
 ) -> ScoredModel | None:
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
-
-    Unless `renews`, the fit ends where derivatives for the robot's own numbers are due again: `refined` goes on from there.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
     and from a drift of the wrong sign the first step could reach any shape. Motion whose numbers went to their bounds for want of
@@ -78,20 +76,10 @@ def with_effect_added(
             values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
             model, near = begun.model.without_effect(effect), begun.evaluation
         model = model.with_effect(effect, values, start.free, n_tendon)
-        stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat, renews)
+        stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
         return score_model(context, fit(context.objective, model, near=near, J=J, stop=stop))
     except SolveError:
         return None
-
-
-def refined(context: FitContext, rough: ScoredModel, beat: float) -> ScoredModel:
-    """Return a model whose fit ended where derivatives were due, fitted on with these."""
-    stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
-    try:
-        found = score_model(context, fit(context.objective, rough.fit.model, J=_own(rough.fit), stop=stop))
-    except SolveError:
-        return rough
-    return found if better(found, rough) else rough
 
 
 def _bent(context: FitContext, fitted: Fit) -> bool:

@@ -15,7 +15,6 @@ from twin.diagnosis.evidence.scored_model import (
     EffectForms,
     ScoredModel,
     better,
-    refined,
     refit_without,
     with_effect_added,
     with_extended_law,
@@ -112,11 +111,7 @@ def carried(
 def extend(
     context: FitContext, base: ScoredModel, member: ScoredModel, lacks: Dictionary, limits: AcceptanceLimits, fresh: Known
 ) -> None:
-    """Add to `fresh` `member` with each of the effects whose pattern promises most.
-
-    Of motion, whose derivatives are dear, all are first fitted with those of the member.
-    """
-    dear, found = context.objective.bends, Known()
+    """Add to `fresh` `member` with each of the effects whose pattern promises most."""
     for candidate in rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks):
         if not _worth_a_fit(context, base, member, lacks, limits, candidate):
             continue
@@ -124,32 +119,10 @@ def extend(
         if not context.budget.allows(name):
             continue
         context.progress(name)
-        beat = _cost_to_beat(fresh, found)
-        fitted = with_effect_added(context, member, candidate.effect, candidate.start, beat, renews=not dear)
-        if fitted is not None and (fitted.forms not in found or better(fitted, found[fitted.forms])):
-            found[fitted.forms] = fitted
-    for forms, fitted in (_refined(context, found, fresh) if dear else found).items():
-        if forms not in fresh or better(fitted, fresh[forms]):
-            fresh[forms] = fitted
-
-
-def _refined(context: FitContext, rough: Known, fresh: Known) -> Known:
-    """Return the models, fitted closer where they may lead: by evidence, or by what they leave."""
-    out, done = dict(rough), set[EffectForms]()
-    while out:
-        lead, least = max(w.score for w in out.values()) - LARGEST_SCORE_GAP, min(w.fit.cost for w in out.values())
-        leading = [k for k, w in out.items() if w.score >= lead or w.fit.cost == least]
-        following = [k for k in sorted(leading, key=lambda k: -out[k].score) if k not in done]
-        if not following or not context.budget.allows(f"a closer fit of {' + '.join(out[following[0]].effects)}"):
-            break
-        context.progress(f"{' + '.join(out[following[0]].effects)}, closer")
-        out[following[0]] = refined(context, out[following[0]], _cost_to_beat(fresh, out))
-        done.add(following[0])
-    return out
-
-
-def _cost_to_beat(*of: Known) -> float:
-    return HOPELESS_COST_RATIO * min((w.fit.cost for known in of for w in known.values()), default=np.inf)
+        beat = HOPELESS_COST_RATIO * min((w.fit.cost for w in fresh.values()), default=np.inf)
+        found = with_effect_added(context, member, candidate.effect, candidate.start, beat)
+        if found is not None and (found.forms not in fresh or better(found, fresh[found.forms])):
+            fresh[found.forms] = found
 
 
 def _leaves(context: FitContext, base: ScoredModel, member: ScoredModel) -> float:
