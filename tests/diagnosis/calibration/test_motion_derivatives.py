@@ -48,6 +48,20 @@ def test_long_steps_give_the_derivatives(swung: tuple[Objective, Model], monkeyp
     assert 0.0 < off.max() < COARSE_ERROR  # columns differ, so that long steps were taken, by less than what a fit bears
 
 
+def test_precise_derivatives_take_no_long_steps(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor do those of some of its trials, by which derivatives are renewed."""
+    objective, model = swung
+    at, which = objective.evaluate(model), list(range(len(model.free)))
+    precise = objective.precise()
+    found = precise.jacobian(at, which), precise.renewed(at, which, np.zeros((at.z.size, len(which))))
+    coarse = objective.jacobian(at, which)
+    monkeypatch.setattr(solver, "COARSE_STEPS", 1.0)
+    fine = Objective(objective.prepared, objective.trials, objective.whitener, 1).jacobian(at, which)
+    for J in found:
+        np.testing.assert_allclose(J, fine, atol=1e-9)
+    assert np.abs(coarse - fine).max() > 1e-3
+
+
 def test_steps_too_long_for_a_model_are_not_used(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
     objective, model = swung
     at, which = objective.evaluate(model), range(len(model.free))

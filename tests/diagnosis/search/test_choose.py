@@ -148,7 +148,7 @@ def test_what_is_gone_on_with_for_what_it_predicts_is_fitted_to_the_end(monkeypa
     monkeypatch.setattr(stage, "fit", lambda objective, model, **how: kept.append(how) or "to the end")
     monkeypatch.setattr(stage, "score_model", lambda study, fitted: done)
     monkeypatch.setattr(stage, "add_one_effect", lambda study, core, found, bars: both if core is done else None)
-    study: Any = SimpleNamespace(accuracy=0.0, objective=None, budget=SimpleNamespace(allows=lambda what: time_left))
+    study: Any = SimpleNamespace(accuracy=0.0, objective=STUDY.objective, budget=SimpleNamespace(allows=lambda what: time_left))
     found = choose(study, searched(base, rough), AcceptanceLimits())
     assert kept == [{"near": "there", "refresh": True}]
     assert found.base is base
@@ -176,7 +176,7 @@ def test_beside_the_core_stays_what_has_evidence_and_predicts(
     monkeypatch.setattr(stage, "dictionary", lambda objective, fit: "patterns" if fit is core.fit else None)
     monkeypatch.setattr(stage, "solves", lambda study, twin: stands or "play" not in twin.effects)
     monkeypatch.setattr(stage, "_converged", lambda study, rough: rough)
-    study: Any = SimpleNamespace(accuracy=0.0, objective=None, progress=lambda words: None)
+    study: Any = SimpleNamespace(accuracy=0.0, objective=STUDY.objective, progress=lambda words: None)
     assert add_one_effect(study, core, searched(base, core), AcceptanceLimits(accept=12.0)) is (more if taken else core)
 
 

@@ -66,6 +66,16 @@ class Objective:
         self.prepared, self.trials, self.whitener, self.jobs = prepared, list(trials), whitener, jobs
         self.n = int(sum(np.isfinite(prepared.measured[k]).sum() for k in trials))
         self._differences: dict[frozenset[str], Differences] = {}  # of motion, by the effects in force
+        self._coarse_error = COARSE_ERROR
+
+    def precise(self) -> Objective:
+        """Return the same objective with derivatives of motion by short steps alone.
+
+        Those of long steps err by some per cent of a column, which in directions that only descriptions hold is more than these.
+        """
+        found = self.of(range(len(self.trials)))
+        found._coarse_error = 0.0
+        return found
 
     @property
     def bends(self) -> bool:
@@ -84,7 +94,9 @@ class Objective:
 
     def of(self, which: Sequence[int]) -> Objective:
         """Return the objective of some of its trials, given by their positions."""
-        return Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
+        part = Objective(self.prepared, [self.trials[k] for k in which], self.whitener.of(which), self.jobs)
+        part._coarse_error = self._coarse_error
+        return part
 
     def predict(
         self, twin: Twin, near: Mapping[int, Trace] | None = None, once: bool = False
@@ -208,7 +220,7 @@ class Objective:
 
         with suppress(SolveError):
             fine, raw = change(MOTION_DIFFERENCE, before, False), self._raw(self.predict(at.model.twin, once=True)[1])
-            if np.linalg.norm(change(MOTION_DIFFERENCE, raw, True) - fine) <= COARSE_ERROR * np.linalg.norm(fine):
+            if np.linalg.norm(change(MOTION_DIFFERENCE, raw, True) - fine) <= self._coarse_error * np.linalg.norm(fine):
                 before, serve = raw, True
         with suppress(SolveError):
             if halved(PARAMETER_DIFFERENCE) < halved(MOTION_DIFFERENCE):

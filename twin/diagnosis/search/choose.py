@@ -92,7 +92,8 @@ def add_one_effect(context: FitContext, core: ScoredModel, found: Search, limits
 
 
 def _converged(context: FitContext, rough: ScoredModel) -> ScoredModel:
-    return score_model(context, fit(context.objective, rough.fit.model, near=rough.fit.evaluation, refresh=True))
+    objective = context.objective.precise() if context.objective.bends else context.objective
+    return score_model(context, fit(objective, rough.fit.model, near=rough.fit.evaluation, refresh=True))
 
 
 def halved(context: FitContext, base: ScoredModel, best: ScoredModel) -> bool:
