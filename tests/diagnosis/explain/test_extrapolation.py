@@ -49,7 +49,7 @@ def weighed(J: np.ndarray, y: np.ndarray, effects: tuple[str, ...]) -> Any:
     x = np.linalg.lstsq(J, y, rcond=None)[0]
     free = [SimpleNamespace(parameter=SimpleNamespace(std=None, step=1.0, value=0.0)) for _ in x]
     model = SimpleNamespace(free=free, vector=lambda: x)
-    fit = SimpleNamespace(J=-J, z=y - J @ x, model=model, at_bound=lambda: np.zeros(len(x), bool))
+    fit = SimpleNamespace(J=-J, z=y - J @ x, model=model, trust=1.0, at_bound=lambda: np.zeros(len(x), bool))
     return SimpleNamespace(fit=fit, effects=effects)
 
 
