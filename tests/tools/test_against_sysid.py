@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mujoco import sysid
+from scipy.optimize import minimize
 
 from tools.benchmarks.solvers import against_sysid
 from tools.simulators.articulated.day import Recipe, make_set
@@ -21,9 +22,9 @@ NUMBERS = ("actuator.shoulder_servo.kp", "joint.shoulder.damping")
 
 @pytest.mark.skipif(not hasattr(sysid, "optimize"), reason='needs pip install "mujoco[sysid]"')
 def test_both_predict_a_trial_alike(tmp_path: Path) -> None:
-    """Their fit of two numbers lowers the twin's own misfit: same commands, readings, units and times on both sides.
+    """Their fit of two numbers is the least misfit of the twin's own predictions: same commands, readings, units and times.
 
-    Without the times of readings set right it would not: half a millisecond late is a noise of the shoulder's encoder.
+    To 0.12 of 61, as the other numbers of the arm are off: theirs is 0.06 above, and 0.25 with readings as late as they come.
     """
     make_set(tmp_path, Recipe("servo_arm", (), 1.0, 71000))
     recording = read(tmp_path / "measured")
@@ -32,10 +33,12 @@ def test_both_predict_a_trial_alike(tmp_path: Path) -> None:
     twin = Twin.of_recording(recording)
     prepared, whole = prepare(recording, twin.robot), Model.base(twin.robot)
     few = Model(whole.twin, tuple(f for f in whole.free if f.parameter.name in NUMBERS))
-    x = against_sysid.by_sysid(prepared, [0], few, 1)
-    assert (np.abs(x) < 5.0).all()
-    found = few.at(
-        np.array([(f.parameter.value + f.parameter.std * d) / f.parameter.step for f, d in zip(few.free, x, strict=True)])
-    )
-    before, after = (against_sysid._misfit(m.twin, prepared, [0]) for m in (few, found))
-    assert after < before
+    step, std = (np.array([getattr(f.parameter, of) for f in few.free]) for of in ("step", "std"))
+
+    def misfit(x: np.ndarray) -> float:
+        return against_sysid._misfit(few.at(few.vector() + x * std / step).twin, prepared, [0])
+
+    begun = {"initial_simplex": np.array([[0.0, 0.0], [1.0, 0.0], [0.0, -1.0]]), "fatol": 1e-3}
+    least = minimize(misfit, np.zeros(2), method="Nelder-Mead", options=begun).fun
+    assert least < misfit(np.zeros(2)) - 1.0
+    assert misfit(against_sysid.by_sysid(prepared, [0], few, 1)) < least + 0.12

@@ -162,7 +162,7 @@ def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: p
         ((50.0, None, 50.0), ["bias_1", "bias_2", "bias_3"]),  # without it there is no equilibrium
     ],
 )
-def test_numbers_of_tendons_without_which_an_effect_fits_no_worse_are_off(
+def test_numbers_of_a_motion_that_are_worth_less_than_a_fit_s_last_step_are_off(
     worth: tuple[float | None, ...], kept: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """|z|^2 rises by what each number that is OFF is worth; what a fit's last step may fall by is no loss."""
@@ -177,7 +177,7 @@ def test_numbers_of_tendons_without_which_an_effect_fits_no_worse_are_off(
         return SimpleNamespace(model=model, z=np.array([np.sqrt(square)]), traces={}) if square <= most else None
 
     told = study()
-    told.objective.within = within
+    told.objective.within, told.objective.bends = within, True
     start = within(np.inf, model, None)
     begun: Any = SimpleNamespace(model=model, J=np.zeros((1, len(model.free))), z=start.z, evaluation=start, cost=107.0, trust=1.0)
     monkeypatch.setattr(stage, "score_model", lambda study, fitted: ScoredModel(fitted, 0.0, None))  # type: ignore[arg-type]
@@ -186,6 +186,9 @@ def test_numbers_of_tendons_without_which_an_effect_fits_no_worse_are_off(
     assert found.J.shape == (1, len(found.model.free))
     assert found.cost == pytest.approx(7.0 + float(found.z @ found.z))
     assert [found.model.twin.effects[-1][n] for n in names] == [0.02 if n in kept else 0.0 for n in names]
+    told.objective.bends = False
+    still = ScoredModel(begun, 0.0, None)  # type: ignore[arg-type]
+    assert without_idle_numbers(told, still) is still
 
 
 def test_a_fuller_law_stands_where_the_data_ask_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import pytest
 
+from twin.diagnosis.budget import Budget
 from twin.diagnosis.evidence.half_session import PredictiveErrors
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.scored_model import better
@@ -95,8 +96,11 @@ def test_the_chosen_fit_of_motion_goes_on_to_its_minimum(monkeypatch: pytest.Mon
     base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
     closer = weighed("drift", score=55.0, size=1.0, unseen=8.0)
     monkeypatch.setattr(stage, "_converged", lambda study, rough: closer)
-    moving = cast(Any, SimpleNamespace(accuracy=0.0, objective=SimpleNamespace(bends=True)))
+    moving = cast(Any, SimpleNamespace(accuracy=0.0, objective=SimpleNamespace(bends=True), budget=Budget()))
     assert choose(moving, searched(base, best), AcceptanceLimits()) == Search(base, closer, (closer, base))
+    late = cast(Any, SimpleNamespace(**vars(moving) | {"budget": Budget(-1.0)}))
+    assert choose(late, searched(base, best), AcceptanceLimits()) == searched(base, best)
+    assert late.budget.untried == ["the last steps of drift"]
     alone = searched(base)
     assert choose(moving, alone, AcceptanceLimits()) == alone  # the calibrated robot is at its minimum already
 

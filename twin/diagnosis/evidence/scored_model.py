@@ -62,8 +62,8 @@ def with_effect_added(
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
-    and from a drift of the wrong sign the first step could reach any shape. Motion whose numbers went to their bounds for want of
-    the effect is fitted from the numbers as described.
+    and from a drift of the wrong sign the first step could reach any shape. Where numbers of the robot went to their bounds for
+    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
     if _bent(context, member.fit):
@@ -107,7 +107,8 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
     """Return the model with the extended equation of an effect (a second creep time), where the data support it.
 
     Where an extended equation is in force, try one that contains it and more (an own value for each spring). This comes before
-    other effects are added, which would otherwise be fitted to what the simple equation leaves.
+    other effects are added, which would otherwise be fitted to what the simple equation leaves. Where the simple equation bent the
+    numbers of a robot in motion, the fit starts from the numbers as described.
     """
     n_tendon, parts = context.prepared.n_tendon, context.prepared.robot.build().features
     for effect in found.effects:
@@ -142,12 +143,13 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
 
 
 def without_idle_numbers(context: FitContext, found: ScoredModel) -> ScoredModel:
-    """Return the model with those numbers of joints and tendons OFF without which its effects fit no worse.
+    """Return the model of a motion with those numbers of joints and tendons OFF that are worth less than a fit's last step.
 
     A stop just beyond what the fitted trials reach takes nothing off their error; trials that nobody fitted may run into it. A
-    fit does not see this where the numbers stand: derivatives there are those of a last touch, or zero.
+    fit does not see this where the numbers stand: derivatives there are those of a last touch, or zero. In statics all
+    numbers stay: derivatives tell there.
     """
-    for effect in found.effects:
+    for effect in found.effects if context.objective.bends else ():
         law = catalogue()[effect]
         each = {p.name for p in law.all_parameters(context.prepared.n_tendon)} - {p.name for p in law.parameters}
         many = [f for f in found.fit.model.free if f.effect == effect and f.parameter.name in each - set(law.inactive_when_off)]
@@ -158,7 +160,7 @@ def without_idle_numbers(context: FitContext, found: ScoredModel) -> ScoredModel
 
 
 def _with_off(context: FitContext, found: ScoredModel, number: Free) -> ScoredModel:
-    """Return the model with one of its free numbers OFF, if it fits no worse, else the model itself."""
+    """Return the model with a free number OFF, if |z|^2 rises by `REFIT_SCORE_TOLERANCE` at most, else the model itself."""
     fitted, i = found.fit, found.fit.model.free.index(number)
     x = fitted.model.vector()
     x[i] = number.parameter.value / number.parameter.step

@@ -27,7 +27,8 @@ def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Sear
     best = predicting(context, found, limits.accept)
     core = None if _smaller(context, found.base, best) else most_predictive(context, found)
     if core is None:
-        if context.objective.bends and best is not found.base:  # refits of motion end far from where their numbers do
+        moved = context.objective.bends and best is not found.base  # refits of motion end far from where their numbers do
+        if moved and context.budget.allows(f"the last steps of {' + '.join(best.effects)}"):
             best = _converged(context, best)
         return Search(found.base, best, _with(found, best))
     core = _converged(context, core)
