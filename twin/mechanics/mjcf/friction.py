@@ -30,6 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit_internal
 
 MUJOCO_SITE = 3  # mjtWrap
@@ -39,6 +40,7 @@ TENDON_SHARE = 0.4  # of the damping that would make a step implicit in what sti
 SHORT_STEP = 2.5e-4  # s, in which joints rub: light fingers swing in what sticks at some 1,000 rad/s
 
 
+@by_reference
 class JointLaws(NamedTuple):
     """Joints that rub: their number in dof, and the law of each, (n,)."""
 
@@ -51,6 +53,7 @@ class JointLaws(NamedTuple):
     presliding: float
 
 
+@by_reference
 class Tree(NamedTuple):
     """What a model's tendons run over, as MuJoCo stores it."""
 
@@ -65,6 +68,7 @@ class Tree(NamedTuple):
     dof_parent: np.ndarray
 
 
+@by_reference
 class Paths(NamedTuple):
     """Views of a data's tendon paths and motion axes."""
 
@@ -76,6 +80,7 @@ class Paths(NamedTuple):
     subtree_com: np.ndarray
 
 
+@by_reference
 class Slip(NamedTuple):
     """Slip states of tendons' points, the paths beyond them in the step before, and room to work in."""
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_internal
 from twin.mechanics.mjcf.friction import JointLaws, follow_joints, joint_forces, tendon_forces
 from twin.mechanics.mujoco_symbols import mj_full_m, mj_fwd_actuation, mj_step1, mj_step2
@@ -16,6 +17,7 @@ REST_STEPS = 30
 LARGEST_RATE = 1e5  # rad/s or m/s: faster bodies have diverged
 
 
+@by_reference
 class Views(NamedTuple):
     """Views of a data's and a model's arrays."""
 
@@ -34,6 +36,7 @@ class Views(NamedTuple):
     implicit: bool  # whether actuators' damping acts at the rates after a step
 
 
+@by_reference
 class Laws(NamedTuple):
     """All laws between the steps; `pull` (ntendon, nu) is the tension per force of each actuator."""
 
@@ -46,6 +49,7 @@ class Laws(NamedTuple):
     lag: np.ndarray  # (nu,) s, of a winch's force behind its control, by its line
 
 
+@by_reference
 class Memory(NamedTuple):
     """What is remembered from step to step: the states of the laws, and the rates and the added damping of the step before."""
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from twin.body import DIRECT, NOT_FOUND, Drive, Loads, Problem
 from twin.body.hinge_chain import HingeChain, hinge_pairs
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import assign, dot, jit, jit_internal
 from twin.foundation.errors import SolveError
 from twin.mechanics.mujoco_symbols import mj_step
@@ -53,6 +54,7 @@ FASTEST_HINGE = 1e5  # rad/s, sixteen turns in a step of a millisecond; beyond i
 FORCE_UPDATE_STEPS = 2  # steps between evaluations of the applied forces, which change by a few per cent a step
 
 
+@by_reference
 class Motion(NamedTuple):
     """MuJoCo's arrays that the loop reads and writes between steps, and the inputs."""
 
@@ -69,6 +71,7 @@ class Motion(NamedTuple):
     ambient: np.ndarray  # (n,) K, around SMA springs
 
 
+@by_reference
 class MotionSamples(NamedTuple):
     """The motion at the samples."""
 

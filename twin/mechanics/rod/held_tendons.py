@@ -20,6 +20,7 @@ import numpy as np
 from twin.body import Drive, Problem
 from twin.body.hinge_chain import HingeChain
 from twin.body.spring import placeholder_springs
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit_internal
 from twin.mechanics.rod import ChainSolution, Equilibrium
 from twin.mechanics.rod.balance.tendon_actuation import (
@@ -32,6 +33,7 @@ from twin.mechanics.rod.balance.tendon_actuation import (
 from twin.mechanics.springs.heat import heated_temperature
 
 
+@by_reference
 class HeldTendons(NamedTuple):
     """The actuation of the held tendons, and MuJoCo's arrays of their whole-path tendons."""
 

@@ -5,6 +5,7 @@ them. Spring temperatures advance once a sample, under the current and at the el
 tension_trials.py.
 """
 
+from twin.foundation.by_reference import refer_to
 from twin.foundation.compiled import assign, jit, jit_inline
 from twin.mechanics.rod.balance.lengths import commit_present_slip, held_tangent, interpolate_target, reach_target, single_held_step
 from twin.mechanics.rod.balance.newton import Factors
@@ -143,7 +144,7 @@ def solve_sample(trial, neighbour, mode, i):
     if mode.single_step and neighbour.q.size > 0 and not trial.system.law.mu > 0.0 and not any_true(trial.actuation.backlash > 0.0):
         interpolate_target(trial.actuation, trial.target, trial.target, 1.0)
         own = trial.factors
-        factors = Factors(neighbour.LU[i], own.usable, own.held_tendons, neighbour.tension_response[i])
+        factors = refer_to(Factors(neighbour.LU[i], own.usable, own.held_tendons, neighbour.tension_response[i]))
         status = single_held_step(trial.system, trial.state, factors, trial.actuation)
         if status == 0:
             assign(trial.state.q, neighbour.q[i])

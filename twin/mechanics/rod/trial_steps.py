@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.effects.backbone_creep import delayed_strain
+from twin.foundation.by_reference import by_reference, refer_to
 from twin.foundation.compiled import assign, jit, jit_inline, jit_internal
 from twin.mechanics.rod.balance.chain import ChainState, ContactLaw, StaticLoad, StaticSystem, commit_slip, force_balance
 from twin.mechanics.rod.balance.elastic import rotation_vectors
@@ -15,6 +16,7 @@ from twin.mechanics.rod.balance.tendon_actuation import Actuation
 START_STEPS = 8  # from slack to the first tensions; 512 instead moved the tip by at most 0.015 mm in 180 random poses, mu 0.2
 
 
+@by_reference
 class TrialDrive(NamedTuple):
     """Inputs of a trial, sample by sample."""
 
@@ -36,6 +38,7 @@ class TrialDrive(NamedTuple):
     pushes: bool  # whether the tendons are rods, which push as well
 
 
+@by_reference
 class CreepState(NamedTuple):
     """Creep elements: amplitude and retardation time (n_element,), and the delayed strains, advanced in place."""
 
@@ -44,6 +47,7 @@ class CreepState(NamedTuple):
     delayed: np.ndarray  # (n_element, nv)
 
 
+@by_reference
 class Neighbour(NamedTuple):
     """A neighbouring solution on the same samples, used as first guess instead of extrapolation; or empty arrays."""
 
@@ -53,6 +57,7 @@ class Neighbour(NamedTuple):
     tension_response: np.ndarray  # (n, n_tendon, nv) rad/N, where tendons are held
 
 
+@by_reference
 class SolveMode(NamedTuple):
     """Tolerance (rad); whether tangents are kept; whether a single Newton step is taken from the neighbour.
 
@@ -64,6 +69,7 @@ class SolveMode(NamedTuple):
     single_step: bool
 
 
+@by_reference
 class TrialResult(NamedTuple):
     """The equilibria, one a sample."""
 
@@ -77,6 +83,7 @@ class TrialResult(NamedTuple):
     status: np.ndarray  # (n,) as `solve_near` returns it
 
 
+@by_reference
 class TrialState(NamedTuple):
     """The present instant of a trial.
 
@@ -149,23 +156,23 @@ def unloaded_trial(described, drive, creep, state):
     """Return the trial's state on the straight robot before its loads, with cold springs."""
     nv, nt, straight, spring = described.rest.size, state.T.size, drive.straight_path, drive.spring
     law, load, warm = described.law, described.load, np.full(nt, drive.ambient[0])
-    system = StaticSystem(
+    system = refer_to(StaticSystem(
         described.model, described.data, described.chain, np.empty(nv), ContactLaw(law.mu, law.presliding, law.wall.copy()),
         StaticLoad(load.gravity.copy(), load.payload, load.force.copy(), load.push.copy(), load.pushed),
-    )  # fmt: skip
+    ))  # fmt: skip
     elongation, tension = np.empty(nt), np.empty(nt)
     for t in range(nt):
         elongation[t], tension[t] = spring[t].initial_elongation, spring[t].initial_tension
-    actuation = Actuation(
+    actuation = refer_to(Actuation(
         drive.by_spring.copy(), drive.by_spring, straight.copy(), np.empty(nt), straight, drive.stretch, np.ones(1), spring,
         warm.copy(), elongation, tension, drive.bedding, drive.bedding_tension, np.zeros(nt), drive.stall_tension,
         drive.backlash, drive.crossing_travel, np.zeros(nt), straight.copy(), drive.pushes,
-    )  # fmt: skip
+    ))  # fmt: skip
     last_shape = np.empty(nv)
-    trial = TrialState(
+    trial = refer_to(TrialState(
         system, load.gravity, load.force, load.push, law.wall[4], described.rest, state, empty_factors(nv, nt), actuation,
         HeldTarget(last_shape, straight.copy(), warm), np.empty(state.s.shape), last_shape, np.empty(nv), np.zeros(nt),
-    )  # fmt: skip
+    ))  # fmt: skip
     apply_stiffness(trial, drive, 0, 1.0)
     set_rest_shape(described.rest, creep.delayed, system.rest)
     assign(state.q, system.rest)

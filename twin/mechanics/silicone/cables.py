@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.effects.tendon_friction import rounded_turn_angle, slip_state
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_internal
 
 SHORTEST_SEGMENT = 1e-9  # m, of a segment
 
 
+@by_reference
 class Cables(NamedTuple):
     """Points at rest (t, p, 3) m and their weights of the free nodes, (t, p, n_free)."""
 
@@ -21,6 +23,7 @@ class Cables(NamedTuple):
     weights: np.ndarray
 
 
+@by_reference
 class TendonForces(NamedTuple):
     """The tendons at a shape. Slip states and distal lengths are those that they would commit there."""
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg.cython_blas  # noqa: F401  compiled products call it: it must be loaded before its threads are limited
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_inline, jit_internal
 from twin.mechanics.silicone.cables import Cables, TendonForces, add_geometric_stiffness, add_sticking_stiffness, trace_tendons
 from twin.mechanics.silicone.material.creep import advance_relaxed_stress
@@ -31,6 +32,7 @@ STALE_AFTER_STEPS = 5  # a tangent to be kept is inverted anew after so many
 NO_TANGENT, OWN_TANGENT, NEIGHBOUR_TANGENT = 0, 1, 2
 
 
+@by_reference
 class BodyArrays(NamedTuple):
     """A body: cells, cables, skin, and the number of clamped nodes."""
 
@@ -40,6 +42,7 @@ class BodyArrays(NamedTuple):
     clamped: int
 
 
+@by_reference
 class NewtonProblem(NamedTuple):
     """The samples to be solved."""
 
@@ -60,6 +63,7 @@ class NewtonProblem(NamedTuple):
     keep_tangent: bool  # whether an accurate tangent is wanted at the end
 
 
+@by_reference
 class SoftNeighbour(NamedTuple):
     """A neighbour's shapes (n, nq) m, tensions (n, t) N and inverse tangents (n, nq, nq) m/N; empty where n is 0."""
 
@@ -68,6 +72,7 @@ class SoftNeighbour(NamedTuple):
     inverse: np.ndarray
 
 
+@by_reference
 class SoftResult(NamedTuple):
     """Solutions of the samples.
 
@@ -82,6 +87,7 @@ class SoftResult(NamedTuple):
     borrowed: np.ndarray
 
 
+@by_reference
 class SoftState(NamedTuple):
     """State of the body."""
 
@@ -94,6 +100,7 @@ class SoftState(NamedTuple):
     source: np.ndarray  # (1,) of the inverse tangent in use
 
 
+@by_reference
 class WorkArrays(NamedTuple):
     """Work arrays of a solve."""
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.effects.contact import obstacle_gap
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit
 from twin.mechanics.silicone.material.lattice import Cone, lattice
 
@@ -18,6 +19,7 @@ from twin.mechanics.silicone.material.lattice import Cone, lattice
 MANTLE_RINGS, POINTS_AROUND, TIP_RINGS = 36, 32, 8
 
 
+@by_reference
 class ContactSkin(NamedTuple):
     """Points at rest (m, 3) m, their weights of the free nodes (m, n_free), and their shares (m,) of a ring."""
 

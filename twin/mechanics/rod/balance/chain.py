@@ -18,10 +18,12 @@ import numpy as np
 
 from twin.effects.contact import obstacle_gap
 from twin.effects.tendon_friction import rounded_turn_angle, slip_state
+from twin.foundation.by_reference import by_reference, refer_to
 from twin.foundation.compiled import assign, assign_vector3, cross, dot, jit, jit_internal
 from twin.mechanics.rod.balance.elastic import elastic_forces
 
 
+@by_reference
 class Chain(NamedTuple):
     """Arrays of the compiled model. The first five are views of MuJoCo's arrays and change with its state."""
 
@@ -54,6 +56,7 @@ class Chain(NamedTuple):
     marker: np.ndarray  # (n_marker,) sites
 
 
+@by_reference
 class ContactLaw(NamedTuple):
     """Friction of the tendons in their holes, and the wall or post that disks press."""
 
@@ -62,6 +65,7 @@ class ContactLaw(NamedTuple):
     wall: np.ndarray  # (10,) as in `Loads`: normal towards the free side, offset (m), stiffness (N/m; 0: no wall), ...
 
 
+@by_reference
 class StaticLoad(NamedTuple):
     """Dead loads of the chain."""
 
@@ -72,6 +76,7 @@ class StaticLoad(NamedTuple):
     pushed: int  # index of that disk, from 0
 
 
+@by_reference
 class StaticSystem(NamedTuple):
     """The system in balance: MuJoCo's model and data by address, the chain, its rest shape, contacts and loads."""
 
@@ -83,6 +88,7 @@ class StaticSystem(NamedTuple):
     load: StaticLoad
 
 
+@by_reference
 class ChainState(NamedTuple):
     """State of the chain. A solve advances it in place."""
 
@@ -116,7 +122,7 @@ def first_pieces(path, nd):
 @jit
 def copy_state(state):
     """Return a copy of the state."""
-    return ChainState(state.T.copy(), state.q.copy(), state.z.copy(), state.s.copy())
+    return refer_to(ChainState(state.T.copy(), state.q.copy(), state.z.copy(), state.s.copy()))
 
 
 @jit

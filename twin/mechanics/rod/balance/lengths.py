@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.effects.tendon_friction import rounded_turn_angle
+from twin.foundation.by_reference import by_reference, refer_to
 from twin.foundation.compiled import assign, dot, jit, jit_internal
 from twin.mechanics.rod.balance.chain import commit_slip, copy_state, force_balance, friction_of, point_velocity
 from twin.mechanics.rod.balance.elastic import add_arc_gradients
@@ -137,6 +138,7 @@ def held_tangent(system, state, by_length, pushes, LU, held_tendons, tension_res
     return True
 
 
+@by_reference
 class HeldTarget(NamedTuple):
     """Target of a move with held tendons, and the shape that it starts from."""
 
@@ -158,7 +160,7 @@ def reach_target(system, state, factors, actuation, target, tol, in_parts):
     """
     T, usable = state.T, factors.usable
     q0, T0, T1 = target.start.copy(), T.copy(), T.copy()
-    origin = HeldTarget(target.start, actuation.free_length.copy(), actuation.temperature.copy())
+    origin = refer_to(HeldTarget(target.start, actuation.free_length.copy(), actuation.temperature.copy()))
     for t in range(T.size):
         if actuation.by_spring[t]:  # its tension at the start; T may be a guess
             T0[t] = actuation.softness[0] * actuation.tension[t]

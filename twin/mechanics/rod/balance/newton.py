@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twin.effects.tendon_friction import slip_state
+from twin.foundation.by_reference import by_reference, refer_to
 from twin.foundation.compiled import assign, dot, jit, jit_inline, jit_internal
 from twin.mechanics.mujoco_symbols import mj_com_pos, mj_kinematics
 from twin.mechanics.rod.balance.chain import commit_slip, copy_state, force_balance, point_velocity, set_state
@@ -32,6 +33,7 @@ FLOW_STEPS = 200
 FLOW_TOLERANCE = 1e-6  # rad, of the intermediate steps
 
 
+@by_reference
 class Factors(NamedTuple):
     """The factorised tangent, kept from solve to solve."""
 
@@ -44,7 +46,7 @@ class Factors(NamedTuple):
 @jit
 def empty_factors(nv, nt):
     """Return unused factors, marked as not valid."""
-    return Factors(np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt, np.bool_), np.empty((nt, nv)))
+    return refer_to(Factors(np.empty((nv, nv)), np.zeros(1, np.bool_), np.zeros(nt, np.bool_), np.empty((nt, nv))))
 
 
 class Flow(NamedTuple):

@@ -21,6 +21,7 @@ import numpy as np
 
 from twin.body import Route
 from twin.effects.tendon_friction import slip_state
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_internal
 from twin.mechanics.springs.force import tension_piece
 
@@ -33,6 +34,7 @@ MOST_BACKLASH_SHARE = 0.99  # of a path's change that backlash may keep from a s
 STALL_COMPLIANCE = 10.0  # m/N of a motor that stalls: 1 mm less than commanded is 0.1 mN more
 
 
+@by_reference
 class Actuation(NamedTuple):
     """Tendons held by motors or springs, (n_tendon,) each. Tensions count times `softness`, as in `trial_steps.apply_stiffness`."""
 

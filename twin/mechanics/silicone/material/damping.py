@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_internal
 from twin.mechanics.silicone.material.lattice import NODES_PER_CELL, Lattice, shape_functions
 from twin.mechanics.silicone.material.law import Cells, Tangent, stiffness
@@ -18,6 +19,7 @@ POLAR_STEPS = 12  # most Newton steps to a polar rotation; strains of tens of pe
 ROTATION_TOLERANCE = 1e-12  # change of its elements
 
 
+@by_reference
 class EffectiveMass(NamedTuple):
     """Effective mass of a body: its parts, and the upper triangle of the sum, or of its factor."""
 

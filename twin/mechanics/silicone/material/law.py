@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_internal
 
 LEAST_VOLUME_RATIO = 0.02  # of J; below it a cell counts as inverted
@@ -20,6 +21,7 @@ NEXT, AFTER = (1, 2, 0), (2, 0, 1)  # cyclic indices
 SYMMETRIC_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # elements of a symmetric tensor, as stored in H
 
 
+@by_reference
 class Cells(NamedTuple):
     """Arrays of the lattice and the silicone, for forces."""
 
@@ -34,6 +36,7 @@ class Cells(NamedTuple):
     bulk: np.ndarray  # (c,) Pa, K
 
 
+@by_reference
 class Tangent(NamedTuple):
     """Tangent K (n, n) N/m; response of pressures to displacements (c, 4, 81) Pa/m, and the pressures used (c, 4) Pa."""
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit_internal
 
 MOST_CONTACT_ITERATIONS, MOST_LINE_SEARCH_STEPS = 50, 30  # a handful usually suffice
@@ -25,6 +26,7 @@ LINE_SEARCH_SLOPE = 0.1  # slope at the end of a line search, relative to its st
 SLOWEST_SLIP = 1e-12  # m/s; slower slip has no direction
 
 
+@by_reference
 class RowLaw(NamedTuple):
     """Force law of the rows: D of each, the number of tendons' rows, the contacts' friction coefficients."""
 

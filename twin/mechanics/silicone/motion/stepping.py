@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit, jit_internal
 from twin.mechanics.silicone.cables import trace_tendons
 from twin.mechanics.silicone.material.damping import EffectiveMass, solve_transposed, solve_upper, update_mass
@@ -28,6 +29,7 @@ SAME_PLACE = 1e-9  # m, within which two contacts are one
 FASTEST_NODE = 1e3  # m/s; beyond it the motion counts as lost
 
 
+@by_reference
 class SteppedBody(NamedTuple):
     """A body that is stepped, and its coordinates in MuJoCo's model."""
 
@@ -46,6 +48,7 @@ class SteppedBody(NamedTuple):
     presliding: float  # m
 
 
+@by_reference
 class EngineState(NamedTuple):
     """MuJoCo's coordinates and masses, and the body that each coordinate belongs to."""
 
@@ -59,6 +62,7 @@ class EngineState(NamedTuple):
     step: float  # s
 
 
+@by_reference
 class Contacts(NamedTuple):
     """MuJoCo's contacts, three rows each, as sparse rows."""
 
@@ -73,6 +77,7 @@ class Contacts(NamedTuple):
     impratio: float
 
 
+@by_reference
 class ConstraintRows(NamedTuple):
     """The held tendons, then the contacts, three rows each."""
 
