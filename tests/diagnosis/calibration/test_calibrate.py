@@ -598,6 +598,15 @@ def test_a_thousandth_of_its_range_from_an_end_a_parameter_stands_there() -> Non
         assert Fit(Evaluation(moved, [], [], np.zeros(5)), np.zeros((5, 4)), 0.0).at_bound().tolist() == [at, False, False, False]
 
 
+def test_a_limit_far_below_the_end_of_a_range_that_no_robot_reaches_is_not_at_the_other() -> None:
+    """4.4 N m of up to 10,000, where 0.02 N m are noticed."""
+    wide = replace(FREE[0].parameter, value=1e4, low=1e-3, high=1e4, std=None, scale=0.02)
+    model = Model(Twin.of(ROBOT), (replace(FREE[0], parameter=wide), *FREE[1:]))
+    for value, at in ((4.4, False), (0.03, False), (0.02, True)):
+        moved = model.at(np.array([value / 0.02, 0.0, 0.0, 0.0]))
+        assert Fit(Evaluation(moved, [], [], np.zeros(5)), np.zeros((5, 4)), 0.0).at_bound().tolist() == [at, False, False, False]
+
+
 def test_twins_and_what_moves_nothing_are_said_to_be_untold_and_the_search_goes_on() -> None:
     """Two numbers that move the data alike, in whole numbers so that no rounding saves it, and one that moves nothing."""
     rng = np.random.default_rng(0)

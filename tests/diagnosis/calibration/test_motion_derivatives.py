@@ -142,6 +142,15 @@ def test_a_hopeless_fit_renews_nothing(swung: tuple[Objective, Model], monkeypat
     assert renewed == []
 
 
+def test_a_fit_that_comes_nearer_with_each_step_is_not_given_up(swung: tuple[Objective, Model]) -> None:
+    """From a servo twice too weak; its cost, logarithmic far from the data, promises nearly as much at each step as at the last."""
+    objective, model = swung
+    best = fit(objective, model)
+    weak = model.at(model.vector() - np.array([0.0, 0.0, 0.0, 0.5 * model.vector()[3]]))
+    found = fit(objective, weak, stop=StopRule(beat=1.1 * best.cost))
+    np.testing.assert_allclose(found.cost, best.cost, rtol=1e-3)
+
+
 def test_fits_of_motion_end_near_a_minimum_that_leaves_much(swung: tuple[Objective, Model]) -> None:
     objective, _ = swung
     at_noise, far = objective.smallest_fall(1e-5, objective.n), objective.smallest_fall(1e-5, 100.0 * objective.n)

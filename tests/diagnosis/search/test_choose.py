@@ -92,17 +92,34 @@ def test_where_nothing_predicts_the_evidence_has_the_word() -> None:
     assert choose(STUDY, found, AcceptanceLimits()) == found
 
 
+def moving(budget: Budget) -> Any:
+    return SimpleNamespace(accuracy=0.0, objective=SimpleNamespace(bends=True), budget=budget, progress=lambda words: None)
+
+
 def test_the_chosen_fit_of_motion_goes_on_to_its_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
     base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
     closer = weighed("drift", score=55.0, size=1.0, unseen=8.0)
     monkeypatch.setattr(stage, "_converged", lambda study, rough: closer)
-    moving = cast(Any, SimpleNamespace(accuracy=0.0, objective=SimpleNamespace(bends=True), budget=Budget()))
-    assert choose(moving, searched(base, best), AcceptanceLimits()) == Search(base, closer, (closer, base))
-    late = cast(Any, SimpleNamespace(**vars(moving) | {"budget": Budget(-1.0)}))
+    assert choose(moving(Budget()), searched(base, best), AcceptanceLimits()) == Search(base, closer, (closer, base))
+    late = moving(Budget(-1.0))
     assert choose(late, searched(base, best), AcceptanceLimits()) == searched(base, best)
     assert late.budget.untried == ["the last steps of drift"]
     alone = searched(base)
-    assert choose(moving, alone, AcceptanceLimits()) == alone  # the calibrated robot is at its minimum already
+    assert choose(moving(Budget()), alone, AcceptanceLimits()) == alone  # the calibrated robot is at its minimum already
+
+
+def test_of_two_near_each_other_the_better_at_its_minimum_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A set with an effect more, and one far behind, are not fitted again."""
+    base, gain = weighed(score=0.0, size=6.0, unseen=4.0), weighed("gain", score=950.0, size=1.0, unseen=1.0)
+    limit, far = weighed("limit", score=900.0, size=1.0, unseen=1.0), weighed("drift", score=500.0, size=1.0, unseen=1.0)
+    pair = weighed("drift", "gain", score=955.0, size=1.0, unseen=1.0)
+    minimum = {("gain",): 960.0, ("limit",): 970.0}
+    monkeypatch.setattr(stage, "_converged", lambda study, w: SimpleNamespace(**vars(w) | {"score": minimum[w.effects]}))
+    found = choose(moving(Budget()), Search(base, gain, (pair, gain, limit, far, base)), AcceptanceLimits())
+    assert (found.best.effects, found.best.score) == (("limit",), 970.0)
+    assert [w.score for w in found.all] == [970.0, 960.0, 955.0, 500.0, 0.0]
+    monkeypatch.setattr(stage, "solves", lambda study, twin: "limit" not in twin.effects)
+    assert choose(moving(Budget()), Search(base, gain, (gain, limit, base)), AcceptanceLimits()).best.effects == ("gain",)
 
 
 def test_a_twin_solves_a_set_unless_a_trial_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:

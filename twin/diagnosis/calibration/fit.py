@@ -22,7 +22,7 @@ from twin.foundation.errors import SolveError
 from twin.foundation.parameters import FittedValue
 
 FAR_SHARE = 0.05  # of the cost: a fit whose derivatives promise a larger fall is far from its minimum
-AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, a parameter is at its bound
+AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, and than its step, a parameter is at its bound
 SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came, they are renewed
 MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit
 MOST_FIT_STEPS = 24  # at most, of a fit of motion or one that renewed them
@@ -127,7 +127,7 @@ class Fit:
     def at_bound(self) -> np.ndarray:
         """Return which free parameters (n_free,) are at an end of their range."""
         at = [(self.model.value(f), f.parameter) for f in self.model.free]
-        return np.array([min(x - p.low, p.high - x) < AT_BOUND_SHARE * (p.high - p.low) for x, p in at], bool)
+        return np.array([min(x - p.low, p.high - x) < min(AT_BOUND_SHARE * (p.high - p.low), p.step) for x, p in at], bool)
 
     def unfixed(self) -> list[str]:
         """Return the labels of the parameters that the data do not fix.
@@ -189,6 +189,7 @@ def fit(
         columns[:, moving] = objective.jacobian(at, moving)
         step = _Step.of(penalty, at, columns)
         promised = step.to(penalty.first_damping)[1] if renewals or objective.bends else 0.0
+        ahead = promised / penalty.trust(at.z)  # in |z|^2, of which a cost far from the data says the share
         least, near_least = objective.smallest_fall(stop.tolerance, now)
         far = renewals and promised > FAR_SHARE * now
         enough = max(least if far else near_least, stop.tolerance * now if kept else 0.0, stop.worth)
@@ -202,8 +203,8 @@ def fit(
                 damping = max(0.1 * damping, LEAST_DAMPING * penalty.first_damping)
             if now - left * fall > beat:
                 break
-        slow = fall < SLOW_FALL_SHARE * promised or promised > SLOW_FALL_SHARE * before  # one good step leaves little to promise
-        before = promised
+        slow = fall < SLOW_FALL_SHARE * promised or ahead > SLOW_FALL_SHARE * before  # one good step leaves little to promise
+        before = ahead
         if better is not None and fall >= enough and not slow:
             continue
         worth_it = since > now and since - now >= enough and now <= beat

@@ -1,5 +1,6 @@
 """Stage `choose`: choose among the fitted candidates, by their predictions of left-out trials where evidence does not decide."""
 
+from dataclasses import replace
 from itertools import combinations
 from math import isfinite
 
@@ -11,7 +12,7 @@ from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.scored_model import EffectForms, ScoredModel, score_model
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.search import Known, Search, extend
-from twin.diagnosis.thresholds import LEFT_BY_EACH_EFFECT, LEFT_BY_EFFECTS, SETS_FITTED_TO_HALVES
+from twin.diagnosis.thresholds import BEAM_WIDTH, LARGEST_SCORE_GAP, LEFT_BY_EACH_EFFECT, LEFT_BY_EFFECTS, SETS_FITTED_TO_HALVES
 from twin.foundation.errors import SolveError
 from twin.prediction.simulate import simulate
 from twin.prediction.twin import Twin
@@ -27,15 +28,33 @@ def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Sear
     best = predicting(context, found, limits.accept)
     core = None if _smaller(context, found.base, best) else most_predictive(context, found)
     if core is None:
-        moved = context.objective.bends and best is not found.base  # refits of motion end far from where their numbers do
-        if moved and context.budget.allows(f"the last steps of {' + '.join(best.effects)}"):
-            best = _converged(context, best)
+        if context.objective.bends and best is not found.base:
+            return _with_last_steps(context, found, best)
         return Search(found.base, best, _with(found, best))
     core = _converged(context, core)
     alone = len(core.effects) == len(found.base.effects) + 1
     if alone and context.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
         core = add_one_effect(context, core, found, limits)
     return Search(found.base, core, _with(found, core), predicted=True)
+
+
+def _with_last_steps(context: FitContext, found: Search, best: ScoredModel) -> Search:
+    """Return the search of a motion with the best candidate, and the nearest with as many effects, fitted to their minima.
+
+    Fits of motion end up to tens of |z|^2 above these, each by another amount, so that of two near each other the worse may lead.
+    """
+    alike = [w for w in found.all if len(w.effects) == len(best.effects) and w.forms != best.forms]
+    near = [w for w in alike if w.score > best.score - LARGEST_SCORE_GAP]
+    for rough in (best, *near[: BEAM_WIDTH - 1]):
+        name = f"the last steps of {' + '.join(rough.effects)}"
+        if not context.budget.allows(name):
+            break
+        context.progress(name)
+        closer = _converged(context, rough)
+        found = replace(found, all=_with(found, closer))
+        if rough is best or (closer.score > best.score and solves(context, closer.fit.model.twin)):
+            best = closer
+    return Search(found.base, best, _with(found, best))
 
 
 def _with(found: Search, chosen: ScoredModel) -> tuple[ScoredModel, ...]:
