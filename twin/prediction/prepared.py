@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from twin.robots import Robot
 
 FEWEST_SMOOTHED_ROWS = 20  # of a thermometer; cross-validation of fewer is unreliable
 MOST_SPLINE_POINTS = 100  # enough to follow a room's temperature
+CORNERS = 1e-3  # s, by which corners of a late command are rounded
 CONTROL_RESOLUTION = 1e-3  # of a control's range, which stands for the resolution of what is known without noise
 ORIENTED = frozenset({"turn", "angles", "imu rate", "imu force"})  # groups of signals that need orientations
 ROOM_TEMPERATURE = 296.15  # K, default: the temperature at which stiffness is quoted
@@ -55,7 +57,7 @@ class Inputs:
         """(n, n_tendon) how much is pulled: the command; of controls their way from home, over the farthest."""
         return self.command if self.home is None or self.reach is None else (self.command - self.home) / self.reach
 
-    @property
+    @cached_property
     def signals(self) -> Signals:
         """The reported drive signals of the trial; markers and other predicted signals are empty."""
         n, nothing = len(self.time), np.zeros_like(self.command)
@@ -64,6 +66,11 @@ class Inputs:
             self.time, self.clock, of[Drive.TENSION], of[Drive.DISPLACEMENT], np.zeros((n, 0, 3)), self.temperature, self.drives,
             of[Drive.CURRENT], smooth=self.smooth, control=of[Drive.CONTROL],
         )  # fmt: skip
+
+    @cached_property
+    def between_rows(self) -> Signals:
+        """The signals straight between rows, every `CORNERS` s."""
+        return self.signals.between_rows(CORNERS)
 
 
 @dataclass(frozen=True)

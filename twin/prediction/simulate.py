@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 LEAST_EXCITATION = 30.0  # resolutions of a drive (`Drive.reading`); a smaller range of commands does not excite a robot
 
-CORNERS = 1e-3  # s, by which corners of a late command are rounded
 MIN_ROWS = 2  # that have anything between them
 
 UNEVEN_STEPS = 0.5  # of the mean step, by which the median step is off it where rows come in bursts
@@ -107,7 +106,7 @@ class TrialSimulator:
         """Return times and commands between rows where effects change controls: late or filtered, these have other corners."""
         if driven.control is inputs.signals.control or not driven.driven_by_control.all() or len(inputs.time) < MIN_ROWS:
             return None
-        finer, chain = inputs.signals.between_rows(CORNERS), self.twin.effect_chain
+        finer, chain = inputs.between_rows, self.twin.effect_chain
         return finer.time, chain.drive(chain.command(finer)).control
 
     def _orientations(self, time: np.ndarray, solution: Solution, loads: Loads) -> dict[str, np.ndarray]:

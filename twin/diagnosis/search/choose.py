@@ -39,12 +39,12 @@ def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Sear
 
 
 def _with_last_steps(context: FitContext, found: Search, best: ScoredModel) -> Search:
-    """Return the search of a motion with the best candidate, and the nearest with as many effects, fitted to their minima.
+    """Return the search of a motion with the best candidate, and the nearest with as many others, fitted to their minima.
 
     Fits of motion end up to tens of |z|^2 above these, each by another amount, so that of two near each other the worse may lead.
     """
-    alike = [w for w in found.all if len(w.effects) == len(best.effects) and w.forms != best.forms]
-    near = [w for w in alike if w.score > best.score - LARGEST_SCORE_GAP]
+    others = [w for w in found.all if len(w.effects) == len(best.effects) and w.effects != best.effects]
+    near = [w for w in others if w.score > best.score - LARGEST_SCORE_GAP]
     for rough in (best, *near[: BEAM_WIDTH - 1]):
         name = f"the last steps of {' + '.join(rough.effects)}"
         if not context.budget.allows(name):
