@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg.cython_blas  # noqa: F401  compiled products call it: it must be loaded before its threads are limited
 
 from twin.foundation.by_reference import by_reference
-from twin.foundation.compiled import jit, jit_inline, jit_internal
+from twin.foundation.compiled import assign, jit, jit_inline, jit_internal
 from twin.mechanics.silicone.cables import Cables, TendonForces, add_geometric_stiffness, add_sticking_stiffness, trace_tendons
 from twin.mechanics.silicone.material.creep import advance_relaxed_stress
 from twin.mechanics.silicone.material.law import LEAST_VOLUME_RATIO, Cells, Tangent, forces, stiffness
@@ -136,7 +136,8 @@ def apply_updates(moved, work, n_update, learns, step):
     if not learns or n_update == MOST_UPDATES:
         return n_update
     s, g = work.update_along[n_update], work.update_add[n_update]
-    s[:], g[:] = step, moved[:, 0]  # step, and what the same tangent makes of the residual that it left
+    assign(s, step)
+    assign(g, moved[:, 0])  # step, and what the same tangent makes of the residual that it left
     size, bent = np.dot(s, s), np.dot(s, s) - np.dot(s, g)
     if not UPDATE_RANGE * size < bent < size / UPDATE_RANGE:
         return n_update
@@ -244,11 +245,11 @@ def linear_step(problem, i, state, work, inverse, du, dT):
             push[:, 1 + t] = tendons.pull[t]
     moved = np.dot(inverse.matrix, push)
     n_update = apply_updates(moved, work, inverse.n_update, inverse.learns, du)
-    du[:] = moved[:, 0]
+    assign(du, moved[:, 0])
     changes = TautTendons(np.empty(nt), np.zeros(nt, np.bool_), np.zeros(nt, np.bool_))
     gap, taut, was_taut = changes.gap, changes.taut, changes.was_taut
     for t in range(nt):
-        response[t] = moved[:, 1 + t]
+        assign(response[t], moved[:, 1 + t])
         if problem.held[t]:
             gap[t] = tendons.path[t] - problem.free_length[i, t] - problem.stretch[i, t] * T[t] + np.dot(tendons.gradient[t], du)
             taut[t] = T[t] > 0.0 or gap[t] > 0.0
@@ -341,8 +342,8 @@ def solve_sample(body, problem, i, state, work, near):
         if share < 1.0:
             state.source[0], n_update = NO_TANGENT, 0
         last, fresh = length if share == 1.0 else 1e9, False
-    state.u[:] = u
-    state.tension[:] = T
+    assign(state.u, u)
+    assign(state.tension, T)
     state.source[0] = NO_TANGENT
     return 0
 
@@ -353,7 +354,7 @@ def solve_samples(body, problem, neighbour, i, state, result, work):
     n, near = problem.time.size, state.inverse
     while i < n:
         if neighbour.u.shape[0] > 0:
-            state.u[:] = neighbour.u[i]
+            assign(state.u, neighbour.u[i])
             state.tension[:] = neighbour.tension[i] / problem.stiffness_ratio[i]
             near = neighbour.inverse[i]
             state.source[0], work.pressures_predicted[0] = NEIGHBOUR_TANGENT, False
@@ -364,7 +365,8 @@ def solve_samples(body, problem, neighbour, i, state, result, work):
             result.borrowed[i] = state.source[0] == NEIGHBOUR_TANGENT
             if not result.borrowed[i]:
                 result.inverse[i] = state.inverse
-        result.u[i], result.path[i] = state.u, work.tendons.path
+        assign(result.u[i], state.u)
+        assign(result.path[i], work.tendons.path)
         result.tension[i] = state.tension * problem.stiffness_ratio[i]
         if state.relaxed.shape[0] > 0 and i + 1 < n:
             work.all_nodes[body.clamped :] = state.u.reshape(-1, 3)
