@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from twin import cli
-from twin.prediction.storage import read_twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.robots import sample
 from twin.robots.robot import models_folder
 

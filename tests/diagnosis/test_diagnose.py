@@ -20,8 +20,8 @@ from twin.diagnosis.split import split
 from twin.foundation.errors import DataError
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import PreparedRecording, prepare
-from twin.prediction.storage import twin_table
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import twin_table
 from twin.report import contents
 from twin.robots import load
 

@@ -10,8 +10,8 @@ import pytest
 
 from twin.diagnosis import Settings, diagnose
 from twin.measurements import read
-from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.report import provenance, write
 from twin.robots import load
 from twin.robots.robot import models_folder

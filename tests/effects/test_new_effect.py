@@ -16,7 +16,7 @@ from tests.recorded_days import half, recorded_day
 from twin import effects, report
 from twin.diagnosis import Settings, diagnose
 from twin.effects import catalogue
-from twin.prediction.storage import read_twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.report.plots.effect_plot import choose_residual_plots
 from twin.report.plots.variables import variables
 

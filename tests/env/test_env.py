@@ -23,8 +23,8 @@ from twin.foundation.errors import DataError, TwinError, UnknownNameError
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.prepared import prepare
 from twin.prediction.simulate import simulate
-from twin.prediction.storage import read_twin, write_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin, write_twin
 
 DIAGNOSED = """
 format = "twin/1"

@@ -14,8 +14,8 @@ from twin.effects import effect_class
 from twin.foundation.errors import DataError
 from twin.prediction.mjcf import ChainStepper, Origins, write_mjcf
 from twin.prediction.rollout import commands, rollout
-from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.robots import load
 
 RATE = 50.0  # Hz

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from twin.effects import Effect, catalogue
 from twin.foundation.errors import DataError, TwinError, UnknownNameError
 from twin.foundation.parameters import FittedValue, Parameter
-from twin.prediction.storage import correlations, read_twin, twin_table, write_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import correlations, read_twin, twin_table, write_twin
 from twin.robots import load, robot_names
 from twin.robots.robot import models_folder
 

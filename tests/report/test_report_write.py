@@ -7,7 +7,7 @@ import pytest
 from small_diagnosis import SETTINGS, diagnosis
 
 from twin.foundation.errors import DataError
-from twin.prediction.storage import read_twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.report import provenance, write
 
 FILES = {"report.json", "report.html", "twin.toml"}

@@ -19,8 +19,8 @@ from twin.measurements import Channel, Recording, Trial, read, write
 from twin.mechanics.mjcf import ModelBody
 from twin.prediction.evaluate import evaluate
 from twin.prediction.prepared import prepare
-from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.robots import Robot, load
 
 PLAIN = PENDULUM.format(joint=' damping="0.02"', key="")

@@ -13,8 +13,8 @@ from tests.command_line import twin
 from tools.site import reference
 from twin.foundation.errors import DataError, UnknownNameError
 from twin.measurements import read
-from twin.prediction.storage import read_twin, robot_reference, twin_table, write_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin, robot_reference, twin_table, write_twin
 from twin.report.robot_page import draw_robot
 from twin.robots import load, robot_names
 from twin.robots.family import family_names, load_family

@@ -18,8 +18,8 @@ from twin.body import Signals
 from twin.effects import effect_class
 from twin.foundation.errors import DataError, TwinError
 from twin.measurements import Recording, read
-from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.robots import load, sample
 from twin.shape.alignment.align import Alignment, align
 from twin.shape.alignment.drift_correction import correct_drift

@@ -19,8 +19,8 @@ import pint
 import pyarrow.parquet
 
 from twin.measurements import Recording
-from twin.prediction.storage import correlations
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import correlations
 from twin.robots import Robot
 from twin.robots.schema import SOURCE_OF_DEFAULT
 

@@ -23,7 +23,7 @@ from literal_reader import Differs, check_robot, check_set, check_twin
 from twin.foundation.errors import TwinError
 from twin.measurements import read
 from twin.prediction.prepared import prepare
-from twin.prediction.storage import read_twin
+from twin.prediction.twin_file.storage import read_twin
 from twin.report.robot_page import draw_robot
 from twin.robots import load
 from twin.robots.robot import models_folder

@@ -9,7 +9,7 @@ from twin.foundation.units import UNIT_EXAMPLES
 from twin.measurements.channels import CHANNEL_KINDS, readable
 from twin.measurements.conditions import SCALAR_CONDITIONS, VECTOR_CONDITIONS
 from twin.measurements.read import ChannelTable, SetFile
-from twin.prediction.storage import TwinFile
+from twin.prediction.twin_file.storage import TwinFile
 from twin.robots.family import family_names, load_family
 from twin.robots.robot import RobotFile
 from twin.robots.schema import BOUND_STDS, Row, Schema

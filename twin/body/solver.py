@@ -9,10 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
+from twin.body.drives.spring import Spring
 from twin.body.loads import Loads
 from twin.body.route import Creep, Route
 from twin.body.signals import Drive, Drives, drive_mask
-from twin.body.spring import Spring
 from twin.measurements.patches import Patches
 
 SOLVE_TOLERANCE = 1e-7  # rad in every hinge: the tip is then within 1e-4 mm

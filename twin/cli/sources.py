@@ -10,8 +10,8 @@ from twin.foundation.errors import DataError
 def load_set_and_twin(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
     """Return the recording, by default the bundled sample, and the twin to compare with it."""
     from twin.measurements import read
-    from twin.prediction.storage import read_twin
     from twin.prediction.twin import Twin
+    from twin.prediction.twin_file.storage import read_twin
     from twin.robots import sample
 
     if folder is None:
@@ -27,8 +27,8 @@ def load_finger_set(folder: Path | None, twin: str | None) -> tuple[Any, Any]:
     Raises DataError for a twin of another robot.
     """
     from twin.measurements import read
-    from twin.prediction.storage import read_twin
     from twin.prediction.twin import Twin
+    from twin.prediction.twin_file.storage import read_twin
     from twin.robots import load, sample
 
     if folder is None:

@@ -14,7 +14,7 @@ upper one:
 
 import numpy as np
 
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.mechanics.springs.force import hysteresis_branches
 from twin.mechanics.springs.heat import heat_loss, heated_temperature
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.foundation.errors import SolveError
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.mechanics.silicone import SoftStatics
 from twin.mechanics.silicone.single_equilibrium import (
     MOVE_TOLERANCE,

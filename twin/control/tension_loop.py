@@ -16,7 +16,7 @@ Source: RBF compensation Peng et al. 2025 (Eqs 11-12); the inverse of the loop i
 
 import numpy as np
 
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.control.heating_guard import HeatingGuard, branch_temperatures
 from twin.control.pi_controller import PIController
 from twin.control.rbf_network import RBFNetwork

@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from twin.body import Loads
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.control.tension_loop import cold_tension
 from twin.prediction.kinematics import LoadedRobot, inverse
 from twin.prediction.kinematics.loaded_robot import ROOM_TEMPERATURE

@@ -38,7 +38,7 @@ from twin.diagnosis.verdict.resolve_ties import resolve_ties
 from twin.diagnosis.verdict.systematic import with_systematic
 from twin.foundation.display_names import display_name
 from twin.foundation.errors import DataError
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.measurements import Recording
 from twin.prediction.damping import damped_as_measured, without_damping
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.body.lag import lag_over, lag_response, late_by
+from twin.body.drives.lag import lag_over, lag_response, late_by
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from twin.body import ROPE_FEATURES, Body, Route, Signals
-from twin.body.counts import of_a_model
+from twin.body.drives.counts import of_a_model
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.body import Bearing, Route, Rubbing, Signals
-from twin.body.counts import joint_names
+from twin.body.drives.counts import joint_names
 from twin.effects.base.effect import Effect, FitStart
 from twin.foundation.parameters import Parameter
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Body, Signals
-from twin.body.counts import joint_names
+from twin.body.drives.counts import joint_names
 from twin.effects.base.effect import Effect, FitStart
 from twin.foundation.parameters import Parameter
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Body, Bumpers, Route, Signals
-from twin.body.counts import joint_names
+from twin.body.drives.counts import joint_names
 from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 

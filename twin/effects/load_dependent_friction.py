@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from twin.body import Route, Rubbing
-from twin.body.counts import joint_names
+from twin.body.drives.counts import joint_names
 from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.body import Body
-from twin.body.counts import joint_names
+from twin.body.drives.counts import joint_names
 from twin.effects.base.effect import DataNeed, Effect
 from twin.foundation.parameters import Parameter
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.body import Signals
-from twin.body.counts import of_a_model, tendon_names
+from twin.body.drives.counts import of_a_model, tendon_names
 from twin.effects.base.effect import Effect, FitStart
 from twin.effects.base.saturating_drift import saturated_time, saturating_starts
 from twin.foundation.parameters import Parameter

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.body import Signals
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.effects.base.effect import Effect, FitStart
 from twin.foundation.parameters import Parameter
 

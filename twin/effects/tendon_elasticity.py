@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.body import ROPE_FEATURES, Body, Route, Signals
-from twin.body.counts import of_a_model, winches
+from twin.body.drives.counts import of_a_model, winches
 from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
@@ -47,7 +47,7 @@ class TendonElasticity(Effect):
 
     >>> TendonElasticity(stretch=5e-5).route().stretch
     5e-05
-    >>> from twin.body.counts import Counts, Winch
+    >>> from twin.body.drives.counts import Counts, Winch
     >>> TendonElasticity(stretch_flexor=1e-4, n_tendon=Counts.of(1, (), ("flexor",), (Winch("flexor", 0, 2.0),))).give().tolist()
     [0.0004]
     >>> TendonElasticity(toe=3e-4, toe_tension=2.0).route().bedding

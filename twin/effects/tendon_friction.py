@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from twin.body import Route, Signals
-from twin.body.counts import of_a_model, tendon_names
+from twin.body.drives.counts import of_a_model, tendon_names
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.compiled import jit
 from twin.foundation.parameters import Parameter

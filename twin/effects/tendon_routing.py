@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.body import Body, Signals
-from twin.body.counts import crossing_tendons, of_a_model
+from twin.body.drives.counts import crossing_tendons, of_a_model
 from twin.effects.base.effect import DataNeed, Effect, FitStart, each_then_all
 from twin.foundation.parameters import Parameter
 
@@ -25,7 +25,7 @@ class TendonRouting(Effect):
 
     >>> TendonRouting(angle_2=0.05)["angle_2"]
     0.05
-    >>> from twin.body.counts import Counts
+    >>> from twin.body.drives.counts import Counts
     >>> TendonRouting(out_flexor=1e-3, n_tendon=Counts.of(1, ("hip",), ("flexor",), crossing=("flexor",)))["out_flexor"]
     0.001
     """

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from twin.body import Signals, interpolate_commands
-from twin.body.lag import late_by
+from twin.body.drives.lag import late_by
 from twin.effects.base.effect import DataNeed, Effect, FitStart
 from twin.foundation.parameters import Parameter
 

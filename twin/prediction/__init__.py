@@ -3,6 +3,6 @@
 twin.py       the twin                                     simulate.py     simulated trials, static or in motion
 prepared.py   a recording prepared for a robot             evaluate.py     the error of a twin on data
 damping.py    whether shapes follow fast tensions late
-storage.py    twin.toml                                    solver_pool.py  compiled solvers for reuse
+twin_file/    twin.toml                                    solver_pool.py  compiled solvers for reuse
 kinematics/   tensions to shape and back                   rollout/        predictions under given or drawn controls
 """

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twin.body import SOLVE_TOLERANCE, Body, Drive, Heating, Loads, Problem, Signals, Solution, Solver
-from twin.body.lag import damped
+from twin.body.drives.lag import damped
+from twin.body.drives.spring import Spring
 from twin.body.orientation import angles, followed, rates_and_forces, turned_by
-from twin.body.spring import Spring
 from twin.foundation.errors import SolveError
 from twin.prediction.first_pose import true_start
 from twin.prediction.prepared import Inputs, PreparedRecording

@@ -11,7 +11,7 @@ import numpy as np
 
 from twin.body import Body, Heating, Solver
 from twin.body.drawable import Drawable
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.effects import Effect, effect_class
 from twin.effects.base.chain import EffectChain
 from twin.foundation.errors import DataError
@@ -49,14 +49,14 @@ class Twin:
     @staticmethod
     def load(source: str | Path) -> Twin:
         """Read a twin from a `twin.toml`, a report's folder, a robot's folder or a robot's name. Raises as `read_twin`."""
-        from twin.prediction.storage import read_twin
+        from twin.prediction.twin_file.storage import read_twin
 
         return read_twin(source)
 
     def save(self, path: str | Path) -> None:
         """Write the twin as a `twin.toml`, whole or not at all; parameters without standard errors."""
         from twin.prediction.provenance import run_provenance
-        from twin.prediction.storage import twin_table, write_twin
+        from twin.prediction.twin_file.storage import twin_table, write_twin
 
         path = Path(path)
         write_twin(path, twin_table(self, path.parent, {}, {}), run_provenance("Twin.save", 0, ""))

@@ -10,7 +10,7 @@ from twin.foundation.atomic_write import write_all_atomically
 from twin.foundation.errors import DataError
 from twin.foundation.parameters import FittedValue
 from twin.prediction.mjcf import MODEL_FILE, Origins, export_mjcf
-from twin.prediction.storage import twin_table, twin_text
+from twin.prediction.twin_file.storage import twin_table, twin_text
 from twin.report.contents import contents
 from twin.report.page import page
 

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from twin.body import Body, Counts, Solver
-from twin.body.drive_train import DriveTrain
+from twin.body.drives.drive_train import DriveTrain
+from twin.body.drives.spring import Spring, build_springs
 from twin.body.hinge_chain import HingeChain
-from twin.body.spring import Spring, build_springs
 from twin.foundation.errors import DataError, TwinError, UnknownNameError, join_problems, short_repr
 from twin.foundation.file_schema import TableSchema, TextLine, validate_table
 from twin.foundation.files import is_file, read_utf8

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.foundation.atomic_write import write_atomically
 from twin.foundation.errors import DataError
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.measurements import Recording
 from twin.mechanics.silicone.skin import Skin
 from twin.mechanics.silicone.statics import rotation_about_z

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.measurements import Recording
 from twin.measurements.patches import camera_direction
 from twin.measurements.recording import EXTERNAL_CONTACT

@@ -22,7 +22,7 @@ from tools.simulators.rod.sensors import Noise
 from tools.simulators.rod.springs import GF, Springs
 from tools.simulators.rod.write import write_set
 from twin.body import Drive, Heating, Loads, Problem, Route
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.effects import Effect, effect_class
 from twin.effects.base.chain import EffectChain
 from twin.foundation.errors import DataError

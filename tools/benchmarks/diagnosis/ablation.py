@@ -38,7 +38,7 @@ from twin.diagnosis.pipeline import decide
 from twin.diagnosis.search.screen import screen
 from twin.diagnosis.verdict.judge import withdraw
 from twin.foundation.errors import TwinError
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.measurements import Recording, read
 from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import prepare

@@ -37,7 +37,7 @@ class Calibrate:
     def run(self) -> None:
         from twin import report
         from twin.diagnosis import Settings, calibrated_fit
-        from twin.prediction.storage import twin_table, write_twin
+        from twin.prediction.twin_file.storage import twin_table, write_twin
 
         if self.out.exists() and not self.force:
             raise DataError(f"{self.out} exists already; give another file with --out, or overwrite it with --force")

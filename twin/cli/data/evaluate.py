@@ -22,7 +22,7 @@ class Evaluate:
     def run(self) -> None:
         from twin.measurements import read
         from twin.prediction.evaluate import evaluate
-        from twin.prediction.storage import read_twin
+        from twin.prediction.twin_file.storage import read_twin
 
         twin = read_twin(self.twin)
         recording = read(self.set, least_trials=1)

@@ -43,6 +43,6 @@ class Export:
 def export_model(source: Path, folder: Path) -> Path:
     """Write the twin of a report, a twin.toml or a robot's folder as an MJCF to `folder`; return the file."""
     from twin.prediction.mjcf import origins_of, write_mjcf
-    from twin.prediction.storage import read_twin
+    from twin.prediction.twin_file.storage import read_twin
 
     return write_mjcf(read_twin(str(source)), folder, origins_of(source))

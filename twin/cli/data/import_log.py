@@ -88,7 +88,7 @@ class ImportLog:
 
 def _robot(recording: Recording, path: Path, folder: Path) -> str:
     """Return how the set names its robot: a map's path is relative to the map, a set's to the set. An unknown robot is said."""
-    from twin.prediction.storage import robot_reference
+    from twin.prediction.twin_file.storage import robot_reference
     from twin.robots import load
 
     try:

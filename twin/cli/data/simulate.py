@@ -20,7 +20,7 @@ class Simulate:
 
     def run(self) -> None:
         from twin.measurements import read, write
-        from twin.prediction.storage import read_twin, robot_reference
+        from twin.prediction.twin_file.storage import read_twin, robot_reference
 
         twin = read_twin(self.twin)
         recording = read(self.set, least_trials=1)

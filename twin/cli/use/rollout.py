@@ -43,7 +43,7 @@ class Rollout:
     def run(self) -> None:
         from twin.measurements import write
         from twin.prediction.rollout import rollout
-        from twin.prediction.storage import read_twin, robot_reference
+        from twin.prediction.twin_file.storage import read_twin, robot_reference
 
         twin = read_twin(self.twin)
         controls = self._controls(twin)

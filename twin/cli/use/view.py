@@ -98,7 +98,7 @@ class View:
 
     def _load_twins(self) -> tuple[list[tuple[str, Twin]], Recording | None]:
         """Return the twins by name, and the set to replay with them."""
-        from twin.prediction.storage import read_twin
+        from twin.prediction.twin_file.storage import read_twin
 
         sets = [w for w in self.what if (Path(w) / "measurements.toml").is_file()]
         named = [w for w in self.what if w not in sets]

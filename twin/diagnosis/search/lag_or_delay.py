@@ -22,7 +22,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize, minimize_scalar
 
 from twin.body import Drive, Signals
-from twin.body.lag import lag_response
+from twin.body.drives.lag import lag_response
 from twin.diagnosis.calibration.first_calibration import sensitivity
 from twin.diagnosis.calibration.fit import fit
 from twin.diagnosis.evidence.scored_model import ScoredModel, score_model

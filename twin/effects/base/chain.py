@@ -14,8 +14,8 @@ from functools import reduce
 import numpy as np
 
 from twin.body import ROPE_FEATURES, Bearing, Body, Bumpers, Creep, Loads, Route, Rubbing, Signals
-from twin.body.drive_train import DriveTrain
-from twin.body.spring import Spring
+from twin.body.drives.drive_train import DriveTrain
+from twin.body.drives.spring import Spring
 from twin.effects import Effect
 from twin.foundation.errors import DataError
 

@@ -31,8 +31,8 @@ import mujoco
 import numpy as np
 
 from twin.body import Body, Creep, Loads, Route, Signals
-from twin.body.counts import joint_names
-from twin.body.spring import Spring
+from twin.body.drives.counts import joint_names
+from twin.body.drives.spring import Spring
 from twin.foundation.errors import TwinError
 from twin.foundation.parameters import Parameter, Values, fill_defaults
 

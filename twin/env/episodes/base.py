@@ -13,8 +13,8 @@ from twin.env.episodes.observation import ObservationLayout
 from twin.env.episodes.rendering import FrameRenderer
 from twin.env.episodes.validation import parse_options, parse_reset_options, select_arrays
 from twin.foundation.errors import DataError, SolveError
-from twin.prediction.storage import read_twin
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import read_twin
 
 MOST_REDRAWS = 20  # of a twin or a goal without equilibrium
 

@@ -19,8 +19,8 @@ from twin.foundation.files import is_file
 from twin.foundation.parameters import Parameter
 from twin.foundation.toml_file import open_toml
 from twin.foundation.units import unit_scale
-from twin.prediction.storage import TWIN_FORMAT, correlations
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import TWIN_FORMAT, correlations
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 loading.py   an MJCF, or why not         numbers.py   its numbers by address
 body.py      channels and changes        poses.py     starts and payloads
 solver.py    trials                      stepping.py  the compiled loop
-friction.py  joints and tendons that rub        written.py    numbers back into the MJCF
+friction.py  joints and tendons that rub  stops.py    bumpers of joints
 routes.py    winches, and hinges that tendons cross
-precise_xml.py  an MJCF as text to the last digit    drawing.py  its geoms and tendons to draw
+xml/         an MJCF as text, with changed numbers    drawing.py  its geoms and tendons to draw
 """
 
 from twin.mechanics.mjcf.body import ModelBody, control_span, control_unit, element_senses, model_size, payload_places, tip_site
@@ -13,10 +13,10 @@ from twin.mechanics.mjcf.drawing import ModelFigure
 from twin.mechanics.mjcf.loading import KINDS, SCALAR_JOINTS, LoadedModel, load_model
 from twin.mechanics.mjcf.numbers import ATTRIBUTES, Attribute, applies, si_unit, slides
 from twin.mechanics.mjcf.poses import contacts_at_start
-from twin.mechanics.mjcf.precise_xml import WrittenModel, copied, exact_text, with_comments
 from twin.mechanics.mjcf.routes import geared, outward, winches_of
 from twin.mechanics.mjcf.solver import LONGEST_STEP, ModelSolver, Motion, longest_step
-from twin.mechanics.mjcf.written import check_same, name_element, written_model
+from twin.mechanics.mjcf.xml.precise import WrittenModel, copied, exact_text, with_comments
+from twin.mechanics.mjcf.xml.written import check_same, name_element, written_model
 
 __all__ = [
     "ATTRIBUTES",

@@ -9,7 +9,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
-from twin.body.counts import Winch
+from twin.body.drives.counts import Winch
 from twin.mechanics.mjcf.loading import LoadedModel
 
 LEAST_SINE = 0.1  # of the angle between a tendon and a hinge's axis: nearer to parallel it has no lever there

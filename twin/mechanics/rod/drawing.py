@@ -7,8 +7,8 @@ import numpy as np
 
 from twin.body import Drive, Heating, Loads, Problem, Route, Solution
 from twin.body.drawable import NO_PIECES, NO_VALUES, ColourScale, Frames, FrameShapes, Solid, stack_frames
+from twin.body.drives.spring import Spring
 from twin.body.hinge_chain import HingeChain
-from twin.body.spring import Spring
 from twin.mechanics.rod import ChainSolution, Equilibrium
 from twin.mechanics.rod.balance.chain import ContactLaw
 from twin.mechanics.rod.tension_along import tension_along

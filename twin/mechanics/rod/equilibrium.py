@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.body import Drive, Loads, Problem, Push, Route, Solution, array_hash
+from twin.body.drives.spring import Spring, placeholder_springs
 from twin.body.hinge_chain import HingeChain
-from twin.body.spring import Spring, placeholder_springs
 from twin.mechanics.rod import held_trials, tension_trials
 from twin.mechanics.rod.balance.chain import ChainState, ContactLaw, StaticLoad, StaticSystem
 from twin.mechanics.rod.balance.compile_chain import compile_chain

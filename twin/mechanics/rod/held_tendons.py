@@ -18,8 +18,8 @@ import mujoco
 import numpy as np
 
 from twin.body import Drive, Problem
+from twin.body.drives.spring import placeholder_springs
 from twin.body.hinge_chain import HingeChain
-from twin.body.spring import placeholder_springs
 from twin.foundation.by_reference import by_reference
 from twin.foundation.compiled import jit_internal
 from twin.mechanics.rod import ChainSolution, Equilibrium

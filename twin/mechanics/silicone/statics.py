@@ -10,7 +10,7 @@ from twin.body import DIRECT, NOT_FOUND, SOLVE_TOLERANCE, Drive, Loads, Problem,
 from twin.body.strain_cords import resistance
 from twin.effects.contact import obstacle_in_frame
 from twin.foundation.errors import SolveError
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.mechanics.silicone.body import SoftBody
 from twin.mechanics.silicone.newton import NODE_TOLERANCE, NewtonProblem, SoftNeighbour, SoftResult, solve_samples
 from twin.mechanics.silicone.skin import Skin, expected_patches

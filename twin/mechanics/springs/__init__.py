@@ -5,7 +5,7 @@ heat.py       current -> temperature
 response.py   temperature and tension of springs along given elongations, without a robot
 """
 
-from twin.body.spring import Spring, build_springs
+from twin.body.drives.spring import Spring, build_springs
 from twin.mechanics.springs.response import spring_response
 
 __all__ = ["Spring", "build_springs", "spring_response"]

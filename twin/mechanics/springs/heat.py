@@ -13,7 +13,7 @@ of eight coils.
 
 import numpy as np
 
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.foundation.compiled import jit
 
 LEAST_LOSS = 1e-5  # W/K; the fitted polynomial falls below zero some 200 K above ambient, and temperatures must stay finite

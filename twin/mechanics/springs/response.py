@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from twin.body.spring import Spring
+from twin.body.drives.spring import Spring
 from twin.foundation.compiled import jit
 from twin.mechanics.springs.force import tension_piece
 from twin.mechanics.springs.heat import heated_temperature

@@ -15,7 +15,7 @@ from twin.foundation.errors import DataError, SolveError, short_repr
 from twin.mechanics.rod.dynamics import ChainMotion, Dynamics, MotionSamples
 from twin.prediction.mjcf.chain import chain_of
 from twin.prediction.prepared import ROOM_TEMPERATURE
-from twin.prediction.storage import read_twin
+from twin.prediction.twin_file.storage import read_twin
 
 TWIN_FILE = "twin.toml"  # beside the model: the laws that MuJoCo has not
 _NO_MARKERS = np.zeros((1, 0, 3))

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from twin.body.counts import joint_names, tendon_names
+from twin.body.drives.counts import joint_names, tendon_names
 from twin.effects import Effect
 from twin.foundation.errors import DataError
 from twin.foundation.files import is_file
 from twin.foundation.parameters import Parameter
 from twin.mechanics.mjcf import ModelBody
-from twin.prediction.storage import standard_errors
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import standard_errors
 from twin.robots.schemas.mjcf import address_of
 
 

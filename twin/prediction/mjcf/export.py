@@ -30,8 +30,8 @@ from twin.prediction.mjcf.comments import Origins, element_comments, heading
 from twin.prediction.mjcf.natives import write_friction
 from twin.prediction.mjcf.stepper import PREFIX, numbers_of
 from twin.prediction.provenance import run_provenance
-from twin.prediction.storage import twin_table, twin_text
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.storage import twin_table, twin_text
 from twin.robots import load_family
 
 MODEL_FILE = "robot.xml"

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from twin.body.spring import SPRING_PREFIX
+from twin.body.drives.spring import SPRING_PREFIX
 from twin.foundation.parameters import parameter_array
 from twin.robots.schema import FULL_TURN, Row, Schema
 from twin.robots.schemas.motor_rows import MOTOR_ROWS, Motorised, motor_conflicts

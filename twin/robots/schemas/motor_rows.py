@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from twin.body import Drive, Port, Sense
-from twin.body.drive_train import DriveTrain
+from twin.body.drives.drive_train import DriveTrain
 from twin.foundation.parameters import parameter_array
 from twin.robots.schema import FULL_TURN, Row, Structure
 

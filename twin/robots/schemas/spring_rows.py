@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from twin.body.spring import SPRING_PREFIX, SPRING_UNITS
+from twin.body.drives.spring import SPRING_PREFIX, SPRING_UNITS
 from twin.robots.schema import Row
 
 # name -> usual unit, meaning, SI range

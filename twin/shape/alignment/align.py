@@ -20,8 +20,8 @@ from scipy.optimize import fminbound
 
 from twin.body.strain_cords import strain
 from twin.foundation.errors import DataError
+from twin.foundation.parallel import single_thread
 from twin.foundation.parameters import FittedValue
-from twin.foundation.threads import single_thread
 from twin.measurements import Clouds, Recording
 from twin.measurements.patches import camera_direction
 from twin.mechanics.silicone import SoftBody, SoftStatics

@@ -7,7 +7,7 @@ from typing import Any
 
 from twin.foundation.atomic_write import write_atomically
 from twin.foundation.errors import DataError
-from twin.prediction.storage import twin_table, write_twin
+from twin.prediction.twin_file.storage import twin_table, write_twin
 from twin.robots.numbers import in_file_unit, std_in_file_unit
 from twin.shape.alignment.align import Alignment
 from twin.shape.alignment.band_widening import BandWidening

@@ -20,7 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.mechanics.silicone import Cone, SoftStatics
 from twin.mechanics.silicone.single_equilibrium import SoftEquilibrium, hang_at_rest, move_equilibrium, nodal_weight
 from twin.mechanics.silicone.skin_loads import PushSurface, push_surface

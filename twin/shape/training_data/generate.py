@@ -20,7 +20,7 @@ from twin.foundation.parallel import run_parallel
 from twin.foundation.parameters import Parameter, Values
 from twin.mechanics.silicone import SoftBody, SoftStatics
 from twin.mechanics.silicone.single_equilibrium import nodal_weight
-from twin.prediction.storage import read_twin, standard_errors
+from twin.prediction.twin_file.storage import read_twin, standard_errors
 from twin.robots import Robot
 from twin.robots.named_points import named_points
 from twin.shape.training_data import shard

@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.body import DIRECT, NOT_FOUND, Drive, Problem
 from twin.foundation.errors import SolveError
-from twin.foundation.threads import single_thread
+from twin.foundation.parallel import single_thread
 from twin.mechanics.silicone.body import SoftBody
 from twin.mechanics.silicone.material.creep import advance_relaxed_stress
 from twin.mechanics.silicone.material.damping import effective_mass

@@ -16,8 +16,8 @@ from twin.foundation.file_schema import TableSchema, TextLine, validate_table
 from twin.foundation.files import is_file
 from twin.foundation.parameters import FittedValue
 from twin.foundation.toml_file import open_toml
-from twin.prediction.joint_errors import CorrelationTable
 from twin.prediction.twin import Twin
+from twin.prediction.twin_file.joint_errors import CorrelationTable
 from twin.robots import Robot, load, robot_names
 from twin.robots.effect_tables import read_effects, read_values
 from twin.robots.robot import models_folder

@@ -7,7 +7,7 @@ import numpy as np
 
 from twin.foundation.errors import DataError
 from twin.mechanics.mjcf.loading import SCALAR_JOINTS, LoadedModel
-from twin.mechanics.mjcf.precise_xml import WrittenModel, self_contained
+from twin.mechanics.mjcf.xml.precise import WrittenModel, self_contained
 
 ROUNDING = 1e-10  # relative, of numbers that MuJoCo computes in another order from a file than from a changed model
 _INERTIA = ("body_mass", "body_inertia", "body_ipos", "body_iquat")

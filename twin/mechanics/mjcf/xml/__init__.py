@@ -1,0 +1,1 @@
+"""An MJCF as text: to the last digit, and with changed numbers."""

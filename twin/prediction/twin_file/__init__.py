@@ -1,0 +1,1 @@
+"""`twin.toml`, written and read."""
