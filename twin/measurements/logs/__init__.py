@@ -9,8 +9,7 @@
     streams.py      Log, Take, Stream, Field, Clock
     clocks.py       which clock, its unit, skew, rate and gaps
     guess.py        proposals of quantity, role and unit
-    map_text.py     the map as it is written first
-    map_file.py     the map as the user leaves it
+    map/            the map: as it is written first, and as the user leaves it
     stamps.py       streams on one time line
     cut.py          trials by gaps and marks
     assemble.py     log and map to recording
@@ -19,8 +18,8 @@ What cannot be known from a log is asked for, by line, and never assumed.
 """
 
 from twin.measurements.logs.assemble import assemble
-from twin.measurements.logs.map_file import read_map
-from twin.measurements.logs.map_text import map_text
+from twin.measurements.logs.map.map_file import read_map
+from twin.measurements.logs.map.map_text import map_text
 from twin.measurements.logs.open_log import open_log
 
 __all__ = ["assemble", "map_text", "open_log", "read_map"]

@@ -12,7 +12,7 @@ from twin.foundation.files import MAX_SET_NUMBERS, prefix_errors
 from twin.measurements.logs.bags.topics import HEADER_CLOCK, LOG_CLOCK, OWN_CLOCK
 from twin.measurements.logs.clocks import EPOCH_SECONDS, header_skew
 from twin.measurements.logs.cut import LEAST_ROWS, cut_at_gaps, cut_at_marks, cut_into_lengths, marks_of
-from twin.measurements.logs.map_file import ImportMap, StreamClock
+from twin.measurements.logs.map.map_file import ImportMap, StreamClock
 from twin.measurements.logs.stamps import Readings, in_order, on_one_line, stamp_streams, without_infinities
 from twin.measurements.logs.streams import Log, Stream, Take
 from twin.measurements.parsing.plausible import check_roles, check_table, check_trials

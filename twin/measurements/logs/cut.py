@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.map_file import CutTable
+from twin.measurements.logs.map.map_file import CutTable
 from twin.measurements.logs.streams import Stream
 
 LEAST_ROWS = 3  # rows of a trial that can be used

@@ -2,7 +2,7 @@
 
 from twin.measurements.logs.clocks import MAX_RATE, choose_clock, share_one_clock
 from twin.measurements.logs.guess import guess_fields
-from twin.measurements.logs.map_text import describe_range, stream_timing
+from twin.measurements.logs.map.map_text import describe_range, stream_timing
 from twin.measurements.logs.streams import Log
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.foundation.errors import DataError, short_repr
-from twin.measurements.logs.map_file import StreamClock
+from twin.measurements.logs.map.map_file import StreamClock
 from twin.measurements.logs.streams import Clock, Stream
 from twin.measurements.parsing.plausible import MIN_TIME_STEP
 

@@ -14,7 +14,7 @@ def section(story: Story) -> Section:
     return Section(
         "attribution",
         "Other explanations",
-        "attribution.html",
+        "answer/attribution.html",
         {
             "claimed": claimed,
             "unit": DISPLAY_UNITS[headline_group(d)][0],

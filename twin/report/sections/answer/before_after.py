@@ -29,7 +29,7 @@ def section(story: Story) -> Section:
         for g in output_groups(d)
     ]
     content = {"tables": tables, "trials": trial_labels(d, d.held_out_trials), "words": describe_errors(d), "each": bool(d.folds)}
-    return Section("before-after", "Error before and after", "before_after.html", content)
+    return Section("before-after", "Error before and after", "answer/before_after.html", content)
 
 
 def error_rows(d: Diagnosis, group: str) -> list[dict[str, str]]:

@@ -17,7 +17,7 @@ def section(story: Story) -> Section:
     return Section(
         "effects",
         "Missing effects" if len(d.claims) != 1 else "Missing effect",
-        "effects.html",
+        "answer/effects.html",
         {
             "effects": effect_rows(d.claims, headline_group(d)),
             "unit": DISPLAY_UNITS[headline_group(d)][0],

@@ -16,7 +16,7 @@ def section(story: Story) -> Section:
     return Section(
         "left",
         "Remaining error",
-        "leftover.html",
+        "answer/leftover.html",
         {
             "left": remaining_structure(d),
             "description": d.description,

@@ -12,4 +12,4 @@ def section(story: Story) -> Section:
         "separation": "" if e is None else f"{e.separation:.0f}",
         "repeats": 0 if e is None else e.repeats,
     }
-    return Section("next", "Next experiment", "next_experiment.html", content)
+    return Section("next", "Next experiment", "answer/next_experiment.html", content)

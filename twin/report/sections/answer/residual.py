@@ -44,7 +44,7 @@ def section(story: Story) -> Section:
             }
         )
     title = "Where the effect shows" if d.claims else "Residual"
-    return Section("residual", title, "residual.html", {"pairs": pairs, "trials": len(d.prepared.inputs)})
+    return Section("residual", title, "answer/residual.html", {"pairs": pairs, "trials": len(d.prepared.inputs)})
 
 
 def panels_before_after(d: Diagnosis, chosen: ResidualPlot, stages: tuple[TwinStage, TwinStage]) -> list[Plot]:

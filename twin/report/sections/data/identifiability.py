@@ -15,7 +15,7 @@ def section(story: Story) -> Section:
     table = story.diagnosis.identifiability
     lacking = any(v.lacking for v in table if math.isfinite(v.seen))
     return Section(
-        "identifiability", "What these data can show", "identifiability.html", {"rows": _rows(table), "lacking": lacking}
+        "identifiability", "What these data can show", "data/identifiability.html", {"rows": _rows(table), "lacking": lacking}
     )
 
 

@@ -24,4 +24,4 @@ def section(story: Story) -> Section:
         for name, loop in zip(names, d.loops.by_trial, strict=True)
     ]
     plots = {"widths": loop_widths.plot(d), "strains": strain_loops.plot(d)}
-    return Section("loops", "Loops", "loops.html", {"rows": rows, "unit": unit, "words": describe_loops(d.loops), **plots})
+    return Section("loops", "Loops", "data/loops.html", {"rows": rows, "unit": unit, "words": describe_loops(d.loops), **plots})

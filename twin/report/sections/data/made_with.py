@@ -22,7 +22,7 @@ def section(story: Story) -> Section:
         ("robot", f"{d.prepared.robot.name}: {d.prepared.robot.title}"),
         *_flattened(story.provenance),
     ]
-    return Section("made", "How this report was made", "made_with.html", {"facts": facts})
+    return Section("made", "How this report was made", "data/made_with.html", {"facts": facts})
 
 
 def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

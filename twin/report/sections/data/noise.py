@@ -31,4 +31,4 @@ def section(story: Story) -> Section:
         f"{DISPLAY_UNITS[of][1] * s:.3g} {DISPLAY_UNITS[of][0]}" for s, of in zip(d.noise.drive, d.prepared.drives, strict=True)
     ]
     content = {"rows": rows, "inputs": ", ".join(inputs), "origin": d.noise.source}
-    return Section("noise", "Noise", "noise.html", content)
+    return Section("noise", "Noise", "data/noise.html", content)

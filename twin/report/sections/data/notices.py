@@ -7,5 +7,5 @@ from twin.report.sections.section import Section, Story
 def section(story: Story) -> Section:
     """Return the section with the notices."""
     return Section(
-        "notices", "Notices about the data", "notices.html", {"notices": list(dict.fromkeys(all_notices(story.diagnosis)))}
+        "notices", "Notices about the data", "data/notices.html", {"notices": list(dict.fromkeys(all_notices(story.diagnosis)))}
     )

@@ -29,7 +29,7 @@ def section(story: Story) -> Section:
             }
         )
     others = [name for name in d.unfixed if name not in d.parameters]
-    return Section("parameters", "Calibrated parameters", "parameters.html", {"rows": rows, "others": others})
+    return Section("parameters", "Calibrated parameters", "data/parameters.html", {"rows": rows, "others": others})
 
 
 def _list_name(name: str) -> str:

@@ -26,7 +26,7 @@ def section(story: Story) -> Section | None:
         return None
     content["skin"] = skin.plot(d, clouds) if clouds else None
     content["distances"] = skin.describe_distances(d, clouds) if clouds else None
-    return Section("shapes", "Shapes", "shapes.html", content)
+    return Section("shapes", "Shapes", "data/shapes.html", content)
 
 
 def choose_poses(d: Diagnosis) -> list[tuple[int, int]]:

@@ -30,7 +30,7 @@ def section(story: Story) -> Section:
     name, columns = (seen or whole)[-1] if whole else _first_group(d)
     k = _most_different_trial(d, columns)
     content = {"trial": trial_labels(d, (k,))[0], "name": name, "plot": _plot(d, k, columns), "distance": bool(whole)}
-    return Section("tip", "One trial over time", "tip.html", content)
+    return Section("tip", "One trial over time", "data/tip.html", content)
 
 
 def _first_group(d: Diagnosis) -> tuple[str, list[int]]:

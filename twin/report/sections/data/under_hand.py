@@ -24,7 +24,9 @@ def section(story: Story) -> Section | None:
         }
         for k, (b, a, s) in enumerate(zip(check.rms_before, check.rms_after, check.strain_error, strict=True))
     ]
-    return Section("under-hand", "Sensors under a hand", "under_hand.html", {"rows": rows, "words": describe_hand_check(check)})
+    return Section(
+        "under-hand", "Sensors under a hand", "data/under_hand.html", {"rows": rows, "words": describe_hand_check(check)}
+    )
 
 
 def describe_hand_check(check: PushedTrialCheck) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.measurements.logs.clocks import MAX_RATE, ClockChoice, Timing, choose_clock, share_one_clock, timing
 from twin.measurements.logs.guess import UNKNOWN, Guess, guess_fields
-from twin.measurements.logs.map_file import MAP_FORMAT
+from twin.measurements.logs.map.map_file import MAP_FORMAT
 from twin.measurements.logs.streams import Field, Log, Stream
 from twin.measurements.logs.tables.folder import stem
 from twin.measurements.parsing.toml_text import toml_value
