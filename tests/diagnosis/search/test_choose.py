@@ -99,7 +99,7 @@ def moving(budget: Budget) -> Any:
 def test_the_chosen_fit_of_motion_goes_on_to_its_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
     base, best = weighed(score=0.0, size=6.0, unseen=4.0), weighed("drift", score=50.0, size=1.0, unseen=9.0)
     closer = weighed("drift", score=55.0, size=1.0, unseen=8.0)
-    monkeypatch.setattr(stage, "_converged", lambda study, rough: closer)
+    monkeypatch.setattr(stage, "converged", lambda study, rough: closer)
     assert choose(moving(Budget()), searched(base, best), AcceptanceLimits()) == Search(base, closer, (closer, base))
     late = moving(Budget(-1.0))
     assert choose(late, searched(base, best), AcceptanceLimits()) == searched(base, best)
@@ -114,7 +114,7 @@ def test_of_two_near_each_other_the_better_at_its_minimum_is_chosen(monkeypatch:
     limit, far = weighed("limit", score=900.0, size=1.0, unseen=1.0), weighed("drift", score=500.0, size=1.0, unseen=1.0)
     pair = weighed("drift", "gain", score=955.0, size=1.0, unseen=1.0)
     minimum = {("gain",): 960.0, ("limit",): 970.0}
-    monkeypatch.setattr(stage, "_converged", lambda study, w: SimpleNamespace(**vars(w) | {"score": minimum[w.effects]}))
+    monkeypatch.setattr(stage, "converged", lambda study, w: SimpleNamespace(**vars(w) | {"score": minimum[w.effects]}))
     found = choose(moving(Budget()), Search(base, gain, (pair, gain, limit, far, base)), AcceptanceLimits())
     assert (found.best.effects, found.best.score) == (("limit",), 970.0)
     assert [w.score for w in found.all] == [970.0, 960.0, 955.0, 500.0, 0.0]
@@ -151,7 +151,7 @@ def test_two_effects_that_halve_it_together_must_take_a_quarter_each(unseen: flo
 @pytest.mark.parametrize(("effects", "sought"), [(("ropes",), True), (("drives", "ropes"), False)])
 def test_beside_a_pair_nothing_more_is_sought(monkeypatch: pytest.MonkeyPatch, effects: tuple[str, ...], sought: bool) -> None:
     core = weighed(*effects, score=1.0, size=3.5, unseen=1.0)
-    monkeypatch.setattr(stage, "_converged", lambda study, rough: rough)
+    monkeypatch.setattr(stage, "converged", lambda study, rough: rough)
     asked: list[Any] = []
     monkeypatch.setattr(stage, "add_one_effect", lambda study, core, found, bars: asked.append(core) or core)
     study: Any = SimpleNamespace(accuracy=0.0, budget=SimpleNamespace(allows=lambda what: True))
@@ -196,7 +196,7 @@ def test_beside_the_core_stays_what_has_evidence_and_predicts(
     monkeypatch.setattr(stage, "extend", extend)
     monkeypatch.setattr(stage, "dictionary", lambda objective, fit: "patterns" if fit is core.fit else None)
     monkeypatch.setattr(stage, "solves", lambda study, twin: stands or "play" not in twin.effects)
-    monkeypatch.setattr(stage, "_converged", lambda study, rough: rough)
+    monkeypatch.setattr(stage, "converged", lambda study, rough: rough)
     study: Any = SimpleNamespace(accuracy=0.0, objective=STUDY.objective, progress=lambda words: None)
     assert add_one_effect(study, core, searched(base, core), AcceptanceLimits(accept=12.0)) is (more if taken else core)
 

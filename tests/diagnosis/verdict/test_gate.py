@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from twin.body import Drive
+from twin.diagnosis.budget import Budget
 from twin.diagnosis.checks.identifiability import Visibility
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.search.screen import Screening
@@ -28,7 +29,8 @@ class World:
         self.plainly: dict[str, float] = {}  # by how many sigmas an effect moves the outputs as they are; negative: away from them
         self.plain_history = 0.0  # what of that depends on more than the pose
         self.context: Any = SimpleNamespace(
-            objective=SimpleNamespace(n=N), progress=lambda words: None, fall_by_group=lambda a, b: a.z**2 - b.z**2,
+            objective=SimpleNamespace(n=N, bends=False), budget=Budget(), progress=lambda words: None,
+            fall_by_group=lambda a, b: a.z**2 - b.z**2,
             evidence=SimpleNamespace(beyond_pose=self.beyond_pose), unwhitened=lambda fit: fit.plain, accuracy=0.0,
             excused=np.full(2, np.inf),
         )  # fmt: skip
@@ -194,6 +196,22 @@ def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(
     assert world.gated("friction", table=(row("friction", apart=0.4),)).best.effects == ("friction",), "the design tells them"
     world.of = _as_good(world, "friction", 30.0)  # type: ignore[method-assign]
     assert world.gated("friction", table=(row("friction", apart=0.6),)).best.effects == ("friction",), "the data tell them"
+
+
+def test_of_motion_the_rival_is_fitted_whatever_the_design_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rival that ended 300 behind and takes all but 20 of |z|^2 at its minimum; one 500 behind is not fitted further."""
+    world = World(monkeypatch, friction=0.5, rival=0.0)
+    world.context.objective.bends, table = True, (row("friction", apart=0.4),)
+    monkeypatch.setattr(stage, "converged", lambda study, w: SimpleNamespace(**vars(w) | {"score": w.score + 280.0}))
+    world.of = _as_good(world, "friction", 300.0)  # type: ignore[method-assign]
+    found = world.gated("friction", table=table)
+    assert [(d.effect, d.other.effects) for d in found.doubts] == [("friction", ("rival",))]
+    world.of = _as_good(world, "friction", 500.0)  # type: ignore[method-assign]
+    assert world.gated("friction", table=table).best.effects == ("friction",)
+    world.of = _as_good(world, "friction", 20.0)  # type: ignore[method-assign]
+    world.context.budget = Budget(-1.0)
+    assert world.gated("friction", table=table).best.effects == ("friction",)
+    assert world.context.budget.untried == ["rival"]
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def choose(context: FitContext, found: Search, limits: AcceptanceLimits) -> Sear
         if context.objective.bends and best is not found.base:
             return _with_last_steps(context, found, best)
         return Search(found.base, best, _with(found, best))
-    core = _converged(context, core)
+    core = converged(context, core)
     alone = len(core.effects) == len(found.base.effects) + 1
     if alone and context.budget.allows(f"what there is beside {' + '.join(core.effects)}"):
         core = add_one_effect(context, core, found, limits)
@@ -50,7 +50,7 @@ def _with_last_steps(context: FitContext, found: Search, best: ScoredModel) -> S
         if not context.budget.allows(name):
             break
         context.progress(name)
-        closer = _converged(context, rough)
+        closer = converged(context, rough)
         found = replace(found, all=_with(found, closer))
         if rough is best or (closer.score > best.score and solves(context, closer.fit.model.twin)):
             best = closer
@@ -108,10 +108,11 @@ def add_one_effect(context: FitContext, core: ScoredModel, found: Search, limits
     limit = LEFT_BY_EACH_EFFECT * left_out(context, core.fit).square
     helpful = [w for w in fresh.values() if left_out(context, w.fit).square <= limit and solves(context, w.fit.model.twin)]
     best = max(helpful, key=lambda w: w.score, default=core)
-    return _converged(context, best) if best.score >= core.score + limits.accept else core
+    return converged(context, best) if best.score >= core.score + limits.accept else core
 
 
-def _converged(context: FitContext, rough: ScoredModel) -> ScoredModel:
+def converged(context: FitContext, rough: ScoredModel) -> ScoredModel:
+    """Return a candidate fitted to its minimum; of motion by derivatives in short steps alone."""
     objective = context.objective.precise() if context.objective.bends else context.objective
     return score_model(context, fit(objective, rough.fit.model, near=rough.fit.evaluation, refresh=True))
 

@@ -8,10 +8,11 @@ from twin.diagnosis.evidence.left_out import left_out, proven
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, with_effect_added
 from twin.diagnosis.fit_context import FitContext
+from twin.diagnosis.search.choose import converged
 from twin.diagnosis.search.lag_or_delay import LATE, tells_laws
 from twin.diagnosis.search.screen import Screening
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LARGE_STRUCTURE, LAW_FORM_SHARE, LEFT_BY_EFFECTS
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LARGE_STRUCTURE, LARGEST_SCORE_GAP, LAW_FORM_SHARE, LEFT_BY_EFFECTS
 
 
 @dataclass(frozen=True)
@@ -137,8 +138,9 @@ def _ambiguity(
 ) -> Ambiguity | None:
     """Return the first ambiguity: an effect whose closest rival in its place explains the data as well; None if there is none.
 
-    Only effects smaller than the design can separate from the rival are tried; "as well" is within five standard errors. A rival in
-    the candidate itself was fitted beside the effect. A lag or a delay that `lag_or_delay` scored is claimed with its odds.
+    Only effects smaller than the design can separate from the rival are tried; of motion all, since what separates small effects
+    need not separate large ones (a limit that drives run into, and their gain). "As well" is within five standard errors. A rival
+    in the candidate itself was fitted beside the effect. A lag or a delay that `lag_or_delay` scored is claimed with its odds.
     """
     rows, form = {(v.effect, v.form): v for v in screening.table}, dict(best.forms)
     for effect in sorted(without, key=lambda e: contribution(context, best, without[e])):
@@ -147,7 +149,7 @@ def _ambiguity(
             continue
         if {effect, row.rival} == LATE and tells_laws(context):
             continue
-        if contribution(context, best, without[effect]) >= row.apart:
+        if contribution(context, best, without[effect]) >= row.apart and not context.objective.bends:
             continue
         other = _in_its_place(context, found, screening, without[effect], row.rival)
         if other is not None and other.score > best.score - CLEAR_CHI_SQUARE:
@@ -159,8 +161,11 @@ def _in_its_place(context: FitContext, found: Search, screening: Screening, rest
     """Return the set `rest` with the rival, as the search fitted it or fitted now; None without an equilibrium."""
     effects = tuple(sorted((*rest.effects, rival)))
     weighed = [w for w in found.all if w.effects == effects]
-    if not weighed:
-        context.progress(f"{rival} in its place")
-        starts = [p.start for p in screening.patterns.patterns if p.effect == rival]
-        weighed = [w for start in starts if (w := with_effect_added(context, rest, rival, start)) is not None]
-    return max(weighed, key=lambda w: w.score, default=None)
+    if weighed or not context.budget.allows(" + ".join((*rest.effects, rival))):
+        return max(weighed, key=lambda w: w.score, default=None)
+    context.progress(f"{rival} in its place")
+    starts = [p.start for p in screening.patterns.patterns if p.effect == rival]
+    fresh = [w for start in starts if (w := with_effect_added(context, rest, rival, start)) is not None]
+    other = max(fresh, key=lambda w: w.score, default=None)
+    near = other is not None and context.objective.bends and other.score > found.best.score - LARGEST_SCORE_GAP
+    return converged(context, other) if other is not None and near else other
