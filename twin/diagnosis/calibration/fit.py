@@ -214,8 +214,7 @@ def fit(
         elif fall < enough or now > beat:
             break
     if refresh:
-        stale = not objective.bends or since - now > objective.smallest_fall(1.0, now)[1]
-        which = range(len(model.free)) if stale else moving
+        which = moving if objective.bends and since - now <= objective.smallest_fall(1.0, now)[1] else range(len(model.free))
         columns[:, which] = objective.jacobian(at, which)
     return Fit(at, columns, float(at.z @ at.z) + penalty.believed(at.model.vector()), trust=penalty.trust(at.z))
 
