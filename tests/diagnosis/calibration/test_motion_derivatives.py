@@ -112,6 +112,30 @@ def test_motion_that_is_lost_in_long_steps_alone_is_taken_by_short_ones(
     assert 0.0 < off.max() < COARSE_ERROR
 
 
+def test_where_motion_is_lost_on_one_side_the_other_gives_the_derivative(
+    swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A servo that is unstable if it is any stronger, and one that is unstable either way."""
+    objective, model = swung
+    at, which = objective.evaluate(model), range(len(model.free))
+    right, kp, predict = objective.jacobian(at, which), model.value(model.free[3]), Objective.predict
+
+    def lost(to: float) -> Any:
+        def found(self: Objective, twin: Twin, *rest: Any, **more: Any) -> Any:
+            if (twin.values["actuator.servo.kp"] - kp) * to > 0.0 or (to == 0.0 and twin.values["actuator.servo.kp"] != kp):
+                raise SolveError("diverges")
+            return predict(self, twin, *rest, **more)
+
+        return found
+
+    monkeypatch.setattr(Objective, "predict", lost(1.0))
+    # The tried move of all parameters is lost too, so that steps are short and differences large here: they err by 2e-3 and more.
+    off = np.linalg.norm(objective.jacobian(at, which) - right, axis=0) / np.linalg.norm(right, axis=0)
+    assert off.max() < 0.05
+    monkeypatch.setattr(Objective, "predict", lost(0.0))
+    assert not objective.jacobian(at, which)[:, 3].any()
+
+
 def test_only_derivatives_that_changed_are_computed_again(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
     objective, model = swung
     at, which = objective.evaluate(model), list(range(len(model.free)))

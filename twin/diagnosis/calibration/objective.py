@@ -38,7 +38,7 @@ LARGEST_LAST_FALL = 3.0  # of |z|^2, by which a fit of motion ends: fast logs ha
 MISFIT_SHARE = 2e-3
 CHANGED_SHARE = 0.05  # of a derivative, by which it changed too much to be kept
 
-Unsolved = Literal["raise", "zeros"]
+Unsolved = Literal["raise", "zeros", "nan"]
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Objective:
         """Return the whitened change of the residual per unit (n, n_model), for neighbouring models and the difference of each.
 
         `once` solves to first order in the difference; motion is simulated in long steps where these serve, else in short ones. A
-        model without an equilibrium, or whose motion is lost, raises SolveError, or has a column of zeros with `unsolved` "zeros".
+        model without an equilibrium, or whose motion is lost, raises SolveError, or has a column of zeros or of NaN (`unsolved`).
         """
         if not models:
             return np.zeros((at.z.size, 0))
@@ -172,7 +172,7 @@ class Objective:
             except SolveError:
                 if unsolved == "raise":
                     raise
-                return np.zeros(at.z.size)
+                return np.full(at.z.size, 0.0 if unsolved == "zeros" else np.nan)
 
         with Parallel(n_jobs=self.jobs, prefer="threads", require="sharedmem") as parallel:
             done: Any = parallel(delayed(column)(m, s) for m, s in models)
@@ -231,18 +231,26 @@ class Objective:
         return [self.prepared.measured[k] - y for k, y in zip(self.trials, predicted, strict=True)]
 
     def jacobian(self, at: Evaluation, which: Sequence[int]) -> np.ndarray:
-        """Return dz/dx (n, len(which)) for the listed free parameters, x in steps."""
+        """Return dz/dx (n, len(which)) for the listed free parameters, x in steps.
+
+        Where motion is lost on one side, by the difference to the other; a parameter that may not move to either has zeros.
+        """
         x, difference = at.model.vector(), PARAMETER_DIFFERENCE
         if self.bends and len(which):
             difference = self._differences_at(at, any(at.model.free[i].effect is None for i in which)).size
-        neighbours = []
-        for i in which:
-            p = at.model.free[i].parameter
-            size = difference if (x[i] + difference) * p.step <= p.high else -difference
-            moved = x.copy()
-            moved[i] += size
-            neighbours.append((at.model.at(moved), size))
-        return self.columns(at, neighbours, once=True)
+        ranges = [(p.low / p.step, p.high / p.step) for p in (at.model.free[i].parameter for i in which)]
+        sizes = [difference if x[i] + difference <= high else -difference for i, (_, high) in zip(which, ranges, strict=True)]
+
+        def neighbour(i: int, size: float) -> tuple[Model, float]:
+            return at.model.at(x + size * (np.arange(x.size) == i)), size
+
+        unsolved: Unsolved = "nan" if self.bends else "raise"
+        J = self.columns(at, [neighbour(i, s) for i, s in zip(which, sizes, strict=True)], once=True, unsolved=unsolved)
+        for k, (i, size, (low, high)) in enumerate(zip(which, sizes, ranges, strict=True)):
+            if np.isnan(J[:, k]).all():
+                back = [neighbour(i, -size)] if low <= x[i] - size <= high else []
+                J[:, k] = self.columns(at, back, once=True, unsolved="zeros").sum(axis=1)
+        return J
 
     def renewed(self, at: Evaluation, which: Sequence[int], known: np.ndarray) -> np.ndarray:
         """Return dz/dx (n, len(which)) as `jacobian`, with columns of `known`, of the same shape, where these hardly changed.
