@@ -1,8 +1,8 @@
 """Named tuples that compiled functions get as one pointer instead of by value.
 
 Numba passes a named tuple by value: each use of it, and of each tuple in it, copies all its arrays and counts their references, so
-the code grows with uses times arrays. The rod's statics, whose system holds some 90 arrays, compiled in 34 s by value and in 18 s
-by reference, and a trial took 0.115 and 0.084 s (one core, 2026-11-30).
+the code grows with uses times arrays. The rod's statics, where the state of a trial holds 65 arrays, compiled in 34 s by value and
+in 18 s by reference; a prediction of the bundled recording took 0.115 and 0.084 s (one core, 2026-11-30).
 """
 
 from __future__ import annotations
