@@ -30,8 +30,8 @@ from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT, NAMED_ONE_BY_O
 from twin.effects import effect_class
 from twin.foundation.errors import DataError, SolveError
 from twin.foundation.parameters import Parameter
-from twin.prediction.damping import without_damping
 from twin.prediction.evaluate import OUTPUT_GROUPS
+from twin.prediction.motion import without_damping
 from twin.prediction.prepared import PreparedRecording
 
 

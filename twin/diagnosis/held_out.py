@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,30 +50,27 @@ class HeldOut:
     def trials(self) -> list[int]:
         return sorted(k for _, trials in self.parts for k in trials)
 
-    def predictions(self, pick: Pick) -> dict[int, np.ndarray]:
+    def predictions(self, pick: Pick, rows: PreparedRecording | None = None) -> dict[int, np.ndarray]:
         """Return outputs (n_k, n_output) SI of each held-out trial, by the twin that `pick` selects of its conclusion.
 
-        NaN where that twin has no equilibrium.
+        In other `rows` of the log, if given; NaN where that twin has no equilibrium.
         """
         out: dict[int, np.ndarray] = {}
         for conclusion, trials in self.parts:
-            twin = pick(conclusion)
-            out |= dict(zip(trials, predicted(twin, self.prepared, trials), strict=True))
+            out |= dict(zip(trials, predicted(pick(conclusion), rows or conclusion.context.prepared, trials), strict=True))
         return out
 
-    def error(self, pick: Pick) -> float:
+    def error(self, pick: Pick, rows: PreparedRecording | None = None) -> float:
         """Return the RMS error of the headline outputs, SI; NaN where some trial cannot be predicted."""
-        at = self.predictions(pick)
+        at, of = self.predictions(pick, rows), rows or self.prepared
         if any(np.isnan(y).all() for y in at.values()):
             return float("nan")
-        groups = [o.group for o in self.prepared.outputs]
-        return rms(self.prepared, [self.prepared.measured[k] - at[k] for k in self.trials], headline_group(groups))
+        return rms(of, [of.measured[k] - at[k] for k in self.trials], headline_group(o.group for o in of.outputs))
 
     def in_all_rows(self, whole: PreparedRecording) -> tuple[float, float, str]:
         """Return the RMS error of the headline outputs in the rows used and in those of the `whole` log, and the unit of both."""
         shown = OUTPUT_GROUPS[headline_group(o.group for o in self.prepared.outputs)]
-        full = replace(self, prepared=whole)
-        return shown.factor * self.error(lambda c: c.final), shown.factor * full.error(lambda c: c.final), shown.unit
+        return shown.factor * self.error(lambda c: c.final), shown.factor * self.error(lambda c: c.final, whole), shown.unit
 
     def rezeroed(self, group: str) -> tuple[float, float]:
         """Return the RMS error (SI) of one group of outputs by the final twins, twice.

@@ -40,12 +40,13 @@ from twin.foundation.display_names import display_name
 from twin.foundation.errors import DataError
 from twin.foundation.parallel import single_thread
 from twin.measurements import Recording
-from twin.prediction.damping import damped_as_measured, without_damping
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms
+from twin.prediction.motion import motion_as_measured, moving_like, with_swing
 from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.twin import Twin
 
+SWINGING = "commands are so fast that shapes swing: what steps of the robot add to its statics is part of each prediction"
 OnPreview = Callable[[DataPreview], None]
 
 
@@ -79,7 +80,7 @@ def diagnose(
         found, held_out = _held_out_diagnosis(recording, preview, twin, settings, progress)
         if every == 1:
             return found
-        whole = whole if any(i.damped for i in preview.prepared.inputs) else without_damping(whole)
+        whole = moving_like(whole, preview.prepared, twin)
         return replace(found, notices=(*found.notices, thinning_words(log, every, *held_out.in_all_rows(whole))))
 
 
@@ -110,11 +111,35 @@ def conclude(
     settings: Settings,
     progress: Progress,
 ) -> Conclusion:
-    """Run all stages without the measurements of the held-out trials."""
-    context, base, notes = calibrate(prepared, twin, held_out, nominal, settings, progress)
+    """Run all stages without the measurements of the held-out trials.
+
+    Fast motion is predicted by what steps of one robot add to statics: of the calibrated one, where that is nearer to the data than
+    the robot as described, and once more of the twin that was found, where that does not explain them.
+    """
+    calibrated = calibrate(prepared, twin, held_out, nominal, settings, progress)
+    if (again := _moving_like_found(calibrated[0], calibrated[1], prepared)) is not None:
+        calibrated = calibrate(again, calibrated[1].fit.model.twin, held_out, nominal, settings, progress)
+    found = _concluded(*calibrated, settings)
+    if settings.budget is None and found.judged.verdict not in ("noise", "explained"):
+        again = _moving_like_found(found.context, found.judged.final, prepared)
+        if again is not None:
+            found = _concluded(*calibrate(again, found.base, held_out, nominal, settings, progress), settings)
+    return found
+
+
+def _concluded(context: FitContext, base: ScoredModel, notes: Sequence[str], settings: Settings) -> Conclusion:
     screening = screen(context, base, settings.seed)
     found, gated, judged = decide(context, base, screening)
-    return Conclusion(context, screening, found, gated, judged, (*notes, *context.budget.words()))
+    swing = [SWINGING] if any(i.swing is not None for i in context.prepared.inputs) else []
+    return Conclusion(context, screening, found, gated, judged, (*notes, *swing, *context.budget.words()))
+
+
+def _moving_like_found(context: FitContext, found: ScoredModel, prepared: PreparedRecording) -> PreparedRecording | None:
+    """Return the recording, its motion that of a model found in it; None where that does not show or is no nearer to the data."""
+    twin, traces = found.fit.model.twin, found.fit.evaluation.traces
+    shown = [traces[k].outputs(twin, context.prepared) if k in traces else y for k, y in enumerate(context.prepared.measured)]
+    again = with_swing(context.prepared, twin, shown, context.trials)
+    return None if again is None else replace(prepared, inputs=again[0].inputs)
 
 
 def decide(context: FitContext, base: ScoredModel, screening: Screening) -> tuple[Search, Gated, Judgement]:
@@ -214,7 +239,7 @@ def _diagnosis(
         ambiguous=judged.ambiguous,
         experiment=_experiment(found, settings),
         recording=recording,
-        prepared=replace(prepared, measured=tuple(measured)),
+        prepared=replace(prepared, inputs=context.prepared.inputs, measured=tuple(measured)),
         fitted_trials=tuple(context.trials),
         held_out_trials=tuple(held_out.trials),
         folds=folds if len(parts) > 1 else (),
@@ -275,7 +300,7 @@ def _predictions(
     for name, pick in (("calibrated", lambda c: c.base), ("after", lambda c: c.final)):
         unseen = held_out.predictions(pick)
         open_ = [k for k in range(len(prepared.inputs)) if k not in unseen]
-        seen = dict(zip(open_, predicted(pick(found), prepared, open_), strict=True))
+        seen = dict(zip(open_, predicted(pick(found), found.context.prepared, open_), strict=True))
         out[name] = [(unseen | seen)[k] for k in range(len(prepared.inputs))]
     return out
 
@@ -301,8 +326,8 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     prepared = whole if every == 1 else prepare(part, twin.robot)
     as_described = predicted(twin, prepared, list(range(len(prepared.inputs))))
     fitted, held_out = split(prepared, settings.seed)
-    prepared, nominal = damped_as_measured(prepared, twin, as_described, fitted)
-    whole = whole if any(i.damped for i in prepared.inputs) else without_damping(whole)
+    prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted)
+    whole = moving_like(whole, prepared, twin)
     seen, alone = without_spikes(blind(prepared, held_out), nominal)
     start, objective, _ = objective_of(seen, twin, fitted, settings)
     found = fit(objective, start, refresh=True)

@@ -51,6 +51,7 @@ class Inputs:
     reach: np.ndarray | None = None  # (n_tendon,) of controls: how far they go from there
     turned: bool = False  # whether orientations are compared
     damped: bool = False  # whether tensions are so fast that the body's damping shows
+    swing: np.ndarray | None = None  # (n, n_output) SI, what steps add to outputs of static shapes
 
     @property
     def pull(self) -> np.ndarray:

@@ -30,14 +30,16 @@ UNEVEN_STEPS = 0.5  # of the mean step, by which the median step is off it where
 
 @dataclass(frozen=True)
 class Trace:
-    """One simulated trial: the true signals, and the solution that they came from."""
+    """One simulated trial: the true signals, the solution that they came from, and what steps add to the outputs of statics."""
 
     true: Signals
     solution: Solution | None
+    swing: np.ndarray | None = None  # (n, n_output)
 
     def outputs(self, twin: Twin, prepared: PreparedRecording) -> np.ndarray:
         """Return the recording's output channels as the twin's sensors report them, (n, n_output)."""
-        return output_columns(prepared, twin.effect_chain.sense(self.true))
+        columns = output_columns(prepared, twin.effect_chain.sense(self.true))
+        return columns if self.swing is None else columns + self.swing
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,8 @@ class TrialSimulator:
         travel = np.where(driven.driven_by_length, driven.displacement, shortening)
         markers = self.body.frame.to_marker_frame(solution.markers)
         others = {**solution.others, **(self._orientations(inputs.time, solution, problem.loads) if inputs.turned else {})}
-        return Trace(driven.with_changes(tension=tension, displacement=travel, markers=markers, others=others), solution)
+        true = driven.with_changes(tension=tension, displacement=travel, markers=markers, others=others)
+        return Trace(true, solution, None if self.steps else inputs.swing)
 
     def _course(self, inputs: Inputs, driven: Signals) -> tuple[np.ndarray, np.ndarray] | None:
         """Return times and commands between rows where effects change controls: late or filtered, these have other corners."""

@@ -73,7 +73,8 @@ def run(case: Case, seed: int) -> Row:
     """Roll out one case, diagnose it, and return what was found."""
     robot = load(case.robot)
     laws = [(name, values) for name, values in EFFECTS[case.effect] if effect_class(name).needs <= robot.build().features]
-    if case.effect != "none" and not laws:
+    weightless = case.effect == "payload" and not np.any(robot.gravity)
+    if case.effect != "none" and (weightless or not laws):
         return {**asdict(case), "day": case.day, "not made": "no such effect acts on it"}
     described = Twin.of(robot)
     effects = [scaled_effect(effect_class(name), values, robot.n_tendon, robot.size) for name, values in laws[:1]]

@@ -12,7 +12,7 @@ from twin.diagnosis.fit_context import Progress, silent
 from twin.diagnosis.split import blind, split
 from twin.diagnosis.thresholds import FEWEST_TRIALS_FOR_HELD_OUT
 from twin.foundation.errors import SolveError
-from twin.prediction.damping import damped_as_measured
+from twin.prediction.motion import motion_as_measured, without_swing
 from twin.prediction.prepared import PreparedRecording
 from twin.prediction.simulate import simulate, unstable_starts
 from twin.prediction.twin import Twin
@@ -49,10 +49,10 @@ def preview_data(prepared: PreparedRecording, twin: Twin, settings: Settings, pr
         raise SolveError("\n".join([str(error), *(f"Suspicion: {s.words}. Change: {s.change}." for s in found)])) from None
     as_described = [t.outputs(twin, prepared) for t in traces]
     fitted = [k for k in range(len(prepared.inputs)) if k not in held_out]
-    prepared, nominal = damped_as_measured(prepared, twin, as_described, fitted)
+    prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted)
     unstable = tuple(f"{name}: unstable start, its shape is one of several" for name in unstable_starts(prepared, traces))
     progress("possible mistakes in the files")
-    found = suspicions(prepared, twin, held_out, nominal)
+    found = suspicions(without_swing(prepared), twin, held_out, nominal)
     return DataPreview(
         replace(prepared, notices=(*prepared.notices, *unstable)), tuple(held_out), nominal, found, loops(blind(prepared, held_out))
     )

@@ -86,7 +86,7 @@ def menu(prepared: PreparedRecording) -> list[tuple[str, Inputs]]:
         for motion, time, command in shapes:
             warm = np.full(len(time), like.temperature[0])
             own = {"time": time, "clock": last + time, "command": command, "temperature": warm, "loads": loads, "clouds": None}
-            out.append((f"{motion}, {load}", replace(like, name=f"{motion}, {load}", **own)))
+            out.append((f"{motion}, {load}", replace(like, name=f"{motion}, {load}", swing=None, **own)))
     return out
 
 

@@ -1,0 +1,121 @@
+"""How far shapes lag behind fast commands and swing past them: decided by the data, where commands are so fast."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from twin.body import Drive
+from twin.foundation.errors import SolveError
+from twin.prediction.evaluate import OUTPUT_GROUPS
+from twin.prediction.prepared import PreparedRecording
+from twin.prediction.simulate import can_step, simulate
+from twin.prediction.twin import Twin
+
+LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
+SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
+
+
+def motion_as_measured(
+    prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int]
+) -> tuple[PreparedRecording, tuple[np.ndarray, ...]]:
+    """Return the recording, to be predicted as the listed trials show that it moves, and that prediction.
+
+    `predicted` (n_k, n_output) SI, of all trials, is by statics with the body's damping. The damping of a body is seldom known, and
+    steps of MuJoCo need some; a body of less follows its tensions sooner. What is later than the damping allows is no reason to
+    leave it out. Where inertia shows, steps are tried (`with_swing`).
+
+    Nothing is calibrated yet: what an affine map of the prediction explains, a camera that is not aligned or a body too stiff, does
+    not count. Trials that pull and never release hardly tell a late body from a stiff one.
+    """
+    if Drive.CONTROL in prepared.drives:
+        return prepared, tuple(predicted)
+    if any(i.damped for i in prepared.inputs):
+        at_once = without_damping(prepared)
+        with suppress(SolveError):
+            other = _predicted(at_once, twin)
+            if _closer(prepared, trials, predicted, other) > 0.0:
+                prepared, predicted = replace(at_once, notices=(*at_once.notices, SOONER)), other
+    found = with_swing(prepared, twin, predicted, trials)
+    return (prepared, tuple(predicted)) if found is None else found
+
+
+def with_swing(
+    prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int]
+) -> tuple[PreparedRecording, tuple[np.ndarray, ...]] | None:
+    """Return the recording with what steps of this twin add to its statics, in each output, and its prediction.
+
+    None where that is less than can be seen, or no nearer to the listed trials than `predicted` (n_k, n_output), and where the
+    steps are lost. Of a twin that differs, statics and this addition together err by the change of the addition alone.
+    """
+    still = without_swing(prepared)
+    try:
+        static = _predicted(still, twin)
+        moving = _stepped(still, twin) if swings(still, static) else static
+    except SolveError:
+        return None
+    return (_swinging(still, moving, static), moving) if _closer(prepared, trials, predicted, moving) > 0.0 else None
+
+
+def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray]) -> bool:
+    """Return whether inertia may show in the outputs (n_k, n_output) of statics, and the robot can be stepped.
+
+    A mode of circular frequency w that follows x(t) is off by x''/w^2 to first order; the lowest mode counts.
+    """
+    if not can_step(prepared) or Drive.CURRENT in prepared.drives:
+        return False
+    w = 2.0 * np.pi * prepared.robot.build().first_mode_frequency()
+    sigma = np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
+    off = [
+        np.gradient(np.gradient(y, i.time, axis=0), i.time, axis=0) / (w**2 * sigma)
+        for y, i in zip(predicted, prepared.inputs, strict=True)
+        if len(i.time) > 2
+    ]
+    return bool(off) and float(np.sqrt(np.nanmean(np.concatenate(off) ** 2))) > LEAST_SWING
+
+
+def moving_like(whole: PreparedRecording, prepared: PreparedRecording, twin: Twin) -> PreparedRecording:
+    """Return all rows of a recording, to be predicted as `prepared` is, some of its rows."""
+    whole = whole if any(i.damped for i in prepared.inputs) else without_damping(whole)
+    if all(i.swing is None for i in prepared.inputs):
+        return whole
+    with suppress(SolveError):
+        whole = _swinging(whole, _stepped(whole, twin), _predicted(whole, twin))
+    return whole
+
+
+def without_swing(prepared: PreparedRecording) -> PreparedRecording:
+    """Return the recording, to be predicted by statics alone."""
+    return replace(prepared, inputs=tuple(replace(i, swing=None) for i in prepared.inputs))
+
+
+def without_damping(prepared: PreparedRecording) -> PreparedRecording:
+    """Return the recording, its shapes to be predicted as if they followed tensions at once."""
+    return replace(prepared, inputs=tuple(replace(i, damped=False) for i in prepared.inputs))
+
+
+def _predicted(prepared: PreparedRecording, twin: Twin) -> tuple[np.ndarray, ...]:
+    return tuple(t.outputs(twin, prepared) for t in simulate(twin, prepared))
+
+
+def _stepped(prepared: PreparedRecording, twin: Twin) -> tuple[np.ndarray, ...]:
+    return tuple(t.outputs(twin, prepared) for t in simulate(twin, prepared, dynamic=True))
+
+
+def _swinging(prepared: PreparedRecording, moving: Sequence[np.ndarray], static: Sequence[np.ndarray]) -> PreparedRecording:
+    each = zip(prepared.inputs, moving, static, strict=True)
+    return replace(prepared, inputs=tuple(replace(i, swing=m - s) for i, m, s in each))
+
+
+def _closer(prepared: PreparedRecording, trials: Sequence[int], first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> float:
+    """Return by how much |z|^2 of the listed trials is less of the second prediction than of the first."""
+    y, before, after = (np.concatenate([of[k] for k in trials]) for of in (prepared.measured, first, second))
+    A, fall = np.column_stack([np.ones(len(y)), before]), 0.0
+    for j, o in enumerate(prepared.outputs):
+        seen = np.isfinite(y[:, j])
+        r = (y[:, j : j + 1] - np.column_stack([before[:, j], after[:, j]]))[seen]
+        left = r - A[seen] @ np.linalg.lstsq(A[seen], r, rcond=None)[0]
+        sigma = o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise
+        fall += float((left[:, 0] ** 2).sum() - (left[:, 1] ** 2).sum()) / sigma**2
+    return fall
