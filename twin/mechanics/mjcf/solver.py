@@ -208,7 +208,8 @@ def _compile(model: mujoco.MjModel, data: mujoco.MjData) -> _Compiled:
         (data.qfrc_passive, data.qfrc_actuator, data.qfrc_constraint, data.qfrc_bias), model.dof_damping, shown,
         rates, before, np.where(affine, model.actuator_biasprm[:, 2], 0.0), limits,
         (data.moment_rownnz, data.moment_rowadr, data.moment_colind, data.actuator_moment.reshape(-1)),
-        model.opt.integrator != int(mujoco.mjtIntegrator.mjINT_EULER),
+        model.opt.integrator != int(mujoco.mjtIntegrator.mjINT_EULER), data.actuator_length,
+        np.column_stack([model.actuator_gainprm[:, 0], model.actuator_biasprm[:, :2]]),
     )  # fmt: skip
     last = np.full(model.nbody, -1, np.int64)
     for k in range(model.nbody):
@@ -289,7 +290,8 @@ def _stand(now: _Compiled, body: ModelBody, joints: JointLaws, z: np.ndarray, st
 
 def _at_rest(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     """Return what is remembered of a step before where there is none."""
-    return {"raised": np.zeros(model.nv), "rate": np.zeros(model.nv), "late": np.zeros((2, model.nu)), "moving": np.zeros(1, bool)}
+    late = np.vstack([np.zeros((3, model.nu)), np.full((1, model.nu), np.nan)])
+    return {"raised": np.zeros(model.nv), "rate": np.zeros(model.nv), "late": late, "moving": np.zeros(1, bool)}
 
 
 def _grid(time: np.ndarray, longest: float) -> tuple[np.ndarray, float, np.ndarray | None]:

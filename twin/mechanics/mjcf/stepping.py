@@ -34,6 +34,8 @@ class Views(NamedTuple):
     forcerange: np.ndarray  # (nu, 2), infinite where it is not limited
     moment: tuple  # of actuators: rownnz, rowadr, colind, values
     implicit: bool  # whether actuators' damping acts at the rates after a step
+    length: np.ndarray  # actuator_length
+    affine: np.ndarray  # (nu, 3) of an actuator's force without its damping: per control, alone, per length
 
 
 @by_reference
@@ -59,42 +61,76 @@ class Memory(NamedTuple):
     raised: np.ndarray  # (nv,) N m s/rad, by what sticks
     rate: np.ndarray  # (nv,)
     moving: np.ndarray  # (1,) whether these rates are those of a step before
-    late: np.ndarray  # (2, nu) rates of actuators behind their lines, before and after the last step
+    # Of actuators behind lines (4, nu): the rates that their drums follow, before and after the last step; their forces without
+    # damping; the lengths that slack lines leave to their drums, NaN of taut ones.
+    late: np.ndarray
     heard: np.ndarray  # (2, nu) controls after the lag, and the controls before it; NaN before the first
 
 
 @jit_internal
-def center_damping(views, own, ahead, behind, applied, lines):
+def center_damping(views, own, ahead, behind, applied):
     """Add to the forces (nv,) what makes damping act at the mean of the rates in a step.
 
     Else it acts at those after it (implicit integrators), which are `ahead` (nv,) of the mean, or, of actuators, at those before it
-    (Euler), which are `behind` (nv,) it. Steps become of second order by it. An actuator at its limit has no damping. `lines` is
-    (lag (nu,) in s, step in s, rates that drums follow (2, nu)): a line that stretches hands on its rate late (`stretch_lines`).
+    (Euler), which are `behind` (nv,) it. Steps become of second order by it. An actuator at its limit has no damping.
     """
-    lag, h, late = lines
     rownnz, rowadr, colind, values = views.moment
-    for k in range(ahead.size):
+    for k in range(applied.size):
         applied[k] += own[k] * ahead[k]
     for k in range(views.force.size):
-        low, high, force = views.forcerange[k, 0], views.forcerange[k, 1], views.force[k]
-        if views.slope[k] != 0.0 and low < force < high:
-            change, mean = 0.0, views.rates[1][k]
+        if views.slope[k] != 0.0 and views.forcerange[k, 0] < views.force[k] < views.forcerange[k, 1]:
+            change = 0.0
             for e in range(rowadr[k], rowadr[k] + rownnz[k]):
                 change += values[e] * (-ahead[colind[e]] if views.implicit else behind[colind[e]])
-                mean += values[e] * behind[colind[e]]
-            if lag[k] > 0.0:
-                left = math.exp(-h / lag[k])
-                change += (late[1, k] - mean) * (1.0 - left) * lag[k] / h
-                late[0, k], late[1, k] = late[1, k], mean + (late[1, k] - mean) * left
             for e in range(rowadr[k], rowadr[k] + rownnz[k]):
                 applied[colind[e]] += values[e] * views.slope[k] * change
+
+
+@jit_internal
+def pull_lines(views, lag, h, memory, behind, applied):
+    """Add to the forces (nv,) what lines that stretch (`lag` > 0 s, `ModelBody.stretch_lines`) pull otherwise than their actuators.
+
+    Of a taut line, compliance c, the force is that of the actuator at a rate that comes late, since its drum, at x, follows by
+
+        kv x' = kp (u - x) + (l - x)/c,    F = -(l - x)/c.
+
+    Beyond a limit at zero it is slack, and its drum moves alone, kv x' = kp (u - x), until l has caught up.
+    """
+    rownnz, rowadr, colind, values = views.moment
+    late, heard = memory.late, memory.heard
+    for k in range(lag.size):
+        if lag[k] == 0.0:
+            continue
+        low, high, l, D = views.forcerange[k, 0], views.forcerange[k, 1], views.length[k], -views.slope[k]
+        per_control, alone, K = views.affine[k, 0], views.affine[k, 1], -views.affine[k, 2]
+        taut = 1.0 / (1.0 + K * lag[k] / D)  # 1 / (1 + kp c): K = kp taut, D = kv taut^2, lag = kv c taut
+        c, static, rate = taut * lag[k] / D, per_control * views.ctrl[k] + alone - K * l, views.rates[1][k]
+        for e in range(rowadr[k], rowadr[k] + rownnz[k]):
+            rate += values[e] * behind[colind[e]]
+        force, left = 0.0, math.exp(-h / lag[k])
+        if math.isfinite(late[3, k]):
+            goal = (per_control * heard[1, k] + alone) / K
+            late[3, k] = goal + (late[3, k] - goal) * math.exp(-h * K * taut / D)
+            force = (late[3, k] - l) / c
+            if low < force < high:
+                late[1, k], late[3, k] = (static - force) / D, np.nan
+        if not math.isfinite(late[3, k]):
+            force = static - D * (rate + (late[1, k] - rate) * (1.0 - left) * lag[k] / h)
+            late[0, k], late[1, k] = late[1, k], rate + (late[1, k] - rate) * left
+            if (high == 0.0 and force > 0.0) or (low == 0.0 and force < 0.0):
+                late[3, k] = l + c * force
+        late[2, k] = static
+        free = low < views.force[k] < high
+        change = min(high, max(low, force)) - (static - D * rate if free else views.force[k])
+        for e in range(rowadr[k], rowadr[k] + rownnz[k]):
+            applied[colind[e]] += values[e] * change
 
 
 @jit_internal
 def center_rates(views, lag, late, out):
     """Replace the rates of a row, those before it, by the mean with those now, and its actuators' forces by those at that mean.
 
-    Behind a line that stretches (`lag` > 0) it is the mean of the rates that its drum follows, `late` (2, nu).
+    Behind a line that stretches (`lag` > 0) it is the mean of the rates that its drum follows, `late` (4, nu).
     """
     at = 0
     for array in views.shown:
@@ -102,14 +138,16 @@ def center_rates(views, lag, late, out):
     for j in range(3):
         array = views.rates[j]
         for k in range(array.size):
-            before = out[at]
-            change = 0.5 * (array[k] - before)
+            change = 0.5 * (array[k] - out[at])
             out[at] += change
             if j == 1:
-                force, low, high = out[views.force_column + k], views.forcerange[k, 0], views.forcerange[k, 1]
-                felt = 0.5 * (late[0, k] + late[1, k]) - before if lag[k] > 0.0 else change
-                if low < force < high:
-                    out[views.force_column + k] = min(high, max(low, force + views.slope[k] * felt))
+                at_force, low, high = views.force_column + k, views.forcerange[k, 0], views.forcerange[k, 1]
+                if lag[k] > 0.0:
+                    slack = math.isfinite(late[3, k])
+                    force = 0.0 if slack else late[2, k] + 0.5 * views.slope[k] * (late[0, k] + late[1, k])
+                    out[at_force] = min(high, max(low, force))
+                elif low < out[at_force] < high:
+                    out[at_force] = min(high, max(low, out[at_force] + views.slope[k] * change))
             at += 1
 
 
@@ -207,7 +245,8 @@ def run(engine, views, laws, memory, commands, rows, out):
                 tendon_forces((t, T), law, laws.tree, laws.paths, memory.slip, memory.started[0], work)
             memory.started[0] = True
         foresee_rates(engine, views, laws, memory, room)
-        center_damping(views, own, room[2], room[3], views.applied, (laws.lag, h, memory.late))
+        center_damping(views, own, room[2], room[3], views.applied)
+        pull_lines(views, laws.lag, h, memory, room[3], views.applied)
         if row >= 0:
             write_row(views, out[row])
         mj_step2(model, data)
