@@ -60,7 +60,7 @@ def _readmes() -> list[Path]:
     return [
         *top,
         *sorted(ROOT.glob("twin/**/README.md")),
-        *sorted(ROOT.glob("models/**/README.md")),
+        *sorted(ROOT.glob("models/**/*.md")),
         *sorted(ROOT.glob("tools/**/*.md")),
     ]
 

@@ -30,7 +30,7 @@ MAX_MAP_BYTES = 8 * 2**20  # bytes
 _FILL_IN = {
     "robot": "a robot's name (twin robots lists them) or the path to its folder from this file", "source": "hardware or simulation",
     "role": "input, output or context", "unit": "the unit of the numbers in the log", "time_unit": "s, ms, us or ns",
-    "quantity": "what it is, a channel name of models/README.md", "rate": 'rows a second, such as "100 Hz"',
+    "quantity": "what it is, a channel name of models/measurements.md", "rate": 'rows a second, such as "100 Hz"',
 }  # fmt: skip
 
 

@@ -32,7 +32,7 @@ _STREAMS = """
 # stamps), equal_stamps = "mean" or "first", backward_stamps = "sort" or "cut"; without these such stamps are refused.
 """
 _CHANNELS = """
-# Channels. quantity: what it is (models/README.md lists all). role: input drives the twin, output is compared with it,
+# Channels. quantity: what it is (models/measurements.md lists all). role: input drives the twin, output is compared with it,
 # context is known. unit: of the numbers in the log. Further keys: name (the column; else the quantity), noise (one standard
 # deviation), scale and offset (reading * scale + offset, in the unit; scale = -1 turns an axis).
 """
