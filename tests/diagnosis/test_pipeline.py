@@ -30,9 +30,10 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         monkeypatch.setattr(pipeline, name, run)
 
     screening: Any = SimpleNamespace(patterns="patterns", limits="bars")
-    study = SimpleNamespace(budget=Budget(0.0))
+    study = SimpleNamespace(budget=Budget(0.0), prepared=SimpleNamespace(inputs=()))
     assert not study.budget.allows("friction")
     stage("calibrate", (study, "base", ["a note"]))
+    stage("fast_motion", None)
     stage("screen", screening)
     stage("search", "found")
     stage("choose", "chosen")
@@ -40,11 +41,13 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
     stage("gate", "gated")
     stage("resolve_ties", ("all told", "settled"))
     stage("judge", "judged")
-    stage("with_systematic", "as unsure as it is")
+    unsure = SimpleNamespace(verdict="explained")
+    stage("with_systematic", unsure)
     settings = Settings(seed=7)
     made = conclude("bench", "twin", [2], "nominal", settings, "progress")  # type: ignore[arg-type]
     assert got == {
         "calibrate": ("bench", "twin", [2], "nominal", settings, "progress"),
+        "fast_motion": (study, "base", "bench"),
         "screen": (study, "base", 7),
         "search": (study, "base", "patterns", "bars"),
         "choose": (study, "found", "bars"),
@@ -54,7 +57,7 @@ def test_every_stage_gets_what_the_one_before_made(monkeypatch: pytest.MonkeyPat
         "judge": (study, "all told", "settled", "bars"),
         "with_systematic": (study, "judged", "patterns"),
     }
-    assert (made.context, made.found, made.gated, made.judged) == (study, "all told", "settled", "as unsure as it is")
+    assert (made.context, made.found, made.gated, made.judged) == (study, "all told", "settled", unsure)
     assert made.notices[0] == "a note"
     assert "not tried: friction" in made.notices[1]
 

@@ -336,6 +336,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(
         return SimpleNamespace(true=name, outputs=lambda twin, bench: f"readings of {name}")
 
     monkeypatch.setattr(look, "simulate", lambda twin, bench: [trace(i.name) for i in bench.inputs])
+    monkeypatch.setattr(look, "motion_as_measured", lambda bench, twin, seen, fitted: (bench, tuple(seen)))
     monkeypatch.setattr(look, "unstable_starts", lambda bench, traces: [traces[1].true])
     monkeypatch.setattr(look, "suspicions", lambda bench, twin, s, nominal: sealed.append((list(s), nominal)) or ("odd",))
     for n, count in ((FEWEST_TRIALS_FOR_HELD_OUT - 1, 0), (FEWEST_TRIALS_FOR_HELD_OUT, 2)):
@@ -452,8 +453,8 @@ def test_every_trial_is_shown_by_the_twin_that_had_to_predict_it(monkeypatch: py
     """Sealed ones as opened, the others by the twin that saw them."""
     monkeypatch.setattr(pipeline, "predicted", lambda twin, bench, trials: [f"{twin} sees {k}" for k in trials])
     opened = SimpleNamespace(predictions=lambda pick: {k: f"{pick(conclusion(('tilt',)))} opened {k}" for k in (1, 3)})
-    bench = SimpleNamespace(inputs=range(4))
-    shown = pipeline._predictions(bench, conclusion(("creep",)), opened, ("a", "b", "c", "d"))  # type: ignore[arg-type]
+    made = conclusion(("creep",), study=SimpleNamespace(prepared="bench"))
+    shown = pipeline._predictions(made, opened, ("a", "b", "c", "d"))  # type: ignore[arg-type]
     assert shown == {
         "nominal": ["a", "b", "c", "d"],
         "calibrated": ["base sees 0", "base opened 1", "base sees 2", "base opened 3"],

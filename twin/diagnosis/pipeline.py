@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnosis.calibration.calibrate import calibrate
+from twin.diagnosis.calibration.fast_motion import fast_motion
 from twin.diagnosis.calibration.first_calibration import objective_of
 from twin.diagnosis.calibration.fit import Fit, fit
 from twin.diagnosis.checks.loops import loops
@@ -41,7 +42,7 @@ from twin.foundation.errors import DataError
 from twin.foundation.parallel import single_thread
 from twin.measurements import Recording
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms
-from twin.prediction.motion import motion_as_measured, moving_like, with_swing
+from twin.prediction.motion import motion_as_measured, moving_like
 from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.twin import Twin
@@ -117,11 +118,11 @@ def conclude(
     the robot as described, and once more of the twin that was found, where that does not explain them.
     """
     calibrated = calibrate(prepared, twin, held_out, nominal, settings, progress)
-    if (again := _moving_like_found(calibrated[0], calibrated[1], prepared)) is not None:
+    if (again := fast_motion(calibrated[0], calibrated[1], prepared)) is not None:
         calibrated = calibrate(again, calibrated[1].fit.model.twin, held_out, nominal, settings, progress)
     found = _concluded(*calibrated, settings)
     if settings.budget is None and found.judged.verdict not in ("noise", "explained"):
-        again = _moving_like_found(found.context, found.judged.final, prepared)
+        again = fast_motion(found.context, found.judged.final, prepared)
         if again is not None:
             found = _concluded(*calibrate(again, found.base, held_out, nominal, settings, progress), settings)
     return found
@@ -132,14 +133,6 @@ def _concluded(context: FitContext, base: ScoredModel, notes: Sequence[str], set
     found, gated, judged = decide(context, base, screening)
     swing = [SWINGING] if any(i.swing is not None for i in context.prepared.inputs) else []
     return Conclusion(context, screening, found, gated, judged, (*notes, *swing, *context.budget.words()))
-
-
-def _moving_like_found(context: FitContext, found: ScoredModel, prepared: PreparedRecording) -> PreparedRecording | None:
-    """Return the recording, its motion that of a model found in it; None where that does not show or is no nearer to the data."""
-    twin, traces = found.fit.model.twin, found.fit.evaluation.traces
-    shown = [traces[k].outputs(twin, context.prepared) if k in traces else y for k, y in enumerate(context.prepared.measured)]
-    again = with_swing(context.prepared, twin, shown, context.trials)
-    return None if again is None else replace(prepared, inputs=again[0].inputs)
 
 
 def decide(context: FitContext, base: ScoredModel, screening: Screening) -> tuple[Search, Gated, Judgement]:
@@ -245,7 +238,7 @@ def _diagnosis(
         folds=folds if len(parts) > 1 else (),
         loops=loops(context.prepared),
         suspicions=preview.suspicions,
-        predictions=_predictions(prepared, found, held_out, nominal),
+        predictions=_predictions(found, held_out, nominal),
         notices=(*prepared.notices, *found.notices, *jumped(prepared, final.fit), *_rezeroed(found, held_out), *left.notices),
         settings=settings,
         scores=tuple((w.effects, w.score) for w in found.found.all),
@@ -292,16 +285,14 @@ def _experiment(found: Conclusion, settings: Settings) -> Experiment | None:
     return next_experiment(context.prepared, context.objective.whitener.noise, a.fit, b.fit, settings.jobs)
 
 
-def _predictions(
-    prepared: PreparedRecording, found: Conclusion, held_out: HeldOut, nominal: Sequence[np.ndarray]
-) -> dict[str, list[np.ndarray]]:
+def _predictions(found: Conclusion, held_out: HeldOut, nominal: Sequence[np.ndarray]) -> dict[str, list[np.ndarray]]:
     """Return every trial's prediction by stage; held-out trials by a twin that was not fitted to them."""
     out = {"nominal": list(nominal)}
     for name, pick in (("calibrated", lambda c: c.base), ("after", lambda c: c.final)):
         unseen = held_out.predictions(pick)
-        open_ = [k for k in range(len(prepared.inputs)) if k not in unseen]
+        open_ = [k for k in range(len(nominal)) if k not in unseen]
         seen = dict(zip(open_, predicted(pick(found), found.context.prepared, open_), strict=True))
-        out[name] = [(unseen | seen)[k] for k in range(len(prepared.inputs))]
+        out[name] = [(unseen | seen)[k] for k in range(len(nominal))]
     return out
 
 

@@ -46,25 +46,25 @@ def with_swing(
 ) -> tuple[PreparedRecording, tuple[np.ndarray, ...]] | None:
     """Return the recording with what steps of this twin add to its statics, in each output, and its prediction.
 
-    None where that is less than can be seen, or no nearer to the listed trials than `predicted` (n_k, n_output), and where the
-    steps are lost. Of a twin that differs, statics and this addition together err by the change of the addition alone.
+    None where that is less than can be seen, or no nearer to the listed trials than `predicted` (n_k, n_output), NaN in
+    others, and where the steps are lost. Of a twin that differs, statics and this addition together err by the addition's change.
     """
     still = without_swing(prepared)
+    shown = [y if i.swing is None else y - i.swing for y, i in zip(predicted, prepared.inputs, strict=True)]
+    if not (_may_swing(still) and swings(still, shown)):
+        return None
     try:
-        static = _predicted(still, twin)
-        moving = _stepped(still, twin) if swings(still, static) else static
+        moving = _stepped(still, twin)
+        return (_swinging(still, twin, moving), moving) if _closer(prepared, trials, predicted, moving) > 0.0 else None
     except SolveError:
         return None
-    return (_swinging(still, moving, static), moving) if _closer(prepared, trials, predicted, moving) > 0.0 else None
 
 
 def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray]) -> bool:
-    """Return whether inertia may show in the outputs (n_k, n_output) of statics, and the robot can be stepped.
+    """Return whether inertia may show in the outputs (n_k, n_output) of statics.
 
     A mode of circular frequency w that follows x(t) is off by x''/w^2 to first order; the lowest mode counts.
     """
-    if not can_step(prepared) or Drive.CURRENT in prepared.drives:
-        return False
     w = 2.0 * np.pi * prepared.robot.build().first_mode_frequency()
     sigma = np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
     off = [
@@ -75,13 +75,18 @@ def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray]) -> bool
     return bool(off) and float(np.sqrt(np.nanmean(np.concatenate(off) ** 2))) > LEAST_SWING
 
 
+def _may_swing(prepared: PreparedRecording) -> bool:
+    """Return whether the robot can be stepped, and pulled faster than springs heat."""
+    return not {Drive.CURRENT, Drive.CONTROL} & set(prepared.drives) and can_step(prepared)
+
+
 def moving_like(whole: PreparedRecording, prepared: PreparedRecording, twin: Twin) -> PreparedRecording:
     """Return all rows of a recording, to be predicted as `prepared` is, some of its rows."""
     whole = whole if any(i.damped for i in prepared.inputs) else without_damping(whole)
     if all(i.swing is None for i in prepared.inputs):
         return whole
     with suppress(SolveError):
-        whole = _swinging(whole, _stepped(whole, twin), _predicted(whole, twin))
+        whole = _swinging(whole, twin, _stepped(whole, twin))
     return whole
 
 
@@ -103,8 +108,8 @@ def _stepped(prepared: PreparedRecording, twin: Twin) -> tuple[np.ndarray, ...]:
     return tuple(t.outputs(twin, prepared) for t in simulate(twin, prepared, dynamic=True))
 
 
-def _swinging(prepared: PreparedRecording, moving: Sequence[np.ndarray], static: Sequence[np.ndarray]) -> PreparedRecording:
-    each = zip(prepared.inputs, moving, static, strict=True)
+def _swinging(prepared: PreparedRecording, twin: Twin, moving: Sequence[np.ndarray]) -> PreparedRecording:
+    each = zip(prepared.inputs, moving, _predicted(prepared, twin), strict=True)
     return replace(prepared, inputs=tuple(replace(i, swing=m - s) for i, m, s in each))
 
 

@@ -148,7 +148,7 @@ def write_set(folder: Path, robot: Robot) -> None:
     schema = load_family(robot.family).SCHEMA
     channels = schema.usual_channels(schema.structure.model_validate(dict(robot.structure)))
     text = [
-        "# One [[channel]] a column of the CSV files, one [[trial]] a file. Every key, every channel's name: models/measurements.md.",
+        "# One [[channel]] a column of the CSV files, one [[trial]] a file. Keys, names of channels: models/measurements.md.",
         "# Times in seconds, each trial from rest; an empty cell is a missing value. Fill the files, then: twin diagnose "
         + FIRST_SET,
         *toml_lines({"format": "twin-measurements/1", "robot": "../..", "title": "First bench day", "source": "hardware"}),

@@ -207,7 +207,7 @@ def fit(
         before = ahead
         if better is not None and fall >= enough and not slow:
             continue
-        worth_it = since > now and since - now >= enough and now <= beat
+        worth_it = since > now and since - now >= enough and (objective.bends or now <= beat)
         if renewals and left and worth_it and (objective.bends or (slow and promised >= enough)):
             columns[:, own], renewals, damping = objective.renewed(at, own, columns[:, own]), renewals - 1, penalty.first_damping
             since, before = now, np.inf
