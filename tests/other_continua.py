@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from tools.simulators.rod.rod import Rod
+from tools.simulators.rod.mechanics.rod import Rod
 from twin.body import Loads, Problem
 from twin.mechanics.rod import Equilibrium
 from twin.robots import Robot, load

@@ -14,8 +14,8 @@ import pytest
 
 from tests.effects.test_conformance import is_of_models
 from tests.recorded_days import RECOVERED, Day, half, recorded_day
-from tools.benchmarks.diagnosis.attribution_table import held
 from tools.benchmarks.diagnosis.compared import COMPARABLE, COMPARED, OTHER_LAW, distance
+from tools.benchmarks.diagnosis.days.attribution_table import held
 from tools.simulators.rod.effects.tendon import TendonBacklash as Play
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.first_calibration import objective_of

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tools.simulators.rod.rod import Rod, follow
+from tools.simulators.rod.mechanics.rod import Rod, follow
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.motion import motion_as_measured, swings, with_swing
 from twin.prediction.prepared import PreparedRecording, prepare

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tools.simulators.rod.rod import Rod, follow
+from tools.simulators.rod.mechanics.rod import Rod, follow
 from twin.body import orientation
 from twin.diagnosis import Settings, diagnose
 from twin.effects import effect_class

@@ -38,7 +38,7 @@ TENSIONS = "made_of or nothing or made_its or grows or likeliest"
 IDENTIFIABILITY = "told_apart or imitates or material or are_one or leaves_nothing or moves_nothing or several or blinds or units"
 FIT = "intervals or linear or widen or neighbour_serve or thousandth or hardly or elsewhere or far_off"
 TIP = "steady or surface or tracked or knows_of or tip_of_an_arc or off_by_is_taken"
-ROD = "mechanics/rod/test_balance.py mechanics/rod/test_equilibrium.py mechanics/rod/test_lengths.py"
+ROD = "mechanics/rod/statics/test_balance.py mechanics/rod/statics/test_equilibrium.py mechanics/rod/statics/test_lengths.py"
 CHECK_TESTS, STAGE_TESTS = "diagnosis/checks", "diagnosis/test_stages.py"
 SHAPE = "shape/test_shape_parts.py shape/test_shape_band.py shape/test_shape_strain.py"
 
@@ -79,8 +79,8 @@ GROUPS = {
         ("jumps", "diagnosis/checks/jump_detection.py diagnosis/checks/zero_jumps.py",
          f"{CHECK_TESTS}/test_zero_jumps.py {CHECK_TESTS}/test_zeros.py -k 'test_jumps or moved_within or joints_zero'"),
         ("base", "diagnosis/calibration/calibrate.py", f"{CHECK_TESTS}/test_zeros.py"),
-        ("suspicions", "diagnosis/checks/suspicions/*.py", f"{CHECK_TESTS}/test_suspicions_parts.py "
-         f"{CHECK_TESTS}/test_suspicions.py {CHECK_TESTS}/test_suspicions_silent.py -k '{SUSPICIONS}'"),
+        ("suspicions", "diagnosis/checks/suspicions/*.py", f"{CHECK_TESTS}/suspicions/test_suspicions_parts.py "
+         f"{CHECK_TESTS}/suspicions/test_suspicions.py {CHECK_TESTS}/suspicions/test_suspicions_silent.py -k '{SUSPICIONS}'"),
         ("budget", "diagnosis/budget.py", "diagnosis/search/test_search.py -k time_is_up"),
         ("friction_noise", "diagnosis/noise/friction.py", "diagnosis/noise/test_friction_noise.py"),
         ("transmission", "diagnosis/noise/transmission.py", "diagnosis/noise/test_transmission_of_noise.py"),
@@ -100,7 +100,7 @@ GROUPS = {
         ("kinematics", "prediction/kinematics/*.py", "prediction/test_kinematics.py"),
         ("antagonists", "mechanics/rod/antagonists.py", "mechanics/rod/test_transmission.py -k 'not diagnosis'"),
         ("compiled", "mechanics/rod/balance/linear.py mechanics/rod/balance/elastic.py mechanics/rod/balance/hyperelastic.py",
-         "mechanics/rod/test_compiled_parts.py mechanics/rod/test_balance.py"),
+         "mechanics/rod/test_compiled_parts.py mechanics/rod/statics/test_balance.py"),
         ("equilibrium", "mechanics/rod/*.py", ROD),
         ("robots", "robots/families/continuum.py", "robots/test_robots.py"),
         ("numbers", "report/numbers.py", "report/test_report_words.py"),

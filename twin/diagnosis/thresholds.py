@@ -1,7 +1,7 @@
 """The thresholds that decide a diagnosis: value, unit, reason, and the evidence for each.
 
 Evidence is a command that reproduces it, a derivation, or "judgement". A judgement was not optimised; the benchmark's results
-(`python -m tools.benchmarks.diagnosis.attribution`) hold with it.
+(`python -m tools.benchmarks.diagnosis.days.attribution`) hold with it.
 """
 
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from typing import TypeVar
 
 Number = TypeVar("Number", int, float)
 
-ATTRIBUTION_BENCHMARK = "python -m tools.benchmarks.diagnosis.attribution --out results/ --sets 300 --seed 13000"
-SUSPICIONS_TEST = "python -m pytest tests/diagnosis/checks/test_suspicions.py"
+ATTRIBUTION_BENCHMARK = "python -m tools.benchmarks.diagnosis.days.attribution --out results/ --sets 300 --seed 13000"
+SUSPICIONS_TEST = "python -m pytest tests/diagnosis/checks/suspicions/test_suspicions.py"
 SPIKES_TEST = "python -m pytest tests/diagnosis/checks/test_spikes.py"
 
 
@@ -130,7 +130,7 @@ HIDING_NOISE_RATIO = _row("HIDING_NOISE_RATIO", 10.0, "ratio", "of declared nois
     "judgement: a factor of 1000")
 CHANCE_OF_REPEATS = _row("CHANCE_OF_REPEATS", 1e-3, "a channel",
     "that a run of equal readings is no accident: a set of thirty channels has one in thirty times as many sets",
-    "python -m pytest tests/diagnosis/checks/test_no_readings.py")
+    "python -m pytest tests/diagnosis/checks/suspicions/test_no_readings.py")
 COUNTER_BITS = (
     _row("FEWEST_COUNTER_BITS", 8, "bits", "no counter of an encoder or converter rolls over sooner", "judgement"),
     _row("MOST_COUNTER_BITS", 33, "bits", "one more than the widest counter that rolls over in a session", "judgement"),

@@ -27,8 +27,8 @@ from tests.other_continua import (
     off,
     robot,
 )
-from tools.simulators.rod.rod import Rod, follow
-from tools.simulators.rod.rod import solve as rod_solve
+from tools.simulators.rod.mechanics.rod import Rod, follow
+from tools.simulators.rod.mechanics.rod import solve as rod_solve
 from twin.body import Loads, Problem, Route
 from twin.effects import catalogue
 from twin.effects.contact import obstacle

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.mechanics.rod.test_balance import Energy, slope
-from tests.mechanics.rod.test_equilibrium import EXACT, FRICTION, HANGING, NOWHERE, SIDEWAYS, solver, swept, tips
-from tools.simulators.rod.rod import Rod, follow
+from tests.mechanics.rod.statics.test_balance import Energy, slope
+from tests.mechanics.rod.statics.test_equilibrium import EXACT, FRICTION, HANGING, NOWHERE, SIDEWAYS, solver, swept, tips
+from tools.simulators.rod.mechanics.rod import Rod, follow
 from twin.body import Loads, Problem, Route
 from twin.mechanics.rod import Equilibrium
 from twin.robots import load

@@ -31,8 +31,8 @@ from tests.other_continua import (
     robot,
 )
 from tools.benchmarks.solvers.tip_wrench import tip_wrench
-from tools.simulators.rod.rod import Rod, follow
-from tools.simulators.rod.rod import solve as rod_solve
+from tools.simulators.rod.mechanics.rod import Rod, follow
+from tools.simulators.rod.mechanics.rod import solve as rod_solve
 from twin.body import Drive, Loads, Problem, Route
 from twin.foundation.compiled import jit
 from twin.foundation.errors import DataError

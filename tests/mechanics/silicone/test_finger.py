@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tools.simulators.finger.effects.silicone import BackbonePrecurvature
-from tools.simulators.finger.equilibria import Finger, equilibrium
+from tools.simulators.finger.mechanics.equilibria import Finger, equilibrium
 from twin.body import DIRECT, NOT_FOUND, Drive, Loads, Problem, Push, Route, Signals
 from twin.body.strain_cords import Cords, resistance, strain
 from twin.effects import effect_class

@@ -17,9 +17,9 @@ from tests.command_line import twin
 from tools.simulators.rod.bench import run
 from tools.simulators.rod.design import bench_day
 from tools.simulators.rod.effects.tendon import TendonElasticity
-from tools.simulators.rod.rod import Rod, follow
+from tools.simulators.rod.mechanics.rod import Rod, follow
+from tools.simulators.rod.mechanics.springs import GF, Springs
 from tools.simulators.rod.sensors import Noise
-from tools.simulators.rod.springs import GF, Springs
 from tools.simulators.rod.write import write_set
 from twin.body import Drive, Heating, Loads, Problem, Route
 from twin.body.drives.spring import Spring

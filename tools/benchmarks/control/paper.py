@@ -19,8 +19,8 @@ from tools.benchmarks.solvers.tip_wrench import tip_wrench
 from tools.simulators.rod.bench import Log, run
 from tools.simulators.rod.design import Day, Trial, bench_day
 from tools.simulators.rod.effects import Effect, all_effects
+from tools.simulators.rod.mechanics.rod import Rod
 from tools.simulators.rod.nuisance import built
-from tools.simulators.rod.rod import Rod
 from tools.simulators.rod.sensors import Noise
 from tools.simulators.rod.write import write_set
 from twin.body import Loads

@@ -19,14 +19,14 @@ from pathlib import Path
 import tyro
 from joblib import delayed
 
-from tools.benchmarks.diagnosis.attribution import Case, plan
-from tools.benchmarks.diagnosis.attribution_table import exact, false_positive, first, flagged, made, right
+from tools.benchmarks.diagnosis.days.attribution import Case, plan
+from tools.benchmarks.diagnosis.days.attribution_table import exact, false_positive, first, flagged, made, right
+from tools.benchmarks.diagnosis.days.second_bench_days import true_row
 from tools.benchmarks.diagnosis.memory import Memory
 from tools.benchmarks.diagnosis.rules import RULES, Rule, without
-from tools.benchmarks.diagnosis.second_bench_days import true_row
 from tools.benchmarks.table import Row, kept_rows, markdown
 from tools.simulators.rod.day import make_set
-from tools.simulators.rod.rod import NoEquilibrium
+from tools.simulators.rod.mechanics.rod import NoEquilibrium
 from twin.diagnosis import Settings
 from twin.diagnosis.calibration.calibrate import calibrate
 from twin.diagnosis.checks.preview import DataPreview, preview_data

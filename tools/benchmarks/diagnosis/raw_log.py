@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 
 from tools.benchmarks.table import markdown
+from tools.simulators.rod.mechanics.rod import follow
 from tools.simulators.rod.nuisance import built
-from tools.simulators.rod.rod import follow
 from twin.diagnosis import Settings, diagnose
 from twin.measurements import Channel, Recording, Trial, write
 

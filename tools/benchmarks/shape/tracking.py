@@ -30,13 +30,13 @@ import tyro
 
 from tools.benchmarks.control.baselines import ConstantDirections, TipTracking
 from tools.simulators.finger.bench import LARGEST_PULL_STEP, SLACK, make_finger
-from tools.simulators.finger.cables import interpolation
 from tools.simulators.finger.day import TABLES, make_set
 from tools.simulators.finger.effects import all_effects
-from tools.simulators.finger.hand import Hand
+from tools.simulators.finger.mechanics.cables import interpolation
+from tools.simulators.finger.mechanics.hand import Hand
+from tools.simulators.finger.mechanics.statics import Load
 from tools.simulators.finger.motions import wander
 from tools.simulators.finger.sensors import Built
-from tools.simulators.finger.statics import Load
 from tools.simulators.finger.write import SENSOR
 from twin.control import ShapeController, StrainTracking
 from twin.measurements import read

@@ -10,7 +10,7 @@ before and after the nuisance parameters have absorbed what they can (the twin i
 import numpy as np
 import tyro
 
-from tools.simulators.rod.rod import Rod, solve
+from tools.simulators.rod.mechanics.rod import Rod, solve
 from twin.body import Loads, Problem
 from twin.mechanics.rod import Equilibrium
 from twin.robots import load

@@ -11,7 +11,7 @@ import time
 import numpy as np
 import tyro
 
-from tools.simulators.finger.equilibria import Equilibrium, Finger, equilibrium
+from tools.simulators.finger.mechanics.equilibria import Equilibrium, Finger, equilibrium
 from twin.body import Drive, Loads, Problem
 from twin.mechanics.silicone import SoftStatics
 from twin.robots import load

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tools.simulators.finger.effects import Effect
-from tools.simulators.finger.hand import Hand
+from tools.simulators.finger.mechanics.hand import Hand
+from tools.simulators.finger.mechanics.statics import Finger, Load, NotConverged, State
 from tools.simulators.finger.motions import PAUSE, Trial
 from tools.simulators.finger.sensors import Built
-from tools.simulators.finger.statics import Finger, Load, NotConverged, State
 
 LARGEST_PULL_STEP = 0.8  # mm, the largest step of a pulling drive between two equilibria
 SLACK = -1.0  # mm, a tendon paid out further plays no part

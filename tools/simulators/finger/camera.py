@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.simulators.finger.body import Body
-from tools.simulators.finger.cables import interpolation
-from tools.simulators.finger.mesh import FINGER_LENGTH, radius
+from tools.simulators.finger.mechanics.body import Body
+from tools.simulators.finger.mechanics.cables import interpolation
+from tools.simulators.finger.mechanics.mesh import FINGER_LENGTH, radius
 
 LOOKS = np.array([-np.sqrt(0.5), -np.sqrt(0.5), 0.0])
 GRAZING = 0.01  # cosine below which a surface is not seen: the tip's face of the hanging finger

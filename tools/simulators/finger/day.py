@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from tools.simulators.finger.bench import Log, make_finger, run
-from tools.simulators.finger.cables import interpolation
 from tools.simulators.finger.camera import Points, cloud, scatter
 from tools.simulators.finger.effects import Effect, all_effects
-from tools.simulators.finger.hand import Hand
+from tools.simulators.finger.mechanics.cables import interpolation
+from tools.simulators.finger.mechanics.hand import Hand
+from tools.simulators.finger.mechanics.shape import write_shape_truth
+from tools.simulators.finger.mechanics.statics import Finger
 from tools.simulators.finger.motions import bench_day, shape_day
 from tools.simulators.finger.sensors import Built
-from tools.simulators.finger.shape import write_shape_truth
-from tools.simulators.finger.statics import Finger
 from tools.simulators.finger.write import CLOUD, MARKER, SENSOR, Sheet, drive_reading, peaks, write_set
 
 TABLES = Path(__file__).parent

@@ -16,8 +16,8 @@ from tools.simulators.rod.bench import Log, run
 from tools.simulators.rod.day import MISMATCH
 from tools.simulators.rod.design import Day
 from tools.simulators.rod.effects import Effect, all_effects
+from tools.simulators.rod.mechanics.rod import Rod
 from tools.simulators.rod.nuisance import built
-from tools.simulators.rod.rod import Rod
 from tools.simulators.rod.sensors import Noise
 from tools.simulators.rod.write import write_truth
 from twin.robots.robot import models_folder

@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 from tools.simulators.rod.bench import Log, as_described, logged_inputs, run
 from tools.simulators.rod.design import Day
 from tools.simulators.rod.effects import Effect
-from tools.simulators.rod.rod import NoEquilibrium, Rod
+from tools.simulators.rod.mechanics.rod import NoEquilibrium, Rod
 from tools.simulators.rod.sensors import Noise
 
 AMPLITUDE_ERROR = 0.03  # relative error of the amplitude that is good enough

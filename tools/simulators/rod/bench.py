@@ -11,7 +11,7 @@ import numpy as np
 
 from tools.simulators.rod.design import Day, Trial
 from tools.simulators.rod.effects import Effect, Situation
-from tools.simulators.rod.rod import Creep, Rod, follow
+from tools.simulators.rod.mechanics.rod import Creep, Rod, follow
 
 RAMP_SECONDS = 2.0  # s
 GAUSS_NODES = 3  # Gauss nodes per interval: the tip is within 2e-3 mm of the converged one at the fullest loads

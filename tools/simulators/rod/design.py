@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.simulators.rod.rod import Rod, follow
+from tools.simulators.rod.mechanics.rod import Rod, follow
 
 POOR = ("no_repeats", "time_ordered", "loading_only", "one_payload", "one_rate", "one_tendon", "tip_only")
 BENCH_DESIGNS = ("default", "hanging", "sideways", "mixed", *POOR, "by_length", "by_current")

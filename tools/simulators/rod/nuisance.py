@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.simulators.rod.rod import Rod
+from tools.simulators.rod.mechanics.rod import Rod
 
 
 def built(rng: np.random.Generator, nominal: Rod | None = None, spread: float = 1.0) -> Rod:

@@ -15,7 +15,7 @@ import numpy as np
 from tools.simulators.rod.bench import Log
 from tools.simulators.rod.design import Day
 from tools.simulators.rod.effects import Effect
-from tools.simulators.rod.rod import Rod
+from tools.simulators.rod.mechanics.rod import Rod
 from tools.simulators.rod.sensors import Noise
 
 

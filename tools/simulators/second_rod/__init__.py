@@ -5,17 +5,18 @@ curvature as Legendre polynomials instead of joints, equilibrium by virtual work
 
 python -m tools.simulators.second_rod --out DIR [--days 30] [--seed 1]
 
-rod.py          the backbone: shape from curvature, virtual work of forces on it
-tendons.py      paths through the holes, tension along them, capstan friction
-contact.py      a wall or a post in the way
-fields.py       a magnet, a jet of air
+mechanics/      what holds the backbone in its shape
+  rod.py          the backbone: shape from curvature, virtual work of forces on it
+  tendons.py      paths through the holes, tension along them, capstan friction
+  contact.py      a wall or a post in the way
+  fields.py       a magnet, a jet of air
+  equilibrium.py  all of them together, solved by Newton and followed along a trial
+  simulate.py     a day run through
 loom.py         a cable loom at the tip: elastic-plastic sliders
-equilibrium.py  all of them together, solved by Newton and followed along a trial
 robot.py        the robot as described, and as built within its tolerances
 motions.py      what an operator lets the robot do
 day.py          one day: trials, mounting, payloads, noise
 effects/        the laws of what may be wrong, by where they act
-simulate.py     a day run through
 sizing.py       how far an effect moves the markers beyond what a refit of the robot takes up
 plan.py         which effects on which day
 write.py        measurement sets and their truth

@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
+from tools.simulators.second_rod.mechanics.rod import INTERVALS
 from tools.simulators.second_rod.motions import ALWAYS, MOTIONS, MOTIONS_REPEATED, TOWARDS, Motion
 from tools.simulators.second_rod.robot import Robot, built
-from tools.simulators.second_rod.rod import INTERVALS
 
 Array = np.ndarray
 Drive = Literal["tension", "displacement"]

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tools.simulators.second_rod import contact, fields, loom
-from tools.simulators.second_rod.equilibrium import Model
-from tools.simulators.second_rod.rod import INTERVALS, make_rod, middles
-from tools.simulators.second_rod.tendons import Tendons, rest_lengths
+from tools.simulators.second_rod import loom
+from tools.simulators.second_rod.mechanics import contact, fields
+from tools.simulators.second_rod.mechanics.equilibrium import Model
+from tools.simulators.second_rod.mechanics.rod import INTERVALS, make_rod, middles
+from tools.simulators.second_rod.mechanics.tendons import Tendons, rest_lengths
 
 YOUNGS_MODULUS = 77.59e9  # Pa
 POISSON_RATIO = 0.33

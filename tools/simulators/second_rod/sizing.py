@@ -12,8 +12,8 @@ from scipy.optimize import lsq_linear
 
 from tools.simulators.second_rod.day import Day
 from tools.simulators.second_rod.effects import Effect
-from tools.simulators.second_rod.rod import INTERVALS
-from tools.simulators.second_rod.simulate import Run, simulate, without_effects
+from tools.simulators.second_rod.mechanics.rod import INTERVALS
+from tools.simulators.second_rod.mechanics.simulate import Run, simulate, without_effects
 
 Array = np.ndarray
 ROWS_SIZED = 25  # of each trial, where a robot that remembers nothing is sized

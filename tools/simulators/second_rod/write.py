@@ -11,11 +11,11 @@ import numpy as np
 
 from tools.simulators.second_rod.day import Day, Trial, draw_day
 from tools.simulators.second_rod.effects import EFFECT_KINDS, Effect
+from tools.simulators.second_rod.mechanics.simulate import Run, simulate, without_effects
+from tools.simulators.second_rod.mechanics.tendons import ROD_TENDONS
 from tools.simulators.second_rod.plan import Planned
 from tools.simulators.second_rod.robot import numbers
-from tools.simulators.second_rod.simulate import Run, simulate, without_effects
 from tools.simulators.second_rod.sizing import Size, Sizer
-from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 Array = np.ndarray
 TEMPERATURE_NOISE = 0.1  # K

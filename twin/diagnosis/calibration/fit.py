@@ -32,8 +32,8 @@ FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
 MOTION_DAMPING = 1e-7
 LEAST_DAMPING = 1e-2  # of the first
 TRUSTED_FALL_SHARE = 0.75  # of the fall that derivatives predicted: after as much, steps may be longer (Marquardt, Fletcher)
-# Of an effect's amplitude: the difference between two programs of one equation. On 69 sets of
-# `tools.benchmarks.diagnosis.attribution` it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
+# Of an effect's amplitude: the difference between two programs of one equation. On 69 sets (`diagnosis.days.attribution`)
+# it was 0.5 to 2 %, where noise and disagreement of trials gave errors of 0.2 to 0.7 %.
 LAW_ACCURACY = 0.02
 UNFIXED_SPREAD_SHARE = 0.9  # a parameter whose standard error stays above this share of its prior's is not fixed by the data
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from tools.simulators.finger.mechanics.statics import Finger
 from tools.simulators.finger.sensors import Built
-from tools.simulators.finger.statics import Finger
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from tools.simulators.finger.effects.effect import Effect
+from tools.simulators.finger.mechanics.skin import Pad
+from tools.simulators.finger.mechanics.statics import Finger
 from tools.simulators.finger.sensors import Built
-from tools.simulators.finger.skin import Pad
-from tools.simulators.finger.statics import Finger
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class TendonBacklash(Effect):
 
 @dataclass(frozen=True)
 class TendonFriction(Effect):
-    """Capstan friction at all 19 bends of every tendon, with pre-sliding; the law is in `tools/simulators/finger/cables.py`."""
+    """Capstan friction at all 19 bends of every tendon, with pre-sliding; the law is in `finger/mechanics/cables.py`."""
 
     id: ClassVar[str] = "tendon_friction"
 

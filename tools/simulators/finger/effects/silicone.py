@@ -9,16 +9,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tools.simulators.finger.effects.effect import Effect
-from tools.simulators.finger.mesh import CLAMP, FINGER_LENGTH, radius
+from tools.simulators.finger.mechanics.mesh import CLAMP, FINGER_LENGTH, radius
+from tools.simulators.finger.mechanics.statics import Finger
 from tools.simulators.finger.sensors import Built
-from tools.simulators.finger.statics import Finger
 
 
 @dataclass(frozen=True)
 class BackboneCreep(Effect):
     """Delayed strain of the silicone: a share of the shear modulus relaxes with one time (standard linear solid).
 
-    The recursion is in `tools/simulators/finger/statics.py`; its state lives on the day's clock and relaxes in the pauses.
+    The recursion is in `finger/mechanics/statics.py`; its state lives on the day's clock and relaxes in the pauses.
     """
 
     id: ClassVar[str] = "backbone_creep"

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tools.simulators.rod.rod import NO_FIELDS, Rod
-from tools.simulators.rod.springs import Springs
+from tools.simulators.rod.mechanics.rod import NO_FIELDS, Rod
+from tools.simulators.rod.mechanics.springs import Springs
 
 
 @dataclass

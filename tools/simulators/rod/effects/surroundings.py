@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tools.simulators.rod.effects.effect import Effect, Situation, rotation, unit_vector
-from tools.simulators.rod.fields import POST_FIELD, WALL_FIELD
+from tools.simulators.rod.mechanics.fields import POST_FIELD, WALL_FIELD
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Contact(Effect):
     """A wall or a round post stands near the robot; the disks (balls of 10 mm) touch it in some trials.
 
     The gap to the straight robot's axis is 95 mm - 25 mm strength for a wall and 80 mm - 25 mm strength for a post, so strength
-    moves the obstacle in. Penalty stiffness 0.3 to 3 N/mm, see `tools/simulators/rod/fields.py`.
+    moves the obstacle in. Penalty stiffness 0.3 to 3 N/mm, see `tools/simulators/rod/mechanics/fields.py`.
     """
 
     id: ClassVar[str] = "contact"

@@ -147,7 +147,7 @@ class TendonElasticity(Effect):
 @dataclass(frozen=True)
 class TendonFriction(Effect):
     """Capstan friction at the holes of the inner disks with Iwan pre-sliding; the law itself is in
-    `tools/simulators/rod/tendons.py`.
+    `tools/simulators/rod/mechanics/tendons.py`.
 
     mu = 0.1 strength; `stroke` is the mean slip before a hole slides.
     """

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tools.simulators.rod.effects.effect import Effect, Situation, rotation, unit_vector
-from tools.simulators.rod.fields import MAGNET_FIELD
+from tools.simulators.rod.mechanics.fields import MAGNET_FIELD
 
 
 @dataclass(frozen=True)

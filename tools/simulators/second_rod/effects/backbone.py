@@ -9,8 +9,8 @@ import numpy as np
 
 from tools.simulators.second_rod.day import REFERENCE, Day
 from tools.simulators.second_rod.effects.effect import Array, Backbone, Effect, sign
+from tools.simulators.second_rod.mechanics.rod import Rod
 from tools.simulators.second_rod.robot import Robot
-from tools.simulators.second_rod.rod import Rod
 
 
 class Creeping(Backbone):

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from tools.simulators.second_rod.day import Day
 from tools.simulators.second_rod.effects.effect import Array, Effect, floats
 from tools.simulators.second_rod.effects.tendon import BOTH
-from tools.simulators.second_rod.tendons import ROD_TENDONS
+from tools.simulators.second_rod.mechanics.tendons import ROD_TENDONS
 
 
 @dataclass(frozen=True)

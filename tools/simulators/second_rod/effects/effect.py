@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tools.simulators.second_rod.day import Day, Drive, Trial, Want
+from tools.simulators.second_rod.mechanics.rod import Rod
 from tools.simulators.second_rod.robot import Robot
-from tools.simulators.second_rod.rod import Rod
 
 Array = np.ndarray
 Numbers = float | tuple["Numbers", ...]

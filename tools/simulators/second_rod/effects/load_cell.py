@@ -7,7 +7,7 @@ import numpy as np
 
 from tools.simulators.second_rod.day import Day
 from tools.simulators.second_rod.effects.effect import Array, Effect, any_three, floats
-from tools.simulators.second_rod.tendons import ROD_TENDONS
+from tools.simulators.second_rod.mechanics.tendons import ROD_TENDONS
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from scipy.interpolate import CubicSpline
 from tools.simulators.second_rod.day import STANDARD_GRAVITY, Day, Trial
 from tools.simulators.second_rod.effects.effect import Array, Effect, Markers, floats, sign
 from tools.simulators.second_rod.effects.tendon import BOTH
-from tools.simulators.second_rod.fields import Jet
-from tools.simulators.second_rod.fields import Magnet as Repeller
 from tools.simulators.second_rod.loom import Loom as Sliders
+from tools.simulators.second_rod.mechanics.fields import Jet
+from tools.simulators.second_rod.mechanics.fields import Magnet as Repeller
+from tools.simulators.second_rod.mechanics.rod import INTERVALS
 from tools.simulators.second_rod.robot import ROD_LENGTH, Robot
-from tools.simulators.second_rod.rod import INTERVALS
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from tools.simulators.second_rod.contact import POST_OBSTACLE, WALL_OBSTACLE, obstacle
 from tools.simulators.second_rod.day import STANDARD_GRAVITY, Day, Trial
 from tools.simulators.second_rod.effects.effect import Array, Effect, Markers, any_three, floats, rotation, sign
 from tools.simulators.second_rod.effects.tendon import BOTH
+from tools.simulators.second_rod.mechanics.contact import POST_OBSTACLE, WALL_OBSTACLE, obstacle
 from tools.simulators.second_rod.robot import Robot
 
 WALL_HEIGHT = 0.06  # m: where a wall's distance is told, half way up the robot

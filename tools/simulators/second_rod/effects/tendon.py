@@ -7,8 +7,8 @@ import numpy as np
 
 from tools.simulators.second_rod.day import Day, Drive
 from tools.simulators.second_rod.effects.effect import Effect, sign
+from tools.simulators.second_rod.mechanics.tendons import ROD_TENDONS
 from tools.simulators.second_rod.robot import Robot
-from tools.simulators.second_rod.tendons import ROD_TENDONS
 
 BOTH: frozenset[Drive] = frozenset({"tension", "displacement"})
 

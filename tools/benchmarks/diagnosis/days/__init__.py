@@ -1,0 +1,1 @@
+"""Days of simulators that are diagnosed and counted."""

@@ -1,0 +1,1 @@
+"""Rods pulled by tendons: equations, frames and equilibria of the independent simulator."""

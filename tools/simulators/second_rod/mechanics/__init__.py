@@ -1,0 +1,1 @@
+"""Rods pulled by tendons, a second time: contact, fields and equilibria."""
