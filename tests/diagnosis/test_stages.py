@@ -336,7 +336,7 @@ def test_the_look_seals_six_trials_and_no_fewer_and_says_what_it_does(
         return SimpleNamespace(true=name, outputs=lambda twin, bench: f"readings of {name}")
 
     monkeypatch.setattr(look, "simulate", lambda twin, bench: [trace(i.name) for i in bench.inputs])
-    monkeypatch.setattr(look, "motion_as_measured", lambda bench, twin, seen, fitted: (bench, tuple(seen)))
+    monkeypatch.setattr(look, "motion_as_measured", lambda bench, twin, seen, fitted, steps: (bench, tuple(seen)))
     monkeypatch.setattr(look, "unstable_starts", lambda bench, traces: [traces[1].true])
     monkeypatch.setattr(look, "suspicions", lambda bench, twin, s, nominal: sealed.append((list(s), nominal)) or ("odd",))
     for n, count in ((FEWEST_TRIALS_FOR_HELD_OUT - 1, 0), (FEWEST_TRIALS_FOR_HELD_OUT, 2)):

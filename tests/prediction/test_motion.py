@@ -114,3 +114,12 @@ def test_nothing_is_added_where_statics_is_nearer_or_motion_is_slow() -> None:
     assert with_swing(replace(prepared, measured=static), softer(1.0), static, [0]) is None
     slow = replace(prepared, inputs=(replace(prepared.inputs[0], time=100.0 * prepared.inputs[0].time),))
     assert not swings(slow, static)
+
+
+def test_long_logs_are_not_stepped_through() -> None:
+    """The same two seconds until they last for more than five minutes."""
+    prepared, static, steps = swung(1.0)
+    n = 160
+    long = replace(prepared, inputs=n * prepared.inputs, measured=n * steps)
+    assert swings(long, n * static)
+    assert with_swing(long, softer(1.0), n * static, [0]) is None

@@ -118,7 +118,8 @@ def conclude(
     the robot as described, and once more of the twin that was found, where that does not explain them.
     """
     calibrated = calibrate(prepared, twin, held_out, nominal, settings, progress)
-    if (again := fast_motion(calibrated[0], calibrated[1], prepared)) is not None:
+    again = fast_motion(calibrated[0], calibrated[1], prepared) if settings.budget is None else None
+    if again is not None:
         calibrated = calibrate(again, calibrated[1].fit.model.twin, held_out, nominal, settings, progress)
     found = _concluded(*calibrated, settings)
     if settings.budget is None and found.judged.verdict not in ("noise", "explained"):
@@ -317,7 +318,7 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     prepared = whole if every == 1 else prepare(part, twin.robot)
     as_described = predicted(twin, prepared, list(range(len(prepared.inputs))))
     fitted, held_out = split(prepared, settings.seed)
-    prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted)
+    prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted, settings.budget is None)
     whole = moving_like(whole, prepared, twin)
     seen, alone = without_spikes(blind(prepared, held_out), nominal)
     start, objective, _ = objective_of(seen, twin, fitted, settings)

@@ -14,17 +14,18 @@ from twin.prediction.simulate import can_step, simulate
 from twin.prediction.twin import Twin
 
 LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
+LONGEST_STEPPED = 300.0  # s of all trials: steps of a rod take up to half as long as its motion
 SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
 
 
 def motion_as_measured(
-    prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int]
+    prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int], steps: bool = True
 ) -> tuple[PreparedRecording, tuple[np.ndarray, ...]]:
     """Return the recording, to be predicted as the listed trials show that it moves, and that prediction.
 
     `predicted` (n_k, n_output) SI, of all trials, is by statics with the body's damping. The damping of a body is seldom known, and
     steps of MuJoCo need some; a body of less follows its tensions sooner. What is later than the damping allows is no reason to
-    leave it out. Where inertia shows, steps are tried (`with_swing`).
+    leave it out. Where inertia shows, and there is time for `steps`, these are tried (`with_swing`).
 
     Nothing is calibrated yet: what an affine map of the prediction explains, a camera that is not aligned or a body too stiff, does
     not count. Trials that pull and never release hardly tell a late body from a stiff one.
@@ -37,7 +38,7 @@ def motion_as_measured(
             other = _predicted(at_once, twin)
             if _closer(prepared, trials, predicted, other) > 0.0:
                 prepared, predicted = replace(at_once, notices=(*at_once.notices, SOONER)), other
-    found = with_swing(prepared, twin, predicted, trials)
+    found = with_swing(prepared, twin, predicted, trials) if steps else None
     return (prepared, tuple(predicted)) if found is None else found
 
 
@@ -76,8 +77,9 @@ def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray]) -> bool
 
 
 def _may_swing(prepared: PreparedRecording) -> bool:
-    """Return whether the robot can be stepped, and pulled faster than springs heat."""
-    return not {Drive.CURRENT, Drive.CONTROL} & set(prepared.drives) and can_step(prepared)
+    """Return whether the robot can be stepped through trials as long as these, and is pulled faster than springs heat."""
+    lasts = sum(float(i.time[-1] - i.time[0]) for i in prepared.inputs)
+    return not {Drive.CURRENT, Drive.CONTROL} & set(prepared.drives) and lasts <= LONGEST_STEPPED and can_step(prepared)
 
 
 def moving_like(whole: PreparedRecording, prepared: PreparedRecording, twin: Twin) -> PreparedRecording:

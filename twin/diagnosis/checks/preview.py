@@ -49,7 +49,7 @@ def preview_data(prepared: PreparedRecording, twin: Twin, settings: Settings, pr
         raise SolveError("\n".join([str(error), *(f"Suspicion: {s.words}. Change: {s.change}." for s in found)])) from None
     as_described = [t.outputs(twin, prepared) for t in traces]
     fitted = [k for k in range(len(prepared.inputs)) if k not in held_out]
-    prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted)
+    prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted, settings.budget is None)
     unstable = tuple(f"{name}: unstable start, its shape is one of several" for name in unstable_starts(prepared, traces))
     progress("possible mistakes in the files")
     found = suspicions(without_swing(prepared), twin, held_out, nominal)
