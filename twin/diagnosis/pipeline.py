@@ -81,7 +81,7 @@ def diagnose(
         found, held_out = _held_out_diagnosis(recording, preview, twin, settings, progress)
         if every == 1:
             return found
-        whole = moving_like(whole, preview.prepared, twin)
+        whole = moving_like(whole, found.prepared, found.twin)
         return replace(found, notices=(*found.notices, thinning_words(log, every, *held_out.in_all_rows(whole))))
 
 
@@ -132,8 +132,12 @@ def conclude(
 def _concluded(context: FitContext, base: ScoredModel, notes: Sequence[str], settings: Settings) -> Conclusion:
     screening = screen(context, base, settings.seed)
     found, gated, judged = decide(context, base, screening)
-    swing = [SWINGING] if any(i.swing is not None for i in context.prepared.inputs) else []
-    return Conclusion(context, screening, found, gated, judged, (*notes, *swing, *context.budget.words()))
+    words = (*notes, *_swing_words(context.prepared), *context.budget.words())
+    return Conclusion(context, screening, found, gated, judged, words)
+
+
+def _swing_words(prepared: PreparedRecording) -> tuple[str, ...]:
+    return (SWINGING,) if any(i.swing is not None for i in prepared.inputs) else ()
 
 
 def decide(context: FitContext, base: ScoredModel, screening: Screening) -> tuple[Search, Gated, Judgement]:
@@ -319,7 +323,7 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     as_described = predicted(twin, prepared, list(range(len(prepared.inputs))))
     fitted, held_out = split(prepared, settings.seed)
     prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted, settings.budget is None)
-    whole = moving_like(whole, prepared, twin)
+    whole = prepared if every == 1 else moving_like(whole, prepared, twin)
     seen, alone = without_spikes(blind(prepared, held_out), nominal)
     start, objective, _ = objective_of(seen, twin, fitted, settings)
     found = fit(objective, start, refresh=True)
@@ -331,4 +335,4 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
         raw = [of.measured[k] - y for k, y in zip(held_out, predicted(found.model.twin, of, held_out), strict=True)]
         errors.append(factor * rms(of, raw, group))
     words = () if every == 1 else (thinning_words(log, every, errors[0], errors[1], unit),)
-    return found, f"{errors[0]:.3f} {unit}", (*prepared.notices, *alone, *words)
+    return found, f"{errors[0]:.3f} {unit}", (*prepared.notices, *alone, *_swing_words(prepared), *words)

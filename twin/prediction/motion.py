@@ -14,7 +14,7 @@ from twin.prediction.simulate import can_step, simulate
 from twin.prediction.twin import Twin
 
 LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
-LONGEST_STEPPED = 300.0  # s of all trials: steps of a rod take up to half as long as its motion
+LONGEST_STEPPED = 300.0  # s of all trials, which take a rod's steps up to two minutes
 SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
 
 
@@ -77,7 +77,7 @@ def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray]) -> bool
 
 
 def _may_swing(prepared: PreparedRecording) -> bool:
-    """Return whether the robot can be stepped through trials as long as these, and is pulled faster than springs heat."""
+    """Return whether the robot can be stepped through trials as long as these, and neither currents nor controls drive it."""
     lasts = sum(float(i.time[-1] - i.time[0]) for i in prepared.inputs)
     return not {Drive.CURRENT, Drive.CONTROL} & set(prepared.drives) and lasts <= LONGEST_STEPPED and can_step(prepared)
 
