@@ -36,43 +36,53 @@ def motion_as_measured(
         at_once = without_damping(prepared)
         with suppress(SolveError):
             other = _predicted(at_once, twin)
-            if _closer(prepared, trials, predicted, other) > 0.0:
+            if _closer(prepared, trials, predicted, other, _usual_noise(prepared)) > 0.0:
                 prepared, predicted = replace(at_once, notices=(*at_once.notices, SOONER)), other
     found = with_swing(prepared, twin, predicted, trials) if steps else None
     return (prepared, tuple(predicted)) if found is None else found
 
 
 def with_swing(
-    prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int]
+    prepared: PreparedRecording,
+    twin: Twin,
+    predicted: Sequence[np.ndarray],
+    trials: Sequence[int],
+    sigma: np.ndarray | None = None,
 ) -> tuple[PreparedRecording, tuple[np.ndarray, ...]] | None:
     """Return the recording with what steps of this twin add to its statics, in each output, and its prediction.
 
     None where that is less than can be seen, or no nearer to the listed trials than `predicted` (n_k, n_output), NaN in
     others, and where the steps are lost. Of a twin that differs, statics and this addition together err by the addition's change.
+    What can be seen is judged by the noise `sigma` (n_output,) SI of the outputs, by default as declared or as is typical.
     """
     still = without_swing(prepared)
     shown = [y if i.swing is None else y - i.swing for y, i in zip(predicted, prepared.inputs, strict=True)]
-    if not (_may_swing(still) and swings(still, shown)):
+    sigma = _usual_noise(prepared) if sigma is None else sigma
+    if not (_may_swing(still) and swings(still, shown, sigma)):
         return None
     try:
         moving = _stepped(still, twin)
-        return (_swinging(still, twin, moving), moving) if _closer(prepared, trials, predicted, moving) > 0.0 else None
+        closer = _closer(prepared, trials, predicted, moving, sigma) > 0.0
+        return (_swinging(still, twin, moving), moving) if closer else None
     except SolveError:
         return None
 
 
-def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray]) -> bool:
-    """Return whether inertia may show in the outputs (n_k, n_output) of statics.
+def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray], sigma: np.ndarray) -> bool:
+    """Return whether inertia may show in the outputs (n_k, n_output) of statics, of noise `sigma` (n_output,).
 
-    A mode of circular frequency w that follows x(t) is off by x''/w^2 to first order; the lowest mode counts.
+    A mode of circular frequency w that follows x(t) is off by x''/w^2 to first order; the lowest mode counts. Of lengths that are
+    driven, damping with the time constant tau adds tau x' to the tensions that are read.
     """
-    w = 2.0 * np.pi * prepared.robot.build().first_mode_frequency()
-    sigma = np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
-    off = [
-        np.gradient(np.gradient(y, i.time, axis=0), i.time, axis=0) / (w**2 * sigma)
-        for y, i in zip(predicted, prepared.inputs, strict=True)
-        if len(i.time) > 2
-    ]
+    body = prepared.robot.build()
+    w = 2.0 * np.pi * body.first_mode_frequency()
+    pushed = Drive.DISPLACEMENT in prepared.drives
+    tau = np.array([body.damping_time if pushed and o.group == "tension" else 0.0 for o in prepared.outputs])
+    off = []
+    for y, i in zip(predicted, prepared.inputs, strict=True):
+        if len(i.time) > 2:
+            rate = np.gradient(y, i.time, axis=0)
+            off.append((tau * rate + np.gradient(rate, i.time, axis=0) / w**2) / sigma)
     return bool(off) and float(np.sqrt(np.nanmean(np.concatenate(off) ** 2))) > LEAST_SWING
 
 
@@ -115,14 +125,23 @@ def _swinging(prepared: PreparedRecording, twin: Twin, moving: Sequence[np.ndarr
     return replace(prepared, inputs=tuple(replace(i, swing=m - s) for i, m, s in each))
 
 
-def _closer(prepared: PreparedRecording, trials: Sequence[int], first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> float:
+def _usual_noise(prepared: PreparedRecording) -> np.ndarray:
+    return np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
+
+
+def _closer(
+    prepared: PreparedRecording,
+    trials: Sequence[int],
+    first: Sequence[np.ndarray],
+    second: Sequence[np.ndarray],
+    sigma: np.ndarray,
+) -> float:
     """Return by how much |z|^2 of the listed trials is less of the second prediction than of the first."""
     y, before, after = (np.concatenate([of[k] for k in trials]) for of in (prepared.measured, first, second))
     A, fall = np.column_stack([np.ones(len(y)), before]), 0.0
-    for j, o in enumerate(prepared.outputs):
+    for j in range(y.shape[1]):
         seen = np.isfinite(y[:, j])
         r = (y[:, j : j + 1] - np.column_stack([before[:, j], after[:, j]]))[seen]
         left = r - A[seen] @ np.linalg.lstsq(A[seen], r, rcond=None)[0]
-        sigma = o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise
-        fall += float((left[:, 0] ** 2).sum() - (left[:, 1] ** 2).sum()) / sigma**2
+        fall += float((left[:, 0] ** 2).sum() - (left[:, 1] ** 2).sum()) / sigma[j] ** 2
     return fall
