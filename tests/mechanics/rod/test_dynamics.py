@@ -143,6 +143,20 @@ def test_half_the_step_is_closer(friction: bool) -> None:
     assert fine < 2e-3
 
 
+@pytest.mark.parametrize(("mu", "presliding", "most"), [(0.2, 8.7e-5, 3.0), (0.3, 2e-5, 3.0), (0.5, 8.7e-5, 6.0)])
+def test_tendons_that_stick_at_once_shake_nothing(mu: float, presliding: float, most: float) -> None:
+    """Random pulls for 2.6 s against steps twenty times as short, at which friction's own spring is resolved; the tip moves by
+    0.2 m. Errors of a millisecond's steps are 0.10 to 0.22 mm (RMS), without friction 0.17 and (6 N) 0.31; a third more is left for
+    other machines. Steps that do not hold the sticking tendon lose the motion of the last two or end 40 mm off."""
+    rng = np.random.default_rng(0)
+    time, pulls = np.arange(0.0, 3.0, 0.02), rng.uniform(0.0, most, (9, 3))
+    pulls[0] = 0.0
+    T = np.stack([np.interp(time, np.linspace(0.0, 2.6, 9), pulls[:, i]) for i in range(3)], axis=1)
+    loads, route = Loads(HANGING), Route(mu, presliding)
+    short, usual = (tips(moved(time, T, loads, route, step=step)) for step in (5e-5, 1e-3))
+    assert np.sqrt(np.mean(np.sum((usual - short) ** 2, axis=1))) < 3e-4
+
+
 def test_the_settled_shape_does_not_depend_on_the_step() -> None:
     t, T, rest = ramps([(0, 0, 0), (2.5, 0.5, 0), (1.0, 0.5, 0)], ramp=3.0, hold=3.0)
     for route, atol in ((Route(), 1e-6), (FRICTION, 1e-5)):  # m: no memory; slip that is integrated explicitly, 4 mm/s at 0.8 ms

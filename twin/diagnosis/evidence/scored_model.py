@@ -57,26 +57,40 @@ def score_model(context: FitContext, fitted: Fit) -> ScoredModel:
 
 
 def with_effect_added(
-    context: FitContext, member: ScoredModel, effect: str, start: FitStart, beat: float = np.inf
+    context: FitContext,
+    member: ScoredModel,
+    effect: str,
+    start: FitStart,
+    beat: float = np.inf,
+    alike: ScoredModel | None = None,
 ) -> ScoredModel | None:
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
     and from a drift of the wrong sign the first step could reach any shape. Where numbers of the robot went to their bounds for
-    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described.
+    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described. A fit of motion, which is
+    dear, goes on from one `alike`, of the same effects: the effect's numbers alone first, then all.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
-    if _bent(context, member.fit):
+    held = alike.fit if alike is not None and context.objective.bends else None
+    if held is not None:
+        model, near, J = Model(held.model.without_effect(effect).twin, ()), None, None
+    elif _bent(context, member.fit):
         model, near, J = _as_described(model), None, None
     values = dict(start.values)
     try:
+        if J is None and held is None and context.objective.bends:
+            J = context.own_derivatives(model)
         if signed := _signed(effect, start, n_tendon):
             amplitudes = model.with_effect(effect, values, signed, n_tendon)
             begun = fit(context.objective, amplitudes, near=near, J=J, stop=StopRule(worth=np.inf))
             values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
             model, near = begun.model.without_effect(effect), begun.evaluation
         model = model.with_effect(effect, values, start.free, n_tendon)
-        stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
+        stop = StopRule(REFIT_TOLERANCE, max(REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE * context.objective.n), beat)
+        if held is not None:
+            alone, others = fit(context.objective, model, near=near, stop=stop), held.model.without_effect(effect).free
+            model, near, J = Model(alone.model.twin, (*others, *model.free)), held.evaluation, _beside(held, effect)
         return score_model(context, fit(context.objective, model, near=near, J=J, stop=stop))
     except SolveError:
         return None
@@ -130,7 +144,7 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
             values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
             model, J = plain.fit.model, _own(plain.fit)
             if context.objective.bends and _bent(context, plain.fit):
-                model, J = _as_described(model), None
+                model = _as_described(model)
             model = model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
                 stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE)
@@ -189,10 +203,9 @@ def refit_without(
     if rest is not None:
         stop = StopRule(worth=REFIT_SCORE_TOLERANCE)
         return score_model(context, fit(context.objective, rest.model, near=rest.evaluation, J=rest.J, stop=stop))
-    keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
     model = best.fit.model.without_effect(effect)
     as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
-    for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
+    for start, J in ((model, _beside(best.fit, effect)), (as_calibrated, _own(base.fit))):
         try:
             return score_model(context, fit(context.objective, start, J=J, stop=StopRule(worth=REFIT_SCORE_TOLERANCE)))
         except SolveError:
@@ -208,6 +221,11 @@ def better(found: ScoredModel, than: ScoredModel) -> bool:
     if set(found.fit.model.free) == set(than.fit.model.free):
         return found.fit.cost < than.fit.cost
     return found.score > than.score
+
+
+def _beside(fitted: Fit, effect: str) -> np.ndarray:
+    """Return the derivatives for all free parameters but those of an effect."""
+    return fitted.J[:, [i for i, f in enumerate(fitted.model.free) if f.effect != effect]]
 
 
 def _own(fitted: Fit) -> np.ndarray:

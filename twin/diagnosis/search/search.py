@@ -120,7 +120,8 @@ def extend(
             continue
         context.progress(name)
         beat = HOPELESS_COST_RATIO * min((w.fit.cost for w in fresh.values()), default=np.inf)
-        found = with_effect_added(context, member, candidate.effect, candidate.start, beat)
+        alike = next((w for w in fresh.values() if w.effects == tuple(sorted((*member.effects, candidate.effect)))), None)
+        found = with_effect_added(context, member, candidate.effect, candidate.start, beat, alike)
         if found is not None and (found.forms not in fresh or better(found, fresh[found.forms])):
             fresh[found.forms] = found
 

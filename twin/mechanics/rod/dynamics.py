@@ -4,9 +4,11 @@ Per step: slip states from the tendons' travel, segment tensions to `ctrl`; tip 
 springs from the true elastic moment (elastic.py) to `qfrc_applied`; then `mj_step`. Tendons that motors or SMA springs hold at
 lengths are in held_tendons.py.
 
-The slip state is explicit here. It is stable while the pre-sliding length in mm is at least half the step in ms, so the step
-shrinks with a short pre-sliding length. MuJoCo's implicit integration takes the springs of hinges and wall, so that neither bounds
-the step. It adds damping: 2 % of critical at 1 ms on the first mode.
+A tendon that sticks at a disk is a spring, K = T mu theta / presliding along its travel, that shakes light disks many times in a
+step h. Its force is explicit here, at MuJoCo's present shape; steps are stable by an inertia of each joint i, h^2 K |ds/dq_i|
+sum_j |ds/dq_j| at most, s the length distal of the disk, while it sticks. MuJoCo has it as a damping that the same force at the
+joint's last rate makes up for. MuJoCo's implicit integration takes damping and the springs of hinges and wall, so that none of
+them bounds the step. It adds damping: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ from twin.mechanics.rod.held_tendons import (
 )
 from twin.mechanics.rod.trial_steps import CreepState, advance_creep, any_true, set_rest_shape
 
-STEP_PER_PRESLIDING = 2.0  # s/m
+STICKING_SHARE = 0.4  # of the inertia that makes a step implicit in what sticks: steps are stable from a quarter on
 # m, from a wall to a distant site in front of it, to which slack springs of that length tie the disks. The sphere that they cannot
 # leave is flat to x^2 / (2 POST_DISTANCE) = 1e-7 m at a robot's length, and lengths are still resolved to 1e-11 m.
 POST_DISTANCE = 1e5
@@ -64,6 +66,8 @@ class Motion(NamedTuple):
     velocity: np.ndarray  # (nv,)
     ctrl: np.ndarray
     applied: np.ndarray  # (nv,)
+    damping: np.ndarray  # (nv,) of the joints, that of sticking tendons included
+    own: np.ndarray  # (nv,) the same without
     actuator: np.ndarray  # (n_tendon, n_piece) actuators
     rest: np.ndarray  # (nv,) rest shape without creep
     time: np.ndarray  # (n,) s
@@ -89,7 +93,9 @@ def route_tension(system, state, motion, tendons):
     Tensions of held tendons are computed first; their own MuJoCo spring's pull is subtracted from the motors'.
     """
     nt, longest = motion.actuator.shape
-    longest_path, distal = empty_tendon_path(longest), np.zeros(longest)
+    longest_path, distal, rubs = empty_tendon_path(longest), np.zeros(longest), system.law.mu > 0.0
+    if rubs:
+        assign(motion.damping, motion.own)
     for t in range(nt):
         tendon, by_spring = first_pieces(longest_path, system.chain.n_piece[t]), 0.0
         trace_tendon(system.chain, t, tendon, distal)
@@ -97,9 +103,31 @@ def route_tension(system, state, motion, tendons):
             state.T[t] = by_spring = held_tension(tendons, t, distal[0])
             distal[0] += tendons.bowing[t]
         apply_friction(state.T[t], system.law, tendon, state.z[t], state.s[t], distal, state.z[t])
+        if rubs:
+            damp_sticking(system, state, motion, tendon, t, distal)
         for d in range(tendon.T.size):
             state.s[t, d] = distal[d]
             motion.ctrl[motion.actuator[t, d]] = tendon.T[d] - by_spring
+
+
+@jit_internal
+def damp_sticking(system, state, motion, tendon, t, distal):
+    """Add the damping (nv,) by which a step is stable where tendon t, traced, sticks; it slides at its farthest slip state."""
+    chain, law, n = system.chain, system.law, tendon.T.size
+    turns, damping = np.zeros(motion.own.size), STICKING_SHARE * motion.step * abs(state.T[t]) * law.mu / law.presliding
+    for d in range(n):
+        end = chain.site[chain.hole[t, d + 1]]
+        for i in range(chain.first_joint[d], chain.first_joint[d + 1]):
+            turns[i] = abs(dot(tendon.u[d], point_velocity(chain, i, end)))
+    beyond, first = 0.0, chain.first_joint[n]
+    for d in range(n - 1, 0, -1):
+        while first > chain.first_joint[d]:
+            first -= 1
+            beyond += turns[first]
+        z, travel = state.z[t, d], state.s[t, d] - distal[d]
+        if abs(z) < 1.0 or z * travel < 0.0:
+            for i in range(first, chain.first_joint[n]):
+                motion.damping[i] += damping * tendon.theta[d] * turns[i] * beyond
 
 
 @jit_internal
@@ -171,6 +199,7 @@ def step_through(system, motion, tendons, creep, state, samples):
     step, or -1.
     """
     chain, time, command, step, holds = system.chain, motion.time, motion.command, motion.step, any_true(tendons.actuation.held)
+    rubs, forces = system.law.mu > 0.0, np.zeros(state.q.size)
     now, r, taken = motion.reached, np.zeros(state.q.size), motion.taken
     D = np.empty((chain.handedness.size, 3, 3))
     for i in range(time.size):
@@ -179,11 +208,15 @@ def step_through(system, motion, tendons, creep, state, samples):
             for t in range(state.T.size):
                 if not tendons.actuation.held[t]:
                     state.T[t] = (1.0 - w) * command[i - 1, t] + w * command[i, t]
-            if holds:
+            if holds or rubs:
                 update_kinematics(system, chain.qpos)
             route_tension(system, state, motion, tendons)
             if taken % FORCE_UPDATE_STEPS == 0:
                 apply_forces(system, state, motion, tendons.bowing, r)
+                assign(forces, motion.applied)
+            if rubs:
+                for k in range(r.size):
+                    motion.applied[k] = forces[k] + (motion.damping[k] - motion.own[k]) * motion.velocity[k]
             if holds:
                 set_held_springs(state, motion, tendons, i, w)
             taken += 1
@@ -239,8 +272,6 @@ class ChainMotion:
         add_held_tendons(body.spec, body, ~self._by_tension)
         compiled = Equilibrium(body)
         self.model, self.data = model, data = compiled.model, compiled.data
-        step = min(model.opt.timestep, STEP_PER_PRESLIDING * route.presliding) if route.mu > 0.0 else model.opt.timestep
-        model.opt.timestep = step
         model.opt.gravity[:] = loads.gravity
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a diverged state must not be reset silently
         rest = model.qpos_spring.copy()
@@ -256,8 +287,8 @@ class ChainMotion:
             actuator[t, d] = model.actuator(f"tendon_{t + 1}_segment_{d + 1}").id
         nt = problem.command.shape[1]
         self._motion = Motion(
-            self._start_time, 0, float(step), data.qvel, data.ctrl, data.qfrc_applied, actuator, rest,
-            np.zeros(0), np.zeros((0, nt)), np.zeros(0),
+            self._start_time, 0, float(model.opt.timestep), data.qvel, data.ctrl, data.qfrc_applied, model.dof_damping,
+            model.dof_damping.copy(), actuator, rest, np.zeros(0), np.zeros((0, nt)), np.zeros(0),
         )  # fmt: skip
         self.state = ChainState(start.tension[0].copy(), start.q[0].copy(), start.slip.copy(), start.distal.copy())
         self._creep = CreepState(amplitude, np.array(problem.creep.time, float), delayed)
