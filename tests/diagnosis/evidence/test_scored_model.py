@@ -131,7 +131,9 @@ def test_another_start_of_an_effect_in_motion_goes_on_from_the_first(monkeypatch
 
 def test_derivatives_of_a_robot_in_motion_are_computed_once_for_all_its_effects() -> None:
     asked = []
-    objective: Any = SimpleNamespace(evaluate=lambda model: model, jacobian=lambda at, which: asked.append(which) or np.ones((2, 1)))
+    objective: Any = SimpleNamespace(
+        evaluate=lambda model: model, jacobian=lambda at, which: asked.append(which) or np.ones((2, 1))
+    )
     context, model = FitContext(objective, SimpleNamespace()), calibrated("base_tilt")  # type: ignore[arg-type]
     first = context.own_derivatives(model)
     assert context.own_derivatives(calibrated("base_tilt")) is first

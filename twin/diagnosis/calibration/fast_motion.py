@@ -11,7 +11,8 @@ from twin.prediction.prepared import PreparedRecording
 def fast_motion(context: FitContext, found: ScoredModel, prepared: PreparedRecording) -> PreparedRecording | None:
     """Return the recording `prepared`, its fast motion that of a model found in it, to be calibrated again.
 
-    None where the motion does not show in the noise that was estimated, or where that of this model is no nearer to the fitted trials than what was found.
+    None where the motion does not show in the noise that was estimated, or where that of this model is no nearer to the fitted
+    trials than what was found.
     """
     twin, traces = found.fit.model.twin, found.fit.evaluation.traces
     shown = [traces[k].outputs(twin, context.prepared) if k in traces else y for k, y in enumerate(context.prepared.measured)]
