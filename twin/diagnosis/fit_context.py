@@ -8,7 +8,6 @@ import numpy as np
 from twin.body import Drive
 from twin.diagnosis.budget import Budget
 from twin.diagnosis.calibration.fit import Fit
-from twin.diagnosis.calibration.model import Model
 from twin.diagnosis.calibration.objective import Objective
 from twin.diagnosis.evidence.discrepancy import Evidence
 from twin.diagnosis.noise.transmission import transmitted_noise
@@ -16,7 +15,6 @@ from twin.diagnosis.noise.whitening import SLACK_READING
 from twin.foundation.parameters import parameter_array
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
-from twin.prediction.twin import Twin
 
 Progress = Callable[[str], None]
 
@@ -36,14 +34,6 @@ class FitContext:
     evidence: Evidence
     progress: Progress = silent
     budget: Budget = field(default_factory=Budget)
-    _derivatives: dict[Twin, np.ndarray] = field(default_factory=dict)
-
-    def own_derivatives(self, model: Model) -> np.ndarray:
-        """Return dz/dx (n, n_own) for the robot's own parameters, in steps; computed once for each twin. Raise SolveError."""
-        if model.twin not in self._derivatives:
-            at = self.objective.evaluate(model)
-            self._derivatives[model.twin] = self.objective.jacobian(at, [i for i, f in enumerate(model.free) if f.effect is None])
-        return self._derivatives[model.twin]
 
     def unwhitened(self, fit: Fit) -> np.ndarray:
         """Return the residual in sigmas of its sensors, not whitened (n,); zero where nothing was measured."""

@@ -20,7 +20,6 @@ from twin.diagnosis.evidence.scored_model import (
     with_extended_law,
     without_idle_numbers,
 )
-from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue, effect_class
 from twin.foundation.errors import SolveError
@@ -99,45 +98,6 @@ def test_one_effect_more_is_fitted_from_its_start_near_what_was_fitted(monkeypat
     assert how == {"near": HERE, "J": member.fit.J, "stop": StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, 7.0)}
     Fits(monkeypatch, fails=1)
     assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",))) is None
-
-
-def test_another_start_of_an_effect_in_motion_goes_on_from_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its numbers alone are fitted at the robot that the first found, then all, by the derivatives that are known there."""
-    fits, member = Fits(monkeypatch), weighed(calibrated("base_tilt"))
-    moving = study()
-    moving.objective.bends = True
-    base = calibrated("base_tilt")
-    friction = base.at(base.vector() * 1.01).with_effect("tendon_friction", {"mu": 0.3}, ("mu",), 3)
-
-    def fit(objective: Any, model: Model, **how: Any) -> Any:
-        fits.fit(objective, model, **how)
-        return SimpleNamespace(model=model)
-
-    monkeypatch.setattr(stage, "fit", fit)
-    monkeypatch.setattr(stage, "score_model", lambda study, fitted: weighed(fitted.model))
-    first = weighed(friction)
-    assert with_effect_added(moving, member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",)), 7.0, first) is not None
-    (alone, _), (whole, how) = fits.asked
-    assert [f.label for f in alone.free] == ["tendon_friction.mu"]
-    assert whole.free == friction.free
-    assert alone.twin == whole.twin
-    assert whole.twin.values == friction.twin.values
-    assert whole.twin.effects[-1]["mu"] == 0.1
-    np.testing.assert_array_equal(how["J"], first.fit.J[:, :-1])
-    still = Fits(monkeypatch)
-    assert with_effect_added(study(), member, "tendon_friction", FitStart({"mu": 0.1}, ("mu",)), 7.0, first)
-    assert len(still.asked) == 1, "statics is fast: all numbers at once"
-
-
-def test_derivatives_of_a_robot_in_motion_are_computed_once_for_all_its_effects() -> None:
-    asked = []
-    objective: Any = SimpleNamespace(
-        evaluate=lambda model: model, jacobian=lambda at, which: asked.append(which) or np.ones((2, 1))
-    )
-    context, model = FitContext(objective, SimpleNamespace()), calibrated("base_tilt")  # type: ignore[arg-type]
-    first = context.own_derivatives(model)
-    assert context.own_derivatives(calibrated("base_tilt")) is first
-    assert asked == [[i for i, f in enumerate(model.free) if f.effect is None]]
 
 
 @pytest.mark.parametrize(("ended", "anew"), [("backbone.youngs_modulus", True), ("about_x", False), ("", False)])

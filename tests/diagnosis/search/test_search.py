@@ -63,7 +63,7 @@ class World:
         fit = SimpleNamespace(effects=effects, z=z, model=model, cost=-score)
         return told(effects, score, fit, "")
 
-    def extended(self, study: Any, member: Any, effect: str, start: Any, beat: float = 0.0, alike: Any = None) -> Any:
+    def extended(self, study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
         return self.of(*member.effects, effect)
 
     def rank(self, objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
@@ -295,7 +295,7 @@ def test_a_set_is_weighed_with_each_law_of_a_name(monkeypatch: pytest.MonkeyPatc
         left = [e for e in world.worth if e not in fit.effects]
         return [SimpleNamespace(effect=e, start=f, gain=1e6) for e in left for f in (("stretch", "toe") if e == "ropes" else ("",))]
 
-    def extended(study: Any, member: Any, effect: str, start: Any, beat: float = 0.0, alike: Any = None) -> Any:
+    def extended(study: Any, member: Any, effect: str, start: Any, beat: float = 0.0) -> Any:
         form = start or dict(member.forms).get("ropes", "")
         made = world.of(*member.effects, effect)
         worth = {("stretch", 1): 50.0, ("toe", 2): 80.0}.get((form, len(made.effects)), 0.0)

@@ -182,7 +182,7 @@ def fit(
     columns[:, fixed] = objective.jacobian(at, fixed)
     now, damping = penalty.cost(at), penalty.first_damping
     beat, before = penalty.scaled(stop.beat), np.inf  # `before`: what derivatives promised a step earlier
-    since = penalty.since(at, near, J)
+    since = np.inf if J is not None else now  # the cost when derivatives for the robot's own parameters were computed
     for left in range(MOST_FIT_STEPS - 1, -1, -1):
         if not objective.bends and renewals == allowed and left < MOST_FIT_STEPS - MOST_STEPS_WITH_KEPT:
             break
@@ -316,12 +316,6 @@ class _Penalty:
 
     def cost(self, e: Evaluation) -> float:
         return self.scaled(float(e.z @ e.z)) + self.besides(e.model.vector())
-
-    def since(self, at: Evaluation, near: Evaluation | None, J: np.ndarray | None) -> float:
-        """Return the cost where derivatives for the robot's own parameters were computed: here, or in a neighbouring fit."""
-        if J is None:
-            return self.cost(at)
-        return np.inf if near is None else self.scaled(float(near.z @ near.z)) + self.besides(at.model.vector())
 
     def scaled(self, square: float) -> float:
         """Return what |z|^2 costs: itself, and of motion above the noise n (1 + ln |z|^2 / n), as for noise of unknown size.

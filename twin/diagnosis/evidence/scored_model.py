@@ -1,19 +1,21 @@
 """A fitted model, its evidence, and its refits."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.diagnosis.calibration.fit import Fit, StopRule, fit
 from twin.diagnosis.calibration.model import Free, Model
+from twin.diagnosis.calibration.objective import Evaluation
 from twin.diagnosis.checks.fit_warnings import unlikely
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.evidence.discrepancy import Discrepancy
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
+from twin.diagnosis.thresholds import MOST_HALVINGS, REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue
-from twin.effects.base.scaling import scaled_extended_starts
+from twin.effects.base.scaling import scaled_extended_starts, scaled_parameters
 from twin.foundation.errors import SolveError
 
 EffectForms = tuple[tuple[str, str], ...]  # effect and its form, sorted; the key of a set of effects
@@ -57,43 +59,71 @@ def score_model(context: FitContext, fitted: Fit) -> ScoredModel:
 
 
 def with_effect_added(
-    context: FitContext,
-    member: ScoredModel,
-    effect: str,
-    start: FitStart,
-    beat: float = np.inf,
-    alike: ScoredModel | None = None,
+    context: FitContext, member: ScoredModel, effect: str, start: FitStart, beat: float = np.inf
 ) -> ScoredModel | None:
     """Return `member` with one effect more, fitted as long as it may `beat` a cost; None without an equilibrium.
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
     and from a drift of the wrong sign the first step could reach any shape. Where numbers of the robot went to their bounds for
-    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described. A fit of motion, which is
-    dear, goes on from one `alike`, of the same effects: the effect's numbers alone first, then all.
+    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described, and from amplitudes that
+    bring it nearer to the data.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
-    held = alike.fit if alike is not None and context.objective.bends else None
-    if held is not None:
-        model, near, J = Model(held.model.without_effect(effect).twin, ()), None, None
-    elif _bent(context, member.fit):
+    if _bent(context, member.fit):
         model, near, J = _as_described(model), None, None
     values = dict(start.values)
     try:
-        if J is None and held is None and context.objective.bends:
-            J = context.own_derivatives(model)
         if signed := _signed(effect, start, n_tendon):
             amplitudes = model.with_effect(effect, values, signed, n_tendon)
             begun = fit(context.objective, amplitudes, near=near, J=J, stop=StopRule(worth=np.inf))
             values = dict(next(e for e in begun.model.twin.effects if e.id == effect).values)
             model, near = begun.model.without_effect(effect), begun.evaluation
+        elif context.objective.bends:
+            values = _begun(context, model, near, effect, start)
         model = model.with_effect(effect, values, start.free, n_tendon)
-        stop = StopRule(REFIT_TOLERANCE, max(REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE * context.objective.n), beat)
-        if held is not None:
-            alone, others = fit(context.objective, model, near=near, stop=stop), held.model.without_effect(effect).free
-            model, near, J = Model(alone.model.twin, (*others, *model.free)), held.evaluation, _beside(held, effect)
+        stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE, beat)
         return score_model(context, fit(context.objective, model, near=near, J=J, stop=stop))
     except SolveError:
         return None
+
+
+def _begun(context: FitContext, model: Model, at: Evaluation | None, effect: str, start: FitStart) -> dict[str, float]:
+    """Return the values of a start, its amplitudes halved towards OFF until a motion is nearer to the data than without the effect.
+
+    A joint that sticks for good shows no derivative to less friction. Limits, whose OFF is out of reach, stay; so does all where
+    nothing is nearer. Raise SolveError where the motion without the effect is lost.
+    """
+    n_tendon, off = context.prepared.n_tendon, dict[str, float]()
+    for p in scaled_parameters(catalogue()[effect], n_tendon, context.prepared.robot.size):
+        if (
+            p.name in start.values
+            and p.name not in catalogue()[effect].inactive_when_off
+            and abs(p.value) < abs(start.values[p.name])
+        ):
+            off[p.name] = p.value
+    before = (at or context.objective.evaluate(model)).z if off else np.zeros(0)
+    for halvings in range(MOST_HALVINGS if off else 0):
+        values = {**start.values, **{n: o + (start.values[n] - o) * 0.5**halvings for n, o in off.items()}}
+        with suppress(SolveError):
+            if context.objective.within(float(before @ before), model.with_effect(effect, values, (), n_tendon)) is not None:
+                return values
+    return dict(start.values)
+
+
+def described(context: FitContext, member: ScoredModel) -> ScoredModel | None:
+    """Return the model of a motion with the robot's own numbers as described, where these were bent for want of an effect.
+
+    Else None, as where the motion is lost. It is not fitted; its derivatives are its own.
+    """
+    if not (context.objective.bends and _bent(context, member.fit)):
+        return None
+    model = _as_described(member.fit.model)
+    try:
+        at = context.objective.evaluate(model)
+        J = context.objective.jacobian(at, range(len(model.free)))
+    except SolveError:
+        return None
+    return score_model(context, Fit(at, J, float(at.z @ at.z)))
 
 
 def _bent(context: FitContext, fitted: Fit) -> bool:
@@ -144,7 +174,7 @@ def with_extended_law(context: FitContext, found: ScoredModel, accept: float) ->
             values, freed = {**law.values, **start.values}, tuple(dict.fromkeys((*free, *start.free)))
             model, J = plain.fit.model, _own(plain.fit)
             if context.objective.bends and _bent(context, plain.fit):
-                model = _as_described(model)
+                model, J = _as_described(model), None
             model = model.without_effect(effect).with_effect(effect, values, freed, n_tendon)
             try:
                 stop = StopRule(REFIT_TOLERANCE, REFIT_SCORE_TOLERANCE)
@@ -203,9 +233,10 @@ def refit_without(
     if rest is not None:
         stop = StopRule(worth=REFIT_SCORE_TOLERANCE)
         return score_model(context, fit(context.objective, rest.model, near=rest.evaluation, J=rest.J, stop=stop))
+    keep = [i for i, f in enumerate(best.fit.model.free) if f.effect != effect]
     model = best.fit.model.without_effect(effect)
     as_calibrated = Model(replace(model.twin, values=base.fit.model.twin.values), model.free)
-    for start, J in ((model, _beside(best.fit, effect)), (as_calibrated, _own(base.fit))):
+    for start, J in ((model, best.fit.J[:, keep]), (as_calibrated, _own(base.fit))):
         try:
             return score_model(context, fit(context.objective, start, J=J, stop=StopRule(worth=REFIT_SCORE_TOLERANCE)))
         except SolveError:
@@ -221,11 +252,6 @@ def better(found: ScoredModel, than: ScoredModel) -> bool:
     if set(found.fit.model.free) == set(than.fit.model.free):
         return found.fit.cost < than.fit.cost
     return found.score > than.score
-
-
-def _beside(fitted: Fit, effect: str) -> np.ndarray:
-    """Return the derivatives for all free parameters but those of an effect."""
-    return fitted.J[:, [i for i, f in enumerate(fitted.model.free) if f.effect != effect]]
 
 
 def _own(fitted: Fit) -> np.ndarray:

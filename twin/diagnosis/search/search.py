@@ -15,6 +15,7 @@ from twin.diagnosis.evidence.scored_model import (
     EffectForms,
     ScoredModel,
     better,
+    described,
     refit_without,
     with_effect_added,
     with_extended_law,
@@ -59,16 +60,21 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
         best_before = max(w.score for w in known.values())
         fresh: Known = {}
         for member in (*beam, *step):
-            lacks = patterns.beside(member.effects)
+            lacks, seen = patterns.beside(member.effects), None
+            if member is (*beam, *step)[0]:
+                seen = described(context, member)
             # Patterns depend little on what is already fitted (gains by some per cent). Only the leading set's are computed again,
-            # of effects that promise something by the base's patterns; the others use the base's.
-            if member is (*beam, *step)[0] and member is not base:
+            # of effects that promise something by the base's patterns; the others use the base's. Where numbers of the robot were
+            # bent for want of an effect, its pattern beside them may promise nothing: patterns are those of the robot as described.
+            if seen is not None:
+                lacks = dictionary(context.objective, seen.fit)
+            elif member is (*beam, *step)[0] and member is not base:
                 least = REUSED_PROMISE_SHARE * _asked(context, base, member, limits, limits.material)
                 promise = rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
                 lacks = dictionary(context.objective, member.fit, {c.effect for c in promise if c.gain >= least})
             context.progress(f"effects, {level} at once")
             before = dict(fresh)
-            extend(context, base, member, lacks, limits, fresh)
+            extend(context, base, member, lacks, limits, fresh, seen)
             if any(member is s for s in step):
                 more, half = best_before + limits.accept, WHITER_MODEL_LEAVES * _leaves(context, base, member)
                 fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(context, base, w) < half}
@@ -109,19 +115,25 @@ def carried(
 
 
 def extend(
-    context: FitContext, base: ScoredModel, member: ScoredModel, lacks: Dictionary, limits: AcceptanceLimits, fresh: Known
+    context: FitContext,
+    base: ScoredModel,
+    member: ScoredModel,
+    lacks: Dictionary,
+    limits: AcceptanceLimits,
+    fresh: Known,
+    seen: ScoredModel | None = None,
 ) -> None:
-    """Add to `fresh` `member` with each of the effects whose pattern promises most."""
-    for candidate in rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks):
-        if not _worth_a_fit(context, base, member, lacks, limits, candidate):
+    """Add to `fresh` `member` with each of the effects whose pattern promises most beside it, or beside `seen`."""
+    seen = seen or member
+    for candidate in rank(context.objective, context.evidence, seen.fit, seen.discrepancy, lacks):
+        if not _worth_a_fit(context, base, seen, lacks, limits, candidate):
             continue
         name = " + ".join((*member.effects, candidate.effect))
         if not context.budget.allows(name):
             continue
         context.progress(name)
         beat = HOPELESS_COST_RATIO * min((w.fit.cost for w in fresh.values()), default=np.inf)
-        alike = next((w for w in fresh.values() if w.effects == tuple(sorted((*member.effects, candidate.effect)))), None)
-        found = with_effect_added(context, member, candidate.effect, candidate.start, beat, alike)
+        found = with_effect_added(context, member, candidate.effect, candidate.start, beat)
         if found is not None and (found.forms not in fresh or better(found, fresh[found.forms])):
             fresh[found.forms] = found
 
