@@ -225,7 +225,8 @@ PROMISED_SHARE = _row("PROMISED_SHARE", 0.25, "of what an effect must have, in e
 REUSED_PROMISE_SHARE = _row("REUSED_PROMISE_SHARE", 0.25, "of what a pattern must promise",
     "that a pattern of the base must promise beside other effects to be computed again there",
     "judgement: of some 96 that then promised enough, on 14 sets, one had promised less (0.04 for 2.6, beside a best of 75)")
-MOST_HALVINGS = _row("MOST_HALVINGS", 6, "halvings", "of the first amplitude of a motion's effect; a thirtieth is small", "judgement")
+MOST_HALVINGS = _row("MOST_HALVINGS", 6, "halvings", "of the first amplitude of a motion's effect; a thirtieth is small",
+    "judgement")
 REFIT_TOLERANCE = _row("REFIT_TOLERANCE", 2e-4, "of the cost",
     "by which the last step of a refit falls; what is left is second order in it", "judgement")
 REFIT_SCORE_TOLERANCE = _row("REFIT_SCORE_TOLERANCE", 3.0, "2 ln odds",

@@ -103,11 +103,11 @@ def _begun(context: FitContext, model: Model, at: Evaluation | None, effect: str
             off[p.name] = p.value
     before = (at or context.objective.evaluate(model)).z if off else np.zeros(0)
     for halvings in range(MOST_HALVINGS if off else 0):
-        values = {**start.values, **{n: o + (start.values[n] - o) * 0.5**halvings for n, o in off.items()}}
+        values = {**begun, **{n: o + (begun[n] - o) * 0.5**halvings for n, o in off.items()}}
         with suppress(SolveError):
             if context.objective.within(float(before @ before), model.with_effect(effect, values, (), n_tendon)) is not None:
                 return values
-    return dict(start.values)
+    return dict(begun)
 
 
 def described(context: FitContext, member: ScoredModel) -> ScoredModel | None:

@@ -60,21 +60,16 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
         best_before = max(w.score for w in known.values())
         fresh: Known = {}
         for member in (*beam, *step):
-            lacks, seen = patterns.beside(member.effects), None
-            if member is (*beam, *step)[0]:
-                seen = described(context, member)
+            lacks = patterns.beside(member.effects)
             # Patterns depend little on what is already fitted (gains by some per cent). Only the leading set's are computed again,
-            # of effects that promise something by the base's patterns; the others use the base's. Where numbers of the robot were
-            # bent for want of an effect, its pattern beside them may promise nothing: patterns are those of the robot as described.
-            if seen is not None:
-                lacks = dictionary(context.objective, seen.fit)
-            elif member is (*beam, *step)[0] and member is not base:
+            # of effects that promise something by the base's patterns; the others use the base's.
+            if member is (*beam, *step)[0] and member is not base:
                 least = REUSED_PROMISE_SHARE * _asked(context, base, member, limits, limits.material)
                 promise = rank(context.objective, context.evidence, member.fit, member.discrepancy, lacks, top=len(lacks.patterns))
                 lacks = dictionary(context.objective, member.fit, {c.effect for c in promise if c.gain >= least})
             context.progress(f"effects, {level} at once")
             before = dict(fresh)
-            extend(context, base, member, lacks, limits, fresh, seen)
+            extend(context, base, member, lacks, limits, fresh)
             if any(member is s for s in step):
                 more, half = best_before + limits.accept, WHITER_MODEL_LEAVES * _leaves(context, base, member)
                 fresh = before | {k: w for k, w in fresh.items() if w.score >= more and _leaves(context, base, w) < half}
@@ -84,10 +79,26 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
         beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
         if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > LEFT_FOR_THIRD_EFFECT):
             break
+    if min(float(w.fit.z @ w.fit.z) for w in known.values()) > HOPELESS_COST_RATIO * context.objective.n:
+        known |= _beside_described(context, base, limits, known)
     best = max(known.values(), key=lambda w: w.score - limits.accept * len(w.effects))
     best = exchanged(context, best, known)
     best = _leaner(context, base, best, known, limits.accept)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
+
+
+def _beside_described(context: FitContext, base: ScoredModel, limits: AcceptanceLimits, known: Known) -> Known:
+    """Return, of a motion that nothing known explains, effects not yet tried alone that promise something beside the description.
+
+    Calibration bends numbers of the robot for want of a large effect (a damper for friction); beside these its pattern promises
+    nothing. None where no number was bent.
+    """
+    fresh: Known = {}
+    if (seen := described(context, base)) is not None:
+        untried = set(catalogue()) - {e for w in known.values() if len(w.effects) == 1 for e in w.effects}
+        context.progress("effects beside the robot as described")
+        extend(context, base, base, dictionary(context.objective, seen.fit, untried), limits, fresh, seen)
+    return {k: _whole(context, w, limits.accept) for k, w in fresh.items()}
 
 
 def _whole(context: FitContext, found: ScoredModel, accept: float) -> ScoredModel:

@@ -71,6 +71,8 @@ def commands(case: Case) -> Iterator[Suspicion]:
             return replace(i, command=i.command * np.where(of, factor, 1.0))
 
         ratios = {other: _ratio(other, unit, si) for other in others(channels[0])}
+        if not ratios:  # shares of a control's range, rates: nobody writes these in another unit
+            continue
         tried = [(o, lambda i, of=of, f=f: scaled(i, of, f)) for o, f in ratios.items() if (f > 1.0) == larger]
         words = f"with {called(channels)} of some {read:.3g} {unit} the robot as described would not move as measured"
         change = 'unit = "{}" ' + f'instead of "{unit}" for {called(channels)}'
