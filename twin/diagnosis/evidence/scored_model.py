@@ -93,14 +93,9 @@ def _begun(context: FitContext, model: Model, at: Evaluation | None, effect: str
     A joint that sticks for good shows no derivative to less friction. Limits, whose OFF is out of reach, stay; so does all where
     nothing is nearer. Raise SolveError where the motion without the effect is lost.
     """
-    n_tendon, off = context.prepared.n_tendon, dict[str, float]()
-    for p in scaled_parameters(catalogue()[effect], n_tendon, context.prepared.robot.size):
-        if (
-            p.name in start.values
-            and p.name not in catalogue()[effect].inactive_when_off
-            and abs(p.value) < abs(start.values[p.name])
-        ):
-            off[p.name] = p.value
+    n_tendon, law, begun = context.prepared.n_tendon, catalogue()[effect], start.values
+    each = {p.name: p.value for p in scaled_parameters(law, n_tendon, context.prepared.robot.size)}
+    off = {n: each[n] for n in begun if n not in law.inactive_when_off and abs(each[n]) < abs(begun[n])}
     before = (at or context.objective.evaluate(model)).z if off else np.zeros(0)
     for halvings in range(MOST_HALVINGS if off else 0):
         values = {**begun, **{n: o + (begun[n] - o) * 0.5**halvings for n, o in off.items()}}
