@@ -116,6 +116,47 @@ def test_a_robot_whose_own_numbers_are_at_bounds_is_fitted_from_the_description(
     assert (how["J"] is None) == anew
 
 
+def test_an_effect_of_a_motion_begins_where_it_brings_it_nearer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """|z|^2 is 9 without friction, and less only below a fifth; where it never is, and where OFF is out of reach, all stays."""
+    fits, member, moving = Fits(monkeypatch), weighed(calibrated("base_tilt")), study()
+    member.fit.evaluation = SimpleNamespace(z=np.full(1, 3.0), traces={})
+    monkeypatch.setattr(stage, "unlikely", lambda fitted: ())
+    least = 0.2
+
+    def within(most: float, model: Model) -> Any:
+        assert most == 9.0
+        return model if model.twin.effects[-1]["mu"] < least else None
+
+    moving.objective = SimpleNamespace(n=N, bends=True, within=within)
+    for begun in (0.15, 0.0):
+        with_effect_added(moving, member, "tendon_friction", FitStart({"mu": 0.6}, ("mu",)))
+        assert fits.asked[-1][0].twin.effects[-1]["mu"] == (begun or 0.6)
+        least = 0.0
+    with_effect_added(moving, member, "actuator_saturation", FitStart({"limit": 5.0}, ("limit",)))
+    assert fits.asked[-1][0].twin.effects[-1]["limit"] == 5.0
+
+
+@pytest.mark.parametrize(("moves", "bent"), [(True, True), (True, False), (False, True)])
+def test_a_bent_robot_in_motion_is_seen_as_described(monkeypatch: pytest.MonkeyPatch, moves: bool, bent: bool) -> None:
+    """Its effects as they are; statics, and a robot within its bounds, stay what they are."""
+    Fits(monkeypatch)
+    monkeypatch.setattr(stage, "unlikely", lambda fitted: ())
+    monkeypatch.setattr(stage, "score_model", lambda study, fitted: fitted)
+    base = calibrated("base_tilt")
+    off = base.at(base.vector() * 1.01)
+    member, moving = weighed(off), study()
+    member.fit.at_bound = lambda: np.array([bent and f.effect is None for f in off.free])
+    evaluate, n = lambda model: SimpleNamespace(model=model, z=np.full(1, 3.0)), len(base.free)
+    moving.objective = SimpleNamespace(n=N, bends=moves, evaluate=evaluate, jacobian=lambda at, which: np.ones((1, len(which))))
+    found: Any = stage.described(moving, member)
+    assert (found is not None) == (moves and bent)
+    if found is not None:
+        own = {f.parameter.name for f in base.free if f.effect is None}
+        assert found.model.twin.values == pytest.approx(base.twin.values | {name: ROBOT.value(name) for name in own})
+        assert found.model.twin.effects == off.twin.effects
+        assert (found.J.shape, found.cost) == ((1, n), 9.0)
+
+
 def test_amplitudes_of_either_sign_take_a_step_before_their_shape(monkeypatch: pytest.MonkeyPatch) -> None:
     """One step with the shape held, then all from where that ended; where nothing has a shape, or no sign, all at once."""
     drift, member = "load_cell_drift", weighed(calibrated("base_tilt"))

@@ -124,6 +124,28 @@ def test_without_any_evidence_what_halves_the_error_is_carried_on_alone(
     assert world.found().best.effects == (("curvature", "drift") if third else ())
 
 
+@pytest.mark.parametrize(("left", "tried"), [(2.1, True), (1.9, False)])
+def test_what_nothing_explains_is_sought_beside_the_robot_as_described(
+    monkeypatch: pytest.MonkeyPatch, left: float, tried: bool
+) -> None:
+    """Friction promises nothing beside a robot whose damper was bent for want of it."""
+    world, seen = World(monkeypatch, {"friction": 500.0, "drift": 40.0}), SimpleNamespace(name="as described")
+    world.square = {0: 1e6, 1: left * 10_000.0, 2: 1e6}
+    seen.fit, seen.discrepancy = SimpleNamespace(effects=(), seen=True, z=np.zeros(1)), None
+    monkeypatch.setattr(stage, "described", lambda study, base: seen)
+    monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: world.anew.append(among))
+    everything = world.rank
+
+    def rank(objective: Any, evidence: Any, fit: Any, *rest: Any, **named: Any) -> list[Any]:
+        found = everything(objective, evidence, fit, *rest, **named)
+        return [c for c in found if c.effect in ("friction" if hasattr(fit, "seen") else "drift")]
+
+    monkeypatch.setattr(stage, "rank", rank)
+    found = world.found()
+    assert found.best.effects == (("friction",) if tried else ("drift",))
+    assert ({"friction"} in world.anew) == tried, "drift was tried already"
+
+
 @pytest.mark.parametrize(("share", "tried"), [(0.24, False), (0.26, True)])
 def test_a_pattern_that_promises_a_quarter_of_what_counts_is_refitted(
     monkeypatch: pytest.MonkeyPatch, share: float, tried: bool
