@@ -219,14 +219,17 @@ LAW_FORM_SHARE = _row("LAW_FORM_SHARE", 0.15, "of the largest contribution",
 HOPELESS_COST_RATIO = _row("HOPELESS_COST_RATIO", 2.0, "times the least cost",
     "a fit that could at best end there is stopped; the smooth error that evidence does not penalise is smaller",
     "judgement")
+UNEXPLAINED_RATIO = _row("UNEXPLAINED_RATIO", 2.0, "times the noise, of |z|^2",
+    "a motion of which the best candidate leaves more is not said to be unexplained before each effect was fitted alone",
+    "judgement")
 PROMISED_SHARE = _row("PROMISED_SHARE", 0.25, "of what an effect must have, in evidence and in size",
     "that a first-order pattern must promise to be worth a refit",
     "derivation: a pattern right to half in size promises a quarter in square")
 REUSED_PROMISE_SHARE = _row("REUSED_PROMISE_SHARE", 0.25, "of what a pattern must promise",
     "that a pattern of the base must promise beside other effects to be computed again there",
     "judgement: of some 96 that then promised enough, on 14 sets, one had promised less (0.04 for 2.6, beside a best of 75)")
-MOST_HALVINGS = _row("MOST_HALVINGS", 6, "halvings", "of the first amplitude of a motion's effect; a thirtieth is small",
-    "judgement")
+MOST_DOUBLINGS = _row("MOST_DOUBLINGS", 5, "doublings and halvings",
+    "of the first amplitude of a motion's effect; a thirtieth is small, thirty times is large", "judgement")
 REFIT_TOLERANCE = _row("REFIT_TOLERANCE", 2e-4, "of the cost",
     "by which the last step of a refit falls; what is left is second order in it", "judgement")
 REFIT_SCORE_TOLERANCE = _row("REFIT_SCORE_TOLERANCE", 3.0, "2 ln odds",

@@ -124,25 +124,30 @@ def test_without_any_evidence_what_halves_the_error_is_carried_on_alone(
     assert world.found().best.effects == (("curvature", "drift") if third else ())
 
 
-@pytest.mark.parametrize(("left", "tried"), [(2.1, True), (1.9, False)])
-def test_what_nothing_explains_is_sought_beside_the_robot_as_described(
-    monkeypatch: pytest.MonkeyPatch, left: float, tried: bool
+@pytest.mark.parametrize(("left", "moves", "tried"), [(2.1, True, True), (1.9, True, False), (2.1, False, False)])
+def test_a_motion_that_nothing_explains_is_sought_among_all_effects(
+    monkeypatch: pytest.MonkeyPatch, left: float, moves: bool, tried: bool
 ) -> None:
     """Friction promises nothing beside a robot whose damper was bent for want of it."""
-    world, seen = World(monkeypatch, {"friction": 500.0, "drift": 40.0}), SimpleNamespace(name="as described")
+    world, seen = World(monkeypatch, {"friction": 500.0, "drift": 40.0}), SimpleNamespace(discrepancy=None)
     world.square = {0: 1e6, 1: left * 10_000.0, 2: 1e6}
-    seen.fit, seen.discrepancy = SimpleNamespace(effects=(), seen=True, z=np.zeros(1)), None
+    seen.fit = SimpleNamespace(effects=(), as_described=True)
     monkeypatch.setattr(stage, "described", lambda study, base: seen)
-    monkeypatch.setattr(stage, "dictionary", lambda objective, fit, among: world.anew.append(among))
-    everything = world.rank
+    monkeypatch.setattr(stage, "promised_change", lambda *args: None)
 
-    def rank(objective: Any, evidence: Any, fit: Any, *rest: Any, **named: Any) -> list[Any]:
-        found = everything(objective, evidence, fit, *rest, **named)
-        return [c for c in found if c.effect in ("friction" if hasattr(fit, "seen") else "drift")]
+    def patterns(objective: Any, fit: Any, among: set[str]) -> Any:
+        world.anew.append(among)
+        return SimpleNamespace(patterns=range(7))
 
+    def rank(objective: Any, evidence: Any, fit: Any, discrepancy: Any, lacks: Any, top: int = 99) -> list[Any]:
+        found = world.rank(objective, evidence, fit, discrepancy, lacks)
+        assert top == (7 if hasattr(fit, "as_described") else 4) or lacks.patterns == ()
+        return [c for c in found if c.effect == ("friction" if hasattr(fit, "as_described") else "drift")]
+
+    monkeypatch.setattr(stage, "dictionary", patterns)
     monkeypatch.setattr(stage, "rank", rank)
-    found = world.found()
-    assert found.best.effects == (("friction",) if tried else ("drift",))
+    study: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=10_000, bends=moves)})
+    assert world.found(study).best.effects == (("friction",) if tried else ("drift",))
     assert ({"friction"} in world.anew) == tried, "drift was tried already"
 
 

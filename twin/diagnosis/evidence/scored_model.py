@@ -13,7 +13,7 @@ from twin.diagnosis.checks.fit_warnings import unlikely
 from twin.diagnosis.checks.zero_jumps import of_robot
 from twin.diagnosis.evidence.discrepancy import Discrepancy
 from twin.diagnosis.fit_context import FitContext
-from twin.diagnosis.thresholds import MOST_HALVINGS, REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
+from twin.diagnosis.thresholds import MOST_DOUBLINGS, REFIT_SCORE_TOLERANCE, REFIT_TOLERANCE
 from twin.effects import FitStart, catalogue
 from twin.effects.base.scaling import scaled_extended_starts, scaled_parameters
 from twin.foundation.errors import SolveError
@@ -88,21 +88,25 @@ def with_effect_added(
 
 
 def _begun(context: FitContext, model: Model, at: Evaluation | None, effect: str, start: FitStart) -> dict[str, float]:
-    """Return the values of a start, its amplitudes halved towards OFF until a motion is nearer to the data than without the effect.
+    """Return the values of a start, its amplitudes scaled from OFF by the power of two that brings a motion nearest to the data.
 
-    A joint that sticks for good shows no derivative to less friction. Limits, whose OFF is out of reach, stay; so does all where
-    nothing is nearer. Raise SolveError where the motion without the effect is lost.
+    A joint that sticks for good shows no derivative to less friction, and one that rests at its stop none to a spring. Limits, whose
+    OFF is out of reach, stay; so does all where nothing is nearer than the motion without the effect. Raise SolveError where that
+    is lost.
     """
     n_tendon, law, begun = context.prepared.n_tendon, catalogue()[effect], start.values
-    each = {p.name: p.value for p in scaled_parameters(law, n_tendon, context.prepared.robot.size)}
-    off = {n: each[n] for n in begun if n not in law.inactive_when_off and abs(each[n]) < abs(begun[n])}
-    before = (at or context.objective.evaluate(model)).z if off else np.zeros(0)
-    for halvings in range(MOST_HALVINGS if off else 0):
-        values = {**begun, **{n: o + (begun[n] - o) * 0.5**halvings for n, o in off.items()}}
+    each = {p.name: p for p in scaled_parameters(law, n_tendon, context.prepared.robot.size)}
+    scaled = [n for n in begun if n not in law.inactive_when_off and abs(each[n].value) < abs(begun[n])]
+    before = (at or context.objective.evaluate(model)).z if scaled else np.zeros(0)
+    best, least = dict(begun), float(before @ before)
+    for power in range(-MOST_DOUBLINGS, MOST_DOUBLINGS + 1) if scaled else ():
+        far = {n: each[n].value + (begun[n] - each[n].value) * 2.0**power for n in scaled}
+        values = {**begun, **{n: min(max(x, each[n].low), each[n].high) for n, x in far.items()}}
         with suppress(SolveError):
-            if context.objective.within(float(before @ before), model.with_effect(effect, values, (), n_tendon)) is not None:
-                return values
-    return dict(begun)
+            nearer = context.objective.within(least, model.with_effect(effect, values, (), n_tendon))
+            if nearer is not None:
+                best, least = values, float(nearer.z @ nearer.z)
+    return best
 
 
 def described(context: FitContext, member: ScoredModel) -> ScoredModel | None:

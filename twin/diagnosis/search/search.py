@@ -25,6 +25,7 @@ from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.noise.friction import noise_credit
 from twin.diagnosis.thresholds import (
     BEAM_WIDTH,
+    CANDIDATES_REFITTED,
     HOPELESS_COST_RATIO,
     LARGEST_SCORE_GAP,
     LAW_FORM_SHARE,
@@ -32,6 +33,7 @@ from twin.diagnosis.thresholds import (
     MOST_EFFECTS,
     PROMISED_SHARE,
     REUSED_PROMISE_SHARE,
+    UNEXPLAINED_RATIO,
     WHITER_MODEL_LEAVES,
 )
 from twin.effects import FitStart, catalogue
@@ -79,25 +81,24 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
         beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
         if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > LEFT_FOR_THIRD_EFFECT):
             break
-    if min(float(w.fit.z @ w.fit.z) for w in known.values()) > HOPELESS_COST_RATIO * context.objective.n:
-        known |= _beside_described(context, base, limits, known)
+    if context.objective.bends and min(float(w.fit.z @ w.fit.z) for w in known.values()) > UNEXPLAINED_RATIO * context.objective.n:
+        known |= _all_others(context, base, limits, known)
     best = max(known.values(), key=lambda w: w.score - limits.accept * len(w.effects))
     best = exchanged(context, best, known)
     best = _leaner(context, base, best, known, limits.accept)
     return Search(base, best, tuple(sorted(known.values(), key=lambda w: -w.score)))
 
 
-def _beside_described(context: FitContext, base: ScoredModel, limits: AcceptanceLimits, known: Known) -> Known:
-    """Return, of a motion that nothing known explains, effects not yet tried alone that promise something beside the description.
+def _all_others(context: FitContext, base: ScoredModel, limits: AcceptanceLimits, known: Known) -> Known:
+    """Return, of a motion that nothing known explains, each effect not yet tried alone that promises anything.
 
-    Calibration bends numbers of the robot for want of a large effect (a damper for friction); beside these its pattern promises
-    nothing. None where no number was bent.
+    First-order patterns of a large effect may promise less than those of others. Calibration bends numbers of the robot for want of
+    it (a damper for friction); beside these it may promise nothing, so that patterns are those of the robot as described.
     """
-    fresh: Known = {}
-    if (seen := described(context, base)) is not None:
-        untried = set(catalogue()) - {e for w in known.values() if len(w.effects) == 1 for e in w.effects}
-        context.progress("effects beside the robot as described")
-        extend(context, base, base, dictionary(context.objective, seen.fit, untried), limits, fresh, seen)
+    fresh, seen = Known(), described(context, base) or base
+    untried = set(catalogue()) - {e for w in known.values() if len(w.effects) == 1 for e in w.effects}
+    context.progress("all other effects")
+    extend(context, base, base, dictionary(context.objective, seen.fit, untried), limits, fresh, seen)
     return {k: _whole(context, w, limits.accept) for k, w in fresh.items()}
 
 
@@ -134,9 +135,9 @@ def extend(
     fresh: Known,
     seen: ScoredModel | None = None,
 ) -> None:
-    """Add to `fresh` `member` with each of the effects whose pattern promises most beside it, or beside `seen`."""
-    seen = seen or member
-    for candidate in rank(context.objective, context.evidence, seen.fit, seen.discrepancy, lacks):
+    """Add to `fresh` `member` with each of the effects whose pattern promises most beside it, or anything beside `seen`."""
+    top, seen = CANDIDATES_REFITTED if seen is None else len(lacks.patterns), seen or member
+    for candidate in rank(context.objective, context.evidence, seen.fit, seen.discrepancy, lacks, top):
         if not _worth_a_fit(context, base, seen, lacks, limits, candidate):
             continue
         name = " + ".join((*member.effects, candidate.effect))
