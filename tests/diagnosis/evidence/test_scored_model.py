@@ -116,22 +116,23 @@ def test_a_robot_whose_own_numbers_are_at_bounds_is_fitted_from_the_description(
     assert (how["J"] is None) == anew
 
 
-def test_an_effect_of_a_motion_begins_where_it_brings_it_nearer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """|z|^2 is 9 without friction, and less only below a fifth; where it never is, and where OFF is out of reach, all stays."""
+@pytest.mark.parametrize(("truth", "begun"), [(0.15, 0.15), (0.07, 0.075), (0.7, 0.6), (1.1, 1.0), (-4.0, 0.6)])
+def test_an_effect_of_a_motion_begins_where_it_brings_it_nearest(
+    monkeypatch: pytest.MonkeyPatch, truth: float, begun: float
+) -> None:
+    """|z| is 3 without friction, and less within 0.3 of the truth; powers of two of 0.6, at most the largest there is. Where no
+    amplitude is nearer, and where OFF is out of reach, the start stays."""
     fits, member, moving = Fits(monkeypatch), weighed(calibrated("base_tilt")), study()
     member.fit.evaluation = SimpleNamespace(z=np.full(1, 3.0), traces={})
     monkeypatch.setattr(stage, "unlikely", lambda fitted: ())
-    least = 0.2
 
     def within(most: float, model: Model) -> Any:
-        assert most == 9.0
-        return model if model.twin.effects[-1]["mu"] < least else None
+        z = np.full(1, 10.0 * abs(model.twin.effects[-1]["mu"] - truth))
+        return SimpleNamespace(z=z) if float(z @ z) <= most else None
 
     moving.objective = SimpleNamespace(n=N, bends=True, within=within)
-    for begun in (0.15, 0.0):
-        with_effect_added(moving, member, "tendon_friction", FitStart({"mu": 0.6}, ("mu",)))
-        assert fits.asked[-1][0].twin.effects[-1]["mu"] == (begun or 0.6)
-        least = 0.0
+    with_effect_added(moving, member, "tendon_friction", FitStart({"mu": 0.6}, ("mu",)))
+    assert fits.asked[-1][0].twin.effects[-1]["mu"] == begun
     with_effect_added(moving, member, "actuator_saturation", FitStart({"limit": 5.0}, ("limit",)))
     assert fits.asked[-1][0].twin.effects[-1]["limit"] == 5.0
 

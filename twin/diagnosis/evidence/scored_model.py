@@ -90,9 +90,9 @@ def with_effect_added(
 def _begun(context: FitContext, model: Model, at: Evaluation | None, effect: str, start: FitStart) -> dict[str, float]:
     """Return the values of a start, its amplitudes scaled from OFF by the power of two that brings a motion nearest to the data.
 
-    A joint that sticks for good shows no derivative to less friction, and one that rests at its stop none to a spring. Limits, whose
-    OFF is out of reach, stay; so does all where nothing is nearer than the motion without the effect. Raise SolveError where that
-    is lost.
+    A joint that sticks for good shows no derivative to less friction, and one that rests at its stop none to a spring. Limits,
+    whose OFF is out of reach, stay; so does all where nothing is nearer than the motion without the effect. Raise SolveError where
+    that is lost.
     """
     n_tendon, law, begun = context.prepared.n_tendon, catalogue()[effect], start.values
     each = {p.name: p for p in scaled_parameters(law, n_tendon, context.prepared.robot.size)}
