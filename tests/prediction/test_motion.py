@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.mechanics.mjcf.models import PENDULUM
+from tests.mechanics.mjcf.models import robot as pendulum
 from tools.simulators.rod.mechanics.rod import Rod, follow
 from twin.measurements import Channel, Recording, Trial
 from twin.prediction.motion import motion_as_measured, swings, with_swing
@@ -124,6 +127,21 @@ def test_long_logs_are_not_stepped_through() -> None:
     long = replace(prepared, inputs=n * prepared.inputs, measured=n * steps)
     assert swings(long, n * static, SIGMA)
     assert with_swing(long, softer(1.0), n * static, [0]) is None
+
+
+@pytest.mark.parametrize(("step", "told"), [(2e-2, True), (1e-4, False)])
+def test_steps_that_are_too_long_are_told(tmp_path: Path, step: float, told: bool) -> None:
+    """A pendulum at 1 Hz swings by 0.2 rad for 4 s: steps of 20 ms are off by many milliradians, of 0.1 ms by none."""
+    hinge = ' stiffness="1" damping="0.02"'
+    swing = pendulum(tmp_path, PENDULUM.format(joint=hinge, key=""), step=step)
+    channels = (Channel("actuator.push.ctrl", "input", "1", 1e-6), Channel("joint.hinge.position", "output", "rad", 1e-3))
+    time = np.arange(0.0, 4.0, 0.04)
+    values = {channels[0].name: 0.4 * np.sin(6.0 * time), channels[1].name: 0.0 * time}
+    day = Recording("pendulum", "test", "hardware", swing.gravity, channels, (Trial("0.csv", time, values),))
+    prepared, twin = prepare(day, swing), Twin.of(swing)
+    predicted = [t.outputs(twin, prepared) for t in simulate(twin, prepared)]
+    notices = motion_as_measured(prepared, twin, predicted, [0])[0].notices
+    assert any(f"set timestep = {0.5 * step:g}" in words for words in notices) == told
 
 
 def test_tensions_at_driven_lengths_show_damping() -> None:

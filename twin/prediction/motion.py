@@ -15,6 +15,7 @@ from twin.prediction.twin import Twin
 
 LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
 LONGEST_STEPPED = 300.0  # s of all trials, which take a rod's steps up to two minutes
+TRIALS_HALVED = 2  # stepped once more in steps half as long
 SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
 
 
@@ -28,10 +29,11 @@ def motion_as_measured(
     leave it out. Where inertia shows, and there is time for `steps`, these are tried (`with_swing`).
 
     Nothing is calibrated yet: what an affine map of the prediction explains, a camera that is not aligned or a body too stiff, does
-    not count. Trials that pull and never release hardly tell a late body from a stiff one.
+    not count. Trials that pull and never release hardly tell a late body from a stiff one. A model that controls drive is always
+    stepped; a notice says where its steps are so long that it shows.
     """
     if Drive.CONTROL in prepared.drives:
-        return prepared, tuple(predicted)
+        return replace(prepared, notices=(*prepared.notices, *_long_steps(prepared, twin, predicted, trials))), tuple(predicted)
     if any(i.damped for i in prepared.inputs):
         at_once = without_damping(prepared)
         with suppress(SolveError):
@@ -84,6 +86,25 @@ def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray], sigma: 
             rate = np.gradient(y, i.time, axis=0)
             off.append((tau * rate + np.gradient(rate, i.time, axis=0) / w**2) / sigma)
     return bool(off) and float(np.sqrt(np.nanmean(np.concatenate(off) ** 2))) > LEAST_SWING
+
+
+def _long_steps(prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int]) -> tuple[str, ...]:
+    """Return a notice where steps half as long move the outputs of the first listed trials by more than `LEAST_SWING` sigma."""
+    robot, few = twin.robot, list(trials[:TRIALS_HALVED])
+    step: float = getattr(prepared.robot.build(), "longest_step", 0.0)
+    finer = replace(twin, robot=replace(robot, structure={**robot.structure, "timestep": 0.5 * step}))
+    try:
+        halved = [t.outputs(finer, prepared) for t in simulate(finer, prepared, trials=few)]
+    except SolveError:
+        return ()
+    off = np.concatenate([y - predicted[k] for y, k in zip(halved, few, strict=True)]) / _usual_noise(prepared)
+    moved = float(np.sqrt(np.nanmean(off**2)))
+    if moved <= LEAST_SWING:
+        return ()
+    return (
+        f"steps half as long as {1e3 * step:g} ms move the prediction by {moved:.2g} sigma (RMS): set timestep = {0.5 * step:g} in "
+        f"[structure] of robot.toml, or what is left may be the error of steps",
+    )
 
 
 def _may_swing(prepared: PreparedRecording) -> bool:
