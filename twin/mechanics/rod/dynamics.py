@@ -68,6 +68,7 @@ class Motion(NamedTuple):
     applied: np.ndarray  # (nv,)
     damping: np.ndarray  # (nv,) of the joints, that of sticking tendons included
     own: np.ndarray  # (nv,) the same without
+    forces: np.ndarray  # (nv,) applied, without what makes up for that damping
     actuator: np.ndarray  # (n_tendon, n_piece) actuators
     rest: np.ndarray  # (nv,) rest shape without creep
     time: np.ndarray  # (n,) s
@@ -199,7 +200,7 @@ def step_through(system, motion, tendons, creep, state, samples):
     step, or -1.
     """
     chain, time, command, step, holds = system.chain, motion.time, motion.command, motion.step, any_true(tendons.actuation.held)
-    rubs, forces = system.law.mu > 0.0, np.zeros(state.q.size)
+    rubs, forces = system.law.mu > 0.0, motion.forces
     now, r, taken = motion.reached, np.zeros(state.q.size), motion.taken
     D = np.empty((chain.handedness.size, 3, 3))
     for i in range(time.size):
@@ -288,7 +289,7 @@ class ChainMotion:
         nt = problem.command.shape[1]
         self._motion = Motion(
             self._start_time, 0, float(model.opt.timestep), data.qvel, data.ctrl, data.qfrc_applied, model.dof_damping,
-            model.dof_damping.copy(), actuator, rest, np.zeros(0), np.zeros((0, nt)), np.zeros(0),
+            model.dof_damping.copy(), np.zeros(model.nv), actuator, rest, np.zeros(0), np.zeros((0, nt)), np.zeros(0),
         )  # fmt: skip
         self.state = ChainState(start.tension[0].copy(), start.q[0].copy(), start.slip.copy(), start.distal.copy())
         self._creep = CreepState(amplitude, np.array(problem.creep.time, float), delayed)
