@@ -147,6 +147,7 @@ def _swinging(prepared: PreparedRecording, twin: Twin, moving: Sequence[np.ndarr
 
 
 def _usual_noise(prepared: PreparedRecording) -> np.ndarray:
+    """Return the noise (n_output,) SI of the outputs, as declared or as is typical."""
     return np.array([o.channel.noise or OUTPUT_GROUPS[o.group].typical_noise for o in prepared.outputs])
 
 

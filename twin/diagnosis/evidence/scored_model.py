@@ -65,8 +65,8 @@ def with_effect_added(
 
     Signed amplitudes take a step before the parameters of their shape: the influence of a shape is proportional to its amplitude,
     and from a drift of the wrong sign the first step could reach any shape. Where numbers of the robot went to their bounds for
-    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described, and from amplitudes that
-    bring it nearer to the data.
+    want of the effect, or those of a motion are unlikely, the fit starts from the numbers as described. Amplitudes
+    of a motion's effect begin where they bring it nearest to the data.
     """
     n_tendon, model, near, J = context.prepared.n_tendon, member.fit.model, member.fit.evaluation, member.fit.J
     if _bent(context, member.fit):

@@ -4,11 +4,8 @@ Per step: slip states from the tendons' travel, segment tensions to `ctrl`; tip 
 springs from the true elastic moment (elastic.py) to `qfrc_applied`; then `mj_step`. Tendons that motors or SMA springs hold at
 lengths are in held_tendons.py.
 
-A tendon that sticks at a disk is a spring, K = T mu theta / presliding along its travel, that shakes light disks many times in a
-step h. Its force is explicit here, at MuJoCo's present shape; steps are stable by an inertia of each joint i, h^2 K |ds/dq_i|
-sum_j |ds/dq_j| at most, s the length distal of the disk, while it sticks. MuJoCo has it as a damping that the same force at the
-joint's last rate makes up for. MuJoCo's implicit integration takes damping and the springs of hinges and wall, so that none of
-them bounds the step. It adds damping: 2 % of critical at 1 ms on the first mode.
+Neither friction, however short its pre-sliding length (sticking.py), nor the springs of hinges and wall, which MuJoCo's implicit
+integration takes, bound the step. That integration adds damping: 2 % of critical at 1 ms on the first mode.
 """
 
 from __future__ import annotations
@@ -45,9 +42,9 @@ from twin.mechanics.rod.held_tendons import (
     set_slack_band,
     update_total_tension,
 )
+from twin.mechanics.rod.sticking import damp_sticking
 from twin.mechanics.rod.trial_steps import CreepState, advance_creep, any_true, set_rest_shape
 
-STICKING_SHARE = 0.4  # of the inertia that makes a step implicit in what sticks: steps are stable from a quarter on
 # m, from a wall to a distant site in front of it, to which slack springs of that length tie the disks. The sphere that they cannot
 # leave is flat to x^2 / (2 POST_DISTANCE) = 1e-7 m at a robot's length, and lengths are still resolved to 1e-11 m.
 POST_DISTANCE = 1e5
@@ -109,26 +106,6 @@ def route_tension(system, state, motion, tendons):
         for d in range(tendon.T.size):
             state.s[t, d] = distal[d]
             motion.ctrl[motion.actuator[t, d]] = tendon.T[d] - by_spring
-
-
-@jit_internal
-def damp_sticking(system, state, motion, tendon, t, distal):
-    """Add the damping (nv,) by which a step is stable where tendon t, traced, sticks; it slides at its farthest slip state."""
-    chain, law, n = system.chain, system.law, tendon.T.size
-    turns, damping = np.zeros(motion.own.size), STICKING_SHARE * motion.step * abs(state.T[t]) * law.mu / law.presliding
-    for d in range(n):
-        end = chain.site[chain.hole[t, d + 1]]
-        for i in range(chain.first_joint[d], chain.first_joint[d + 1]):
-            turns[i] = abs(dot(tendon.u[d], point_velocity(chain, i, end)))
-    beyond, first = 0.0, chain.first_joint[n]
-    for d in range(n - 1, 0, -1):
-        while first > chain.first_joint[d]:
-            first -= 1
-            beyond += turns[first]
-        z, travel = state.z[t, d], state.s[t, d] - distal[d]
-        if abs(z) < 1.0 or z * travel < 0.0:
-            for i in range(first, chain.first_joint[n]):
-                motion.damping[i] += damping * tendon.theta[d] * turns[i] * beyond
 
 
 @jit_internal

@@ -27,7 +27,7 @@ ARM = """
 
 
 def test_a_share_of_a_muscle_is_in_no_other_unit(tmp_path: Path) -> None:
-    """The hinge moves five times as far as the model: any unit of another quantity would be tried, and shares have none."""
+    """The hinge moves four times as far as the model's: any unit of another quantity would be tried, and shares have none."""
     arm = robot(tmp_path / "arm", ARM)
     channels = (Channel("actuator.flexor.ctrl", "input", "1", 1e-6), Channel("joint.hinge.position", "output", "rad", 1e-3))
     time, rng, trials = np.arange(0.0, 2.0, 0.02), np.random.default_rng(0), []
