@@ -1,11 +1,12 @@
-"""What is each rule of the decision worth? Every rule taken out by itself, and the answers counted again.
+"""What is each rule of the decision worth? Rules are taken out, and the answers counted again.
 
     python -m tools.benchmarks.diagnosis.ablation --out results/ [--sets 60] [--seed 30000] [--jobs 2]
 
 The days are those of the attribution benchmark, and with `--second DIR` those of the second rod simulator. A day is calibrated
-once. Then everything from the search to the verdict is run by all rules, and again without each of those in `rules.py`; fits that
-an earlier run of the day has made are not repeated. Rows go to results/ablation.jsonl as they come, so an interrupted run resumes.
-Days with an even seed are for developing, the others only for reporting.
+once. Then everything from the search to the verdict is run by all rules, and again without all of those in `rules.py`; where that
+changes the answer, without either half of them, and so on down to single rules. Fits that an earlier run of the day has made are not
+repeated. Rows go to results/ablation.jsonl as they come, so an interrupted run resumes. Days with an even seed are for developing,
+the others only for reporting.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ from twin.prediction.twin import Twin
 
 AS_IT_IS = "as it is"
 NO_WITHDRAWAL = "claims no better on held-out trials are withdrawn"
+TOGETHER = "several together, none of them by itself"
 
 
 class Day:
@@ -65,14 +67,25 @@ class Day:
         self.seen: dict[str, tuple[bool, dict[str, float], dict[str, float]]] = {}
 
     def answers(self, rules: tuple[Rule, ...]) -> Iterator[tuple[str, Row]]:
-        """Yield the name of each rule and the answer without it, beginning with the answer by all rules."""
-        yield AS_IT_IS, self._answer(None, True)
-        yield NO_WITHDRAWAL, self._answer(None, False)
-        for rule in rules:
-            yield rule.name, self._answer(rule, True)
+        """Yield the answer by all rules, and the names of those without which it is another, each with that answer."""
+        as_it_is = self._answer((), True)
+        yield AS_IT_IS, as_it_is
+        yield NO_WITHDRAWAL, self._answer((), False)
+        yield from self._deciding(rules, as_it_is)
 
-    def _answer(self, rule: Rule | None, withdraws: bool) -> Row:
-        with self.memory.in_force(), without(rule, self.memory):
+    def _deciding(self, rules: tuple[Rule, ...], known: Row) -> Iterator[tuple[str, Row]]:
+        now = self._answer(rules, True)
+        if _same(now, known):
+            return
+        if len(rules) == 1:
+            yield rules[0].name, now
+            return
+        half = len(rules) // 2
+        deciding = [*self._deciding(rules[:half], known), *self._deciding(rules[half:], known)]
+        yield from deciding or [(TOGETHER, {**now, "rules": [r.name for r in rules]})]
+
+    def _answer(self, rules: tuple[Rule, ...], withdraws: bool) -> Row:
+        with self.memory.in_force(), without(rules, self.memory):
             screening = screen(self.context, self.base, self.settings.seed)
             try:
                 found, gated, judged = decide(self.context, self.base, screening)
@@ -160,16 +173,15 @@ def table(rows: list[Row]) -> str:
             continue
         base = counts(half, AS_IT_IS)
         lines: list[list[object]] = [[AS_IT_IS, "", *(f"{a}/{n}" for a, n in base.values())]]
-        for rule in (NO_WITHDRAWAL, *(r.name for r in RULES)):
+        for rule in (NO_WITHDRAWAL, TOGETHER, *(r.name for r in RULES)):
             now = counts(half, rule)
-            moved = sum(not _same(r, rule) for r in half)
+            moved = sum(not _same(r["answers"].get(rule, r["answers"][AS_IT_IS]), r["answers"][AS_IT_IS]) for r in half)
             lines.append([rule, moved, *(_change(now[k][0] - base[k][0]) for k in base)])
         out.append(f"Days for {name}: {len(half)}\n\n" + markdown(["without", "days it decides", *base], lines))
     return "\n\n".join(out)
 
 
-def _same(row: Row, rule: str) -> bool:
-    a, b = row["answers"][AS_IT_IS], row["answers"].get(rule, row["answers"][AS_IT_IS])
+def _same(a: Row, b: Row) -> bool:
     return a["verdict"] == b["verdict"] and a["claims"] == b["claims"]
 
 
@@ -178,7 +190,7 @@ def _change(n: int) -> str:
 
 
 def main(out: Path, sets: int = 60, seed: int = 30000, second: Path | None = None, jobs: int = 1) -> None:
-    """Decide fresh days with each rule taken out, and print the tables of both halves.
+    """Decide fresh days with rules taken out, and print the tables of both halves.
 
     Args:
         out: folder of ablation.jsonl

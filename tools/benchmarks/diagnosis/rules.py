@@ -111,23 +111,21 @@ RULES: tuple[Rule, ...] = (
 
 
 @contextmanager
-def without(rule: Rule | None, memory: Memory) -> Iterator[None]:
-    """Take a rule out of the diagnosis; None takes out none."""
-    if rule is None:
-        yield
-        return
+def without(rules: tuple[Rule, ...], memory: Memory) -> Iterator[None]:
+    """Take rules out of the diagnosis."""
     with ExitStack() as stack:
-        if rule.scores:
+        if any(rule.scores for rule in rules):
             stack.enter_context(_forgotten(memory))
-        if rule.thresholds:
-            stack.enter_context(_set(rule.thresholds))
-        if rule.functions:
-            stack.enter_context(replaced(rule.functions))
-        if rule.method:
-            name, instead = rule.method
-            own = getattr(FitContext, name)
-            setattr(FitContext, name, instead)
-            stack.callback(setattr, FitContext, name, own)
+        for rule in rules:
+            if rule.thresholds:
+                stack.enter_context(_set(rule.thresholds))
+            if rule.functions:
+                stack.enter_context(replaced(rule.functions))
+            if rule.method:
+                name, instead = rule.method
+                own = getattr(FitContext, name)
+                setattr(FitContext, name, instead)
+                stack.callback(setattr, FitContext, name, own)
         yield
 
 
