@@ -27,8 +27,7 @@ def test_a_day_is_decided_with_and_without_rules() -> None:
     found = dict(day.answers(rules))
     assert found[ablation.AS_IT_IS]["claims"] == ["tip_payload"]
     assert found["endless evidence"]["claims"] == []
-    assert found["no caveats"]["claims"] == ["tip_payload"]
-    assert found["no caveats"]["after"] == found[ablation.AS_IT_IS]["after"]
+    assert set(found) == {ablation.AS_IT_IS, ablation.NO_WITHDRAWAL, "endless evidence"}, "the others change nothing"
     assert (judge.find_caveats, null_distribution.LEAST_EVIDENCE, FitContext.blocked_input_noise) == before
     assert day.floor
 
