@@ -42,7 +42,7 @@ from twin.foundation.errors import DataError
 from twin.foundation.parallel import single_thread
 from twin.measurements import Recording
 from twin.prediction.evaluate import OUTPUT_GROUPS, headline_group, rms
-from twin.prediction.motion import motion_as_measured, moving_like
+from twin.prediction.motion import in_steps_that_suffice, motion_as_measured, moving_like
 from twin.prediction.own_clocks import on_rows_of_outputs
 from twin.prediction.prepared import PreparedRecording, prepare
 from twin.prediction.twin import Twin
@@ -74,8 +74,8 @@ def diagnose(
     if len(whole.inputs) < 2:
         raise DataError(f"{recording.title}: a diagnosis needs at least two trials, one to fit and one to hold out")
     part, every = thinned(log, whole, settings.budget)
-    prepared = whole if every == 1 else prepare(part, twin.robot)
     with single_thread():
+        prepared, twin = in_steps_that_suffice(whole if every == 1 else prepare(part, twin.robot), twin)
         preview = preview_data(prepared, twin, settings, progress)
         on_preview(preview)
         found, held_out = _held_out_diagnosis(recording, preview, twin, settings, progress)
@@ -319,7 +319,7 @@ def calibrated_fit(recording: Recording, twin: Twin, settings: Settings | None =
     log = on_rows_of_outputs(recording)
     whole = prepare(log, twin.robot)
     part, every = thinned(log, whole, settings.budget)
-    prepared = whole if every == 1 else prepare(part, twin.robot)
+    prepared, twin = in_steps_that_suffice(whole if every == 1 else prepare(part, twin.robot), twin)
     as_described = predicted(twin, prepared, list(range(len(prepared.inputs))))
     fitted, held_out = split(prepared, settings.seed)
     prepared, nominal = motion_as_measured(prepared, twin, as_described, fitted, settings.budget is None)

@@ -15,7 +15,11 @@ from twin.prediction.twin import Twin
 
 LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
 LONGEST_STEPPED = 300.0  # s of all trials, which take a rod's steps up to two minutes
-TRIALS_HALVED = 2  # stepped once more in steps half as long
+# sigma (RMS) of outputs, by which steps of a model's motion may err: 0.02 to 0.03 on the example days of the independent simulator in
+# steps of 2 ms; 0.12 on a servo arm that steps of its command swing at 9 rad/s, of which joint friction, whose steps are half as
+# long, was once claimed
+STEP_ERROR = 0.05
+MOST_HALVINGS = 2  # four times the time
 SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
 
 
@@ -30,10 +34,10 @@ def motion_as_measured(
 
     Nothing is calibrated yet: what an affine map of the prediction explains, a camera that is not aligned or a body too stiff, does
     not count. Trials that pull and never release hardly tell a late body from a stiff one. A model that controls drive is always
-    stepped; a notice says where its steps are so long that it shows.
+    stepped (`in_steps_that_suffice`).
     """
     if Drive.CONTROL in prepared.drives:
-        return replace(prepared, notices=(*prepared.notices, *_long_steps(prepared, twin, predicted, trials))), tuple(predicted)
+        return prepared, tuple(predicted)
     if any(i.damped for i in prepared.inputs):
         at_once = without_damping(prepared)
         with suppress(SolveError):
@@ -88,23 +92,39 @@ def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray], sigma: 
     return bool(off) and float(np.sqrt(np.nanmean(np.concatenate(off) ** 2))) > LEAST_SWING
 
 
-def _long_steps(prepared: PreparedRecording, twin: Twin, predicted: Sequence[np.ndarray], trials: Sequence[int]) -> tuple[str, ...]:
-    """Return a notice where steps half as long move the outputs of the first listed trials by more than `LEAST_SWING` sigma."""
-    robot, few = twin.robot, list(trials[:TRIALS_HALVED])
-    step: float = getattr(prepared.robot.build(), "longest_step", 0.0)
-    finer = replace(twin, robot=replace(robot, structure={**robot.structure, "timestep": 0.5 * step}))
-    try:
-        halved = [t.outputs(finer, prepared) for t in simulate(finer, prepared, trials=few)]
-    except SolveError:
-        return ()
-    off = np.concatenate([y - predicted[k] for y, k in zip(halved, few, strict=True)]) / _usual_noise(prepared)
-    moved = float(np.sqrt(np.nanmean(off**2)))
-    if moved <= LEAST_SWING:
-        return ()
-    return (
-        f"steps half as long as {1e3 * step:g} ms move the prediction by {moved:.2g} sigma (RMS): set timestep = {0.5 * step:g} in "
-        f"[structure] of robot.toml, or what is left may be the error of steps",
-    )
+def in_steps_that_suffice(prepared: PreparedRecording, twin: Twin) -> tuple[PreparedRecording, Twin]:
+    """Return a recording whose controls drive its robot, and the twin, in steps that move its outputs by `STEP_ERROR` at most.
+
+    Steps are halved, up to `MOST_HALVINGS` times, until half of them moves the prediction by less; a notice says so. Else an effect
+    would be found that lets the robot step differently. What is left is told.
+    """
+    if Drive.CONTROL not in prepared.drives:
+        return prepared, twin
+    first = step = float(getattr(prepared.robot.build(), "longest_step", 0.0))
+    halvings, moved = 0, np.inf
+    with suppress(SolveError):
+        now = _predicted(prepared, twin)
+        while True:
+            finer = _in_steps(twin, 0.5 * step)
+            halved = _predicted(prepared, finer)
+            off = (np.concatenate(halved) - np.concatenate(now)) / _usual_noise(prepared)
+            moved = float(np.sqrt(np.nanmean(off**2)))
+            if moved <= STEP_ERROR or halvings == MOST_HALVINGS:
+                break
+            twin, now, step, halvings = finer, halved, 0.5 * step, halvings + 1
+    told = []
+    if halvings:
+        told.append(f"steps of {1e3 * step:g} ms: those of {1e3 * first:g} ms err by more than {STEP_ERROR:g} sigma on these trials")
+    if STEP_ERROR < moved < np.inf:
+        told.append(
+            f"steps half as long as {1e3 * step:g} ms move the prediction by {moved:.2g} sigma (RMS): set timestep = {0.5 * step:g} in "
+            f"[structure] of robot.toml, or what is left may be the error of steps",
+        )
+    return replace(prepared, robot=twin.robot, notices=(*prepared.notices, *told)), twin
+
+
+def _in_steps(twin: Twin, step: float) -> Twin:
+    return replace(twin, robot=replace(twin.robot, structure={**twin.robot.structure, "timestep": step}))
 
 
 def _may_swing(prepared: PreparedRecording) -> bool:

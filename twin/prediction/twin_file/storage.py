@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,7 @@ class TwinFile(TableSchema):
 
     format: str = Field(description=f'"{TWIN_FORMAT}"')
     robot: TextLine = Field(description="a robot's name, or the path to its folder from this file")
+    timestep: float | None = Field(None, gt=0.0, le=0.1, description="s, of an MJCF: the longest step, in place of its robot.toml's")
     parameters: dict[str, Any] = Field({}, description="calibrated values; what is absent keeps the robot's nominal value")
     effect: list[Any] = Field([], description="[[effect]] tables: the laws in force")
     correlation: dict[str, Any] | None = Field(None, description="how the errors of fitted values go together")
@@ -90,6 +92,8 @@ def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
     if file is None:
         raise DataError(join_problems(problems))
     robot = load(file.robot, folder)
+    if file.timestep is not None:
+        robot = replace(robot, structure={**robot.structure, "timestep": file.timestep})
     values = read_values(file.parameters, robot.parameters, "parameters", problems)
     effects = read_effects(file.effect, robot.n_tendon, robot.size, problems)
     together = None if file.correlation is None else validate_table(CorrelationTable, file.correlation, "correlation", problems)
@@ -110,6 +114,8 @@ def twin_table(
     correlations."""
     units = {p.name: p.unit for p in twin.robot.parameters}
     table: dict[str, Any] = {"format": TWIN_FORMAT, "robot": robot_reference(twin.robot, folder)}
+    if "timestep" in twin.robot.structure:
+        table["timestep"] = twin.robot.structure["timestep"]
     table["parameters"] = {
         n: value_entry(parameters.get(n) or FittedValue(v, None, units[n])) for n, v in sorted(twin.values.items())
     }

@@ -54,7 +54,7 @@ class ModelStructure(Structure):
 
     model: TextLine = Field(description="the MJCF, relative to this folder")
     tip: TextLine | None = Field(None, description="site that a tip payload hangs at; left out: the last with 'tip' in its name")
-    timestep: float = Field(LONGEST_STEP, gt=0.0, le=0.1, description="s, longest step of a simulation")
+    timestep: float | None = Field(None, gt=0.0, le=0.1, description=f"s, longest step of a simulation; left out: {LONGEST_STEP}")
     tendons: int | None = Field(None, description="not written: the number of the model's actuators")
 
     def located(self, folder: Path) -> dict[str, object]:
