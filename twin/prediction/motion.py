@@ -15,9 +15,9 @@ from twin.prediction.twin import Twin
 
 LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
 LONGEST_STEPPED = 300.0  # s of all trials, which take a rod's steps up to two minutes
-# sigma (RMS) of outputs, by which steps of a model's motion may err: 0.02 to 0.03 on the example days of the independent simulator in
-# steps of 2 ms; 0.12 on a servo arm that steps of its command swing at 9 rad/s, of which joint friction, whose steps are half as
-# long, was once claimed
+# sigma (RMS) of outputs, by which steps of a model's motion may err: 0.02 to 0.03 on the example days of the independent simulator
+# in steps of 2 ms; 0.12 on a servo arm that steps of its command swing at 9 rad/s, of which joint friction, whose steps are half
+# as long, was once claimed
 STEP_ERROR = 0.05
 MOST_HALVINGS = 2  # four times the time
 SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
@@ -114,11 +114,11 @@ def in_steps_that_suffice(prepared: PreparedRecording, twin: Twin) -> tuple[Prep
             twin, now, step, halvings = finer, halved, 0.5 * step, halvings + 1
     told = []
     if halvings:
-        told.append(f"steps of {1e3 * step:g} ms: those of {1e3 * first:g} ms err by more than {STEP_ERROR:g} sigma on these trials")
+        told.append(f"steps of {1e3 * step:g} ms: those of {1e3 * first:g} ms err by more than {STEP_ERROR} sigma on these trials")
     if STEP_ERROR < moved < np.inf:
         told.append(
-            f"steps half as long as {1e3 * step:g} ms move the prediction by {moved:.2g} sigma (RMS): set timestep = {0.5 * step:g} in "
-            f"[structure] of robot.toml, or what is left may be the error of steps",
+            f"steps half as long as {1e3 * step:g} ms move the prediction by {moved:.2g} sigma (RMS): set timestep = "
+            f"{0.5 * step:g} in [structure] of robot.toml, or what is left may be the error of steps"
         )
     return replace(prepared, robot=twin.robot, notices=(*prepared.notices, *told)), twin
 

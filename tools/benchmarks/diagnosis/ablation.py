@@ -4,9 +4,9 @@
 
 The days are those of the attribution benchmark, and with `--second DIR` those of the second rod simulator. A day is calibrated
 once. Then everything from the search to the verdict is run by all rules, and again without all of those in `rules.py`; where that
-changes the answer, without either half of them, and so on down to single rules. Fits that an earlier run of the day has made are not
-repeated. Rows go to results/ablation.jsonl as they come, so an interrupted run resumes. Days with an even seed are for developing,
-the others only for reporting.
+changes the answer, without either half of them, and so on down to single rules. Fits that an earlier run of the day has made are
+not repeated. Rows go to results/ablation.jsonl as they come, so an interrupted run resumes. Days with an even seed are for
+developing, the others only for reporting.
 """
 
 from __future__ import annotations

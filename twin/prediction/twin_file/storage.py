@@ -78,7 +78,7 @@ class TwinFile(TableSchema):
 
     format: str = Field(description=f'"{TWIN_FORMAT}"')
     robot: TextLine = Field(description="a robot's name, or the path to its folder from this file")
-    timestep: float | None = Field(None, gt=0.0, le=0.1, description="s, of an MJCF: the longest step, in place of its robot.toml's")
+    timestep: float | None = Field(None, gt=0.0, le=0.1, description="s, of an MJCF: longest step, in place of its robot.toml's")
     parameters: dict[str, Any] = Field({}, description="calibrated values; what is absent keeps the robot's nominal value")
     effect: list[Any] = Field([], description="[[effect]] tables: the laws in force")
     correlation: dict[str, Any] | None = Field(None, description="how the errors of fitted values go together")
