@@ -34,12 +34,9 @@ class World:
             evidence=SimpleNamespace(beyond_pose=self.beyond_pose), unwhitened=lambda fit: fit.plain, accuracy=0.0,
             excused=np.full(2, np.inf),
         )  # fmt: skip
-        self.harmful: set[str] = set()
-        self.thrown: set[str] = set()  # of these: by a step to first order alone
         self.rest: dict[tuple[str, ...], tuple[float, float]] = {}  # smooth error fitted, left out
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e, known: self.of(*(x for x in best.effects if x != e)))
         monkeypatch.setattr(stage, "left_out", lambda study, fit: self.left_out(fit.effects))
-        monkeypatch.setattr(stage, "proven", lambda study, fit, known: self.left_out(tuple({*fit.effects} - self.thrown)))
         monkeypatch.setattr(stage, "with_effect_added", lambda study, rest, rival, start: self.of(*rest.effects, rival))
 
     def beyond_pose(self, z: np.ndarray) -> float:
@@ -60,10 +57,7 @@ class World:
         return SimpleNamespace(effects=tuple(sorted(effects)), forms=laws, fit=fit, score=-square, discrepancy=size)
 
     def left_out(self, effects: tuple[str, ...]) -> Any:
-        hurt = len(self.harmful & set(effects))
-        return SimpleNamespace(
-            hurt=hurt, worse=lambda than: hurt > than.hurt, structure=self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[1]
-        )
+        return SimpleNamespace(structure=self.rest.get(tuple(sorted(effects)), (0.0, 0.0))[1])
 
     def gated(self, *effects: str, table: tuple[Visibility, ...] = (), accuracy: float = 0.0) -> Any:
         best = self.of(*effects)
@@ -159,27 +153,6 @@ def test_beside_a_much_larger_one_it_must_take_half_of_what_is_left_on_trials_le
     found = world.gated("large", "small")
     assert found.best.effects == (("large", "small") if kept else ("large",))
     assert [s.effect for s in found.small] == ([] if kept else ["small"])
-
-
-def test_of_several_the_one_that_predicts_worse_goes_and_a_single_one_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World(monkeypatch, friction=1.0, routing=0.5)
-    world.harmful = {"routing"}
-    found = world.gated("friction", "routing")
-    assert found.best.effects == ("friction",)
-    assert found.small == ()
-    world.harmful = {"friction"}
-    assert world.gated("friction").best.effects == ("friction",)  # the judge has the word
-
-
-def test_what_a_step_to_first_order_throws_is_judged_by_fits_in_truth(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An obstacle that two trials show: with one of them left out a step goes anywhere, a fit to the rest does not."""
-    world = World(monkeypatch, contact=1.0, friction=0.5)
-    world.harmful, world.thrown = {"contact", "friction"}, {"contact"}
-    assert world.gated("contact", "friction").best.effects == ("contact",)
-    world.thrown = {"contact", "friction"}
-    assert world.gated("contact", "friction").best.effects == ("contact", "friction")
-    world.rest = {("contact", "friction"): (1.0, 1.0)}  # a set that leaves a sigma of those fitted is not tried at such cost
-    assert len(world.gated("contact", "friction").best.effects) == 1
 
 
 def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:

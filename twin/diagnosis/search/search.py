@@ -29,7 +29,6 @@ from twin.diagnosis.thresholds import (
     HOPELESS_COST_RATIO,
     LARGEST_SCORE_GAP,
     LAW_FORM_SHARE,
-    LEFT_FOR_THIRD_EFFECT,
     MOST_EFFECTS,
     PROMISED_SHARE,
     REUSED_PROMISE_SHARE,
@@ -79,7 +78,7 @@ def search(context: FitContext, base: ScoredModel, patterns: Dictionary, limits:
         fresh = {k: _whole(context, w, limits.accept) if w.score > max(best_before, leading) else w for k, w in fresh.items()}
         known |= {k: w for k, w in fresh.items() if k not in known or w.score > known[k].score}
         beam, step = carried(context, base, [*beam, *step], list(fresh.values()), best_before + limits.accept)
-        if not (beam or step) or (level > 1 and _leaves(context, base, (*beam, *step)[0]) > LEFT_FOR_THIRD_EFFECT):
+        if not (beam or step):
             break
     if context.objective.bends and min(float(w.fit.z @ w.fit.z) for w in known.values()) > UNEXPLAINED_RATIO * context.objective.n:
         known |= _all_others(context, base, limits, known)

@@ -1,10 +1,10 @@
-"""Stage `gate`: drop effects that are too small, may be errors of a larger one, predict worse, or are confusable with a rival."""
+"""Stage `gate`: drop effects that are too small, may be errors of a larger one, or are confusable with a rival."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from twin.diagnosis.evidence.left_out import left_out, proven
+from twin.diagnosis.evidence.left_out import left_out
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
 from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, with_effect_added
 from twin.diagnosis.fit_context import FitContext
@@ -12,7 +12,7 @@ from twin.diagnosis.search.choose import converged
 from twin.diagnosis.search.lag_or_delay import LATE, tells_laws
 from twin.diagnosis.search.screen import Screening
 from twin.diagnosis.search.search import Search
-from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LARGE_STRUCTURE, LARGEST_SCORE_GAP, LAW_FORM_SHARE, LEFT_BY_EFFECTS
+from twin.diagnosis.thresholds import CLEAR_CHI_SQUARE, LARGEST_SCORE_GAP, LAW_FORM_SHARE, LEFT_BY_EFFECTS
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,6 @@ def gate(context: FitContext, found: Search, screening: Screening) -> Gated:
             small.append(TooSmall(least, best, moved[least]))
             best = without[least]
             continue
-        harmful = [e for e in moved if len(moved) > 1 and _harms(context, screening.limits, best, without[e])]
-        if harmful:
-            best = without[min(harmful, key=lambda e: moved[e])]
-            continue
         if (ambiguity := _ambiguity(context, found, screening, best, without)) is None:
             return Gated(best, without, tuple(small), tuple(doubts))
         doubts.append(ambiguity)
@@ -119,18 +115,6 @@ def _may_be_form(
         return False
     sizes = [(w.discrepancy.beyond(context.accuracy), left_out(context, w.fit).structure) for w in (best, without[least])]
     return not all(after <= LEFT_BY_EFFECTS * before for after, before in zip(*sizes, strict=True))
-
-
-def _harms(context: FitContext, limits: AcceptanceLimits, best: ScoredModel, without: ScoredModel) -> bool:
-    """Return whether left-out trials are predicted better without an effect.
-
-    Where the candidate leaves only noise on fitted trials, and a first-order step is not accurate for a left-out trial, full fits
-    decide.
-    """
-    own, other = left_out(context, best.fit), left_out(context, without.fit)
-    if not own.worse(other) or best.discrepancy.size > max(LARGE_STRUCTURE, limits.left):
-        return own.worse(other)
-    return proven(context, best.fit, own).worse(proven(context, without.fit, other))
 
 
 def _ambiguity(
