@@ -149,6 +149,31 @@ def test_steps_are_halved_until_they_suffice(tmp_path: Path, step: float, taken:
     assert Twin.load(tmp_path).robot.structure["timestep"] == taken
 
 
+SLIDE = """<mujoco><option gravity="0 0 0"/><worldbody><geom type="sphere" size="0.01" pos="0.05 0 0"/>
+  <body name="car"><joint name="way" type="slide" axis="1 0 0" damping="20"/><geom type="sphere" size="0.01" mass="0.1"/></body>
+  </worldbody><actuator><position name="push" joint="way" kp="1000" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+def test_bodies_that_touch_in_the_motion_described_are_told(tmp_path: Path) -> None:
+    """A ball of 2 cm on a slide is pushed from 0 to 10 cm in 1 s, towards a ball on the world 5 cm away, which it meets at 3 cm.
+
+    It follows 20 ms late, its damping over its kp.
+    """
+    slide = pendulum(tmp_path, SLIDE)
+    channels = (Channel("actuator.push.ctrl", "input", "m", 1e-6), Channel("joint.way.position", "output", "m", 1e-4))
+    time = np.linspace(0.0, 1.0, 101)
+
+    def told(way: float) -> list[str]:
+        values = {channels[0].name: way * time, channels[1].name: 0.0 * time}
+        day = Recording("slide", "test", "hardware", slide.gravity, channels, (Trial("0.csv", time, values),))
+        prepared, _ = in_steps_that_suffice(prepare(day, slide), Twin.of(slide))
+        return [words for words in prepared.notices if "touch" in words]
+
+    assert told(0.02) == []
+    (words,) = told(0.1)
+    assert words.startswith("world and car touch in the motion described (0.csv from 0.32 s)")
+
+
 def test_tensions_at_driven_lengths_show_damping() -> None:
     """Shortened by 1 mm/s at a constant rate, a body of one time constant is pulled by tau x' more, within
     5 %: the first half second, in which it starts, is left out. Inertia is 1e-3 sigma of a good load cell, this 2 sigma."""

@@ -126,6 +126,10 @@ class Body:
         """
         return 0.5 * pull if self.pushes else np.maximum(pull, 0.0)
 
+    def touching(self, q: np.ndarray) -> Mapping[tuple[str, str], int]:
+        """Return which of its parts touch each other in shapes q (n, nq), each with the first row in which they do."""
+        return {}
+
     @property
     def size(self) -> Size:
         """Its size relative to the reference robot, for which effects' numbers are written; 1 for a body without a rod."""

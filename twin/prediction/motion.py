@@ -10,7 +10,7 @@ from twin.body import Drive
 from twin.foundation.errors import SolveError
 from twin.prediction.evaluate import OUTPUT_GROUPS
 from twin.prediction.prepared import PreparedRecording
-from twin.prediction.simulate import can_step, simulate
+from twin.prediction.simulate import Trace, can_step, simulate
 from twin.prediction.twin import Twin
 
 LEAST_SWING = 0.1  # sigma (RMS) of outputs, by which inertia must move them for steps to be tried: a smaller error is not seen
@@ -20,6 +20,7 @@ LONGEST_STEPPED = 300.0  # s of all trials, which take a rod's steps up to two m
 # as long, was once claimed
 STEP_ERROR = 0.05
 MOST_HALVINGS = 2  # four times the time
+TRIALS_NAMED = 3  # of those in which bodies touch
 SOONER = "shapes follow fast tensions sooner than the described damping lets them: it is left out of this prediction"
 
 
@@ -103,7 +104,9 @@ def in_steps_that_suffice(prepared: PreparedRecording, twin: Twin) -> tuple[Prep
     first = step = float(getattr(prepared.robot.build(), "longest_step", 0.0))
     halvings, moved = 0, np.inf
     with suppress(SolveError):
-        now = _predicted(prepared, twin)
+        traces = simulate(twin, prepared)
+        now = tuple(t.outputs(twin, prepared) for t in traces)
+        prepared = replace(prepared, notices=(*prepared.notices, *_contacts(prepared, traces)))
         while True:
             finer = _in_steps(twin, 0.5 * step)
             halved = _predicted(prepared, finer)
@@ -121,6 +124,21 @@ def in_steps_that_suffice(prepared: PreparedRecording, twin: Twin) -> tuple[Prep
             f"{0.5 * step:g} in [structure] of robot.toml, or what is left may be the error of steps"
         )
     return replace(prepared, robot=twin.robot, notices=(*prepared.notices, *told)), twin
+
+
+def _contacts(prepared: PreparedRecording, traces: Sequence[Trace]) -> tuple[str, ...]:
+    """Return, in words, which bodies of the described robot touch in which trials."""
+    body, met = prepared.robot.build(), dict[tuple[str, str], list[str]]()
+    for inputs, trace in zip(prepared.inputs, traces, strict=True):
+        if trace.solution is not None:
+            for pair, row in body.touching(trace.solution.q).items():
+                met.setdefault(pair, []).append(f"{inputs.name} from {inputs.time[row]:.3g} s")
+    return tuple(
+        f"{a} and {b} touch in the motion described ({', '.join(when[:TRIALS_NAMED])}{' ...' * (len(when) > TRIALS_NAMED)}): "
+        "contacts are stepped as MuJoCo has them, and nothing is fitted through them; if the built ones do not touch, <exclude> "
+        "the pair in the MJCF"
+        for (a, b), when in met.items()
+    )
 
 
 def _in_steps(twin: Twin, step: float) -> Twin:

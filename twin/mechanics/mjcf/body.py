@@ -15,6 +15,7 @@ from twin.effects.joint_stop import NO_STOP
 from twin.foundation.parameters import Size
 from twin.mechanics.mjcf.loading import SCALAR_JOINTS, LoadedModel
 from twin.mechanics.mjcf.numbers import slides
+from twin.mechanics.mjcf.poses import touching_bodies
 from twin.mechanics.mjcf.routes import outward
 
 LINE_LAG = 9  # of an actuator's dynprm, all of which MuJoCo leaves alone where it has no dynamics: s, `line_lag`
@@ -129,6 +130,9 @@ class ModelBody(Body):
     def size(self) -> Size:  # type: ignore[override]
         """Its reach, and the torque that gravity and its springs put on a joint over that, relative to the reference robot."""
         return model_size(self.loaded.model)
+
+    def touching(self, q: np.ndarray) -> Mapping[tuple[str, str], int]:
+        return touching_bodies(self.model, q)
 
     def add_joint_inertia(self, inertia: np.ndarray) -> None:
         for joint, more in zip(self.joints, inertia, strict=True):

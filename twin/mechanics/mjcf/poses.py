@@ -60,6 +60,19 @@ def contacts_at_start(loaded: LoadedModel) -> int:
     return int(data.ncon)
 
 
+def touching_bodies(model: mujoco.MjModel, q: np.ndarray) -> dict[tuple[str, str], int]:
+    """Return which bodies touch in poses q (n, nq), each pair with the first row in which it does."""
+    data, found = mujoco.MjData(model), dict[tuple[str, str], int]()
+    for row, pose in enumerate(q):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        for contact in data.contact:
+            a, b = (model.body(int(model.geom_bodyid[g])).name for g in contact.geom)
+            found.setdefault((a, b), row)
+    return found
+
+
 def add_masses(model: mujoco.MjModel, masses: Iterable[tuple[str, float]], places: Mapping[str, tuple[int, np.ndarray]]) -> None:
     """Hang point masses (kg) at sites or bodies, whose `places` are (body, place in its frame); inertias by the parallel axes.
 
