@@ -21,6 +21,7 @@ from tools.simulators.plain_mujoco.day import EFFECTS, HERE, MODELS, write_log
 from twin.diagnosis import Settings, diagnose
 from twin.foundation.errors import TwinError
 from twin.measurements import read
+from twin.prediction.evaluate import headline_group
 from twin.robots.starter import write_model_starter
 
 
@@ -36,7 +37,8 @@ def run(model: str, effect: str, folder: Path, seed: int) -> Row:
         found = diagnose(read(where / "samples/first"), settings=Settings(seed=seed, jobs=1))
     except TwinError as error:
         return {**row, **no_answer(error)}
-    after, floor = found.errors.after["joint"], found.errors.floor["joint"]
+    headline = headline_group(o.group for o in found.prepared.outputs)
+    after, floor = found.errors.after[headline], found.errors.floor[headline]
     claims = {c.effect: {n: v.value for n, v in c.parameters.items()} for c in found.claims}
     took = time.perf_counter() - began
     return {**row, "verdict": found.verdict, "claims": list(claims), "values": claims, "over_floor": after / floor, "seconds": took}
