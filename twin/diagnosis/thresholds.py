@@ -211,7 +211,7 @@ WHITER_MODEL_LEAVES = _row("WHITER_MODEL_LEAVES", 0.5, "of what the best by evid
 LARGEST_SCORE_GAP = _row("LARGEST_SCORE_GAP", 400.0, "2 ln odds", "a model further behind the best never led after another effect",
     "judgement")
 MOST_EFFECTS = _row("MOST_EFFECTS", 2, "effects",
-    "at once: a third claim was wrong on four of 106 days and right on one, beside a wrong second; a twin with two is diagnosed again",
+    "at once: a third was wrong on four of 106 days and right on one, beside a wrong second; a twin with two is diagnosed again",
     "python -m tools.benchmarks.diagnosis.ablation --out results/ --sets 120 --seed 36000")
 LAW_FORM_SHARE = _row("LAW_FORM_SHARE", 0.15, "of the largest contribution",
     "a smaller effect may be an error of the large one's equation", ATTRIBUTION_BENCHMARK)
