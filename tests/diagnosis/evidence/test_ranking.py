@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from twin.diagnosis.evidence import ranking as stage
 from twin.diagnosis.evidence.first_order import Dictionary, Pattern
-from twin.diagnosis.evidence.ranking import Candidate, gains, projected, promised_change, rank
+from twin.diagnosis.evidence.ranking import Candidate, _amplitudes, gains, projected, promised_change, rank
 from twin.diagnosis.thresholds import STARTS_PER_EFFECT
 from twin.effects import FitStart
 
@@ -98,6 +98,17 @@ def test_an_effect_that_only_goes_one_way_gains_nothing_the_other_way() -> None:
     against = gain("tendon_friction", ("mu",), -4.0 * column, fitted())  # of some quarter of a unit
     assert against == pytest.approx(fall(column, [0, 1]) - np.log(N), rel=1e-6)
     assert gain("base_tilt", ("about_x",), column, fitted()) == pytest.approx(against, rel=1e-9)
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-7])
+def test_of_two_columns_that_are_the_same_each_takes_half(rounding: float) -> None:
+    """As the springs of two joints that an equality couples; the third goes the other way, and stays at its bound of 0.
+
+    By rounding A has an eigenvalue of -1e-7 along the difference of the two, of which nothing is known.
+    """
+    A = np.array([[1.0, 1.0 + rounding, 0.2], [1.0 + rounding, 1.0, 0.2], [0.2, 0.2, 1.0]])
+    amplitude = _amplitudes(A, np.array([-1.0, -1.0, 0.5]), np.zeros(3))
+    np.testing.assert_allclose(amplitude, [0.5, 0.5, 0.0], atol=1e-6)
 
 
 def test_of_a_law_for_every_tendon_the_worn_one_counts_whatever_the_others_would_do() -> None:
