@@ -115,8 +115,8 @@ def _amplitudes(A: np.ndarray, u: np.ndarray, least: np.ndarray) -> np.ndarray:
     """Return the amplitudes that reduce |z|^2 most, none below its `least`.
 
     z falls by column * amplitude, the columns being changes of the residual, so that without bounds the solution is -A^-1 u. Of an
-    effect with one amplitude a tendon, some stay at 0 where one tendon has it. Of joints that an equality couples two columns are the
-    same, and A has eigenvalues of zero, by rounding below it, which are lifted well above that rounding.
+    effect with one amplitude a tendon, some stay at 0 where one tendon has it. Of joints that an equality couples two columns are
+    the same, and A has eigenvalues of zero, by rounding below it, which are lifted well above that rounding.
     """
     rounding = max(0.0, -float(np.linalg.eigvalsh(A)[0]))
     held = A + (1e-9 * np.trace(A) + 10.0 * rounding) * np.eye(len(A))
