@@ -150,7 +150,7 @@ def test_steps_are_halved_until_they_suffice(tmp_path: Path, step: float, taken:
 
 
 SLIDE = """<mujoco><option gravity="0 0 0"/><worldbody><geom type="sphere" size="0.01" pos="0.05 0 0"/>
-  <body name="car"><joint name="way" type="slide" axis="1 0 0" damping="20"/><geom type="sphere" size="0.01" mass="0.1"/></body>
+  <body><joint name="way" type="slide" axis="1 0 0" damping="20"/><geom type="sphere" size="0.01" mass="0.1"/></body>
   </worldbody><actuator><position name="push" joint="way" kp="1000" ctrlrange="-1 1"/></actuator></mujoco>"""
 
 
@@ -171,7 +171,7 @@ def test_bodies_that_touch_in_the_motion_described_are_told(tmp_path: Path) -> N
 
     assert told(0.02) == []
     (words,) = told(0.1)
-    assert words.startswith("world and car touch in the motion described (0.csv from 0.32 s)")
+    assert words.startswith("world and body_2 touch in the motion described (0.csv from 0.32 s)")
 
 
 def test_tensions_at_driven_lengths_show_damping() -> None:

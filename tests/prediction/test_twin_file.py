@@ -142,6 +142,8 @@ REFUSED = {
     "a unit that is no text": (HEAD + '[parameters]\n"disks.mass" = { value = 5.0, unit = 3 }', "disks.mass"),
     "beyond its bounds": (HEAD + '[parameters]\n"disks.mass" = { value = 50.0, unit = "g" }', "disks.mass.*allowed"),
     "no number": (HEAD + '[parameters]\n"disks.mass" = nan', "disks.mass.*allowed"),
+    "a step of a robot that has none": (HEAD + "timestep = 0.001", "timestep.*'continuum'.*leave it out"),
+    "a step of nothing": (HEAD.replace("continuum", "tendon_leg") + "timestep = 0.0", "timestep"),
     "an effect beyond its bounds": (HEAD + FRICTION + "{ mu = 3.0 }", "tendon_friction.*mu.*allowed"),
 }
 

@@ -212,7 +212,7 @@ LARGEST_SCORE_GAP = _row("LARGEST_SCORE_GAP", 400.0, "2 ln odds", "a model furth
     "judgement")
 MOST_EFFECTS = _row("MOST_EFFECTS", 2, "effects",
     "at once: a third was wrong on four of 106 days and right on one, beside a wrong second; a twin with two is diagnosed again",
-    "python -m tools.benchmarks.diagnosis.ablation --out results/ --sets 120 --seed 36000")
+    "tools/evidence/diagnosis.md; python -m tools.benchmarks.diagnosis.ablation --out results/ --sets 120 --seed 36000")
 LAW_FORM_SHARE = _row("LAW_FORM_SHARE", 0.15, "of the largest contribution",
     "a smaller effect may be an error of the large one's equation", ATTRIBUTION_BENCHMARK)
 HOPELESS_COST_RATIO = _row("HOPELESS_COST_RATIO", 2.0, "times the least cost",

@@ -94,10 +94,10 @@ def swings(prepared: PreparedRecording, predicted: Sequence[np.ndarray], sigma: 
 
 
 def in_steps_that_suffice(prepared: PreparedRecording, twin: Twin) -> tuple[PreparedRecording, Twin]:
-    """Return a recording whose controls drive its robot, and the twin, in steps that move its outputs by `STEP_ERROR` at most.
+    """Return a recording whose controls drive its robot, and the twin, in steps that err by `STEP_ERROR` at most.
 
-    Steps are halved, up to `MOST_HALVINGS` times, until half of them moves the prediction by less; a notice says so. Else an effect
-    would be found that lets the robot step differently. What is left is told.
+    Steps are halved, up to `MOST_HALVINGS` times, until steps half as long move the prediction by no more. Else effects that are
+    stepped differently gain by that alone. Notices say which step was taken, what error is left, and which bodies touch.
     """
     if Drive.CONTROL not in prepared.drives:
         return prepared, twin

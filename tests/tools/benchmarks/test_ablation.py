@@ -32,6 +32,22 @@ def test_a_day_is_decided_with_and_without_rules() -> None:
     assert day.floor
 
 
+def test_rules_that_change_an_answer_only_together_are_listed_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of four, without `d` nothing is claimed; `a` and `b` stand in for each other."""
+    day = object.__new__(ablation.Day)
+
+    def answer(rules: tuple[Rule, ...], withdraws: bool) -> dict[str, Any]:
+        out = {r.name for r in rules}
+        claims = [] if "d" in out else ["tip_payload", *(["base_tilt"] if {"a", "b"} <= out else [])]
+        return {"verdict": "explained", "claims": claims}
+
+    monkeypatch.setattr(day, "_answer", answer)
+    found = dict(day.answers(tuple(Rule(name) for name in "abcd")))
+    assert set(found) == {ablation.AS_IT_IS, ablation.NO_WITHDRAWAL, ablation.TOGETHER, "d"}
+    assert found[ablation.TOGETHER]["rules"] == ["a", "b"]
+    assert found["d"]["claims"] == []
+
+
 def test_rules_name_thresholds_that_there_are_and_each_once() -> None:
     names = [rule.name for rule in RULES]
     assert len(names) == len(set(names))

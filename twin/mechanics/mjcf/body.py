@@ -132,7 +132,7 @@ class ModelBody(Body):
         return model_size(self.loaded.model)
 
     def touching(self, q: np.ndarray) -> Mapping[tuple[str, str], int]:
-        return touching_bodies(self.model, q)
+        return touching_bodies(self.loaded, q)
 
     def add_joint_inertia(self, inertia: np.ndarray) -> None:
         for joint, more in zip(self.joints, inertia, strict=True):

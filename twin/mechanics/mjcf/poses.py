@@ -60,16 +60,17 @@ def contacts_at_start(loaded: LoadedModel) -> int:
     return int(data.ncon)
 
 
-def touching_bodies(model: mujoco.MjModel, q: np.ndarray) -> dict[tuple[str, str], int]:
-    """Return which bodies touch in poses q (n, nq), each pair with the first row in which it does."""
+def touching_bodies(loaded: LoadedModel, q: np.ndarray) -> dict[tuple[str, str], int]:
+    """Return which bodies touch in poses q (n, nq), each pair in the model's order with the first row in which it does."""
+    model, names = loaded.model, loaded.names("body")
     data, found = mujoco.MjData(model), dict[tuple[str, str], int]()
     for row, pose in enumerate(q):
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
         for contact in data.contact:
-            a, b = (model.body(int(model.geom_bodyid[g])).name for g in contact.geom)
-            found.setdefault((a, b), row)
+            a, b = sorted(model.geom_bodyid[contact.geom])
+            found.setdefault((names[a], names[b]), row)
     return found
 
 

@@ -19,7 +19,7 @@ from twin.foundation.parameters import FittedValue
 from twin.foundation.toml_file import open_toml
 from twin.prediction.twin import Twin
 from twin.prediction.twin_file.joint_errors import CorrelationTable
-from twin.robots import Robot, load, robot_names
+from twin.robots import Robot, load, load_family, robot_names
 from twin.robots.effect_tables import read_effects, read_values
 from twin.robots.robot import models_folder
 
@@ -92,7 +92,9 @@ def _twin(table: Mapping[str, Any], folder: Path) -> Twin:
     if file is None:
         raise DataError(join_problems(problems))
     robot = load(file.robot, folder)
-    if file.timestep is not None:
+    if file.timestep is not None and "timestep" not in load_family(robot.family).SCHEMA.structure.model_fields:
+        problems.append(f"timestep: robot {robot.name!r} chooses its own steps; leave it out")
+    elif file.timestep is not None:
         robot = replace(robot, structure={**robot.structure, "timestep": file.timestep})
     values = read_values(file.parameters, robot.parameters, "parameters", problems)
     effects = read_effects(file.effect, robot.n_tendon, robot.size, problems)
