@@ -208,11 +208,15 @@ def _by_chance(repeats: int, equal: float, readings: int) -> float:
 
 
 def _goes_on(s: Series, a: int, b: int) -> bool:
-    """Return whether a command, after it stood in rows a to b, jumps by what it would have gone in them, or goes on slower."""
+    """Return whether a command, after it stood in rows a to b, jumps by what it would have gone in them, or goes on slower.
+
+    A command that stands before or after them too is given in steps, and stands by design.
+    """
     if b >= len(s.time):
         return False
     beside = [abs(float(s.read[i, 0] - s.read[i - 1, 0])) for i in (a, b + 1) if 0 < i < len(s.time)]
-    return abs(float(s.read[b, 0] - s.read[b - 1, 0])) > LEFT_BY_PATTERN * (b - a) * min(beside, default=0.0)
+    slower = min(beside, default=0.0)
+    return slower > 0.0 and abs(float(s.read[b, 0] - s.read[b - 1, 0])) > LEFT_BY_PATTERN * (b - a) * slower
 
 
 def _held(s: Series, a: int, b: int) -> bool:
