@@ -25,6 +25,7 @@ FAR_SHARE = 0.05  # of the cost: a fit whose derivatives promise a larger fall i
 AT_BOUND_SHARE = 1e-3  # of a parameter's range: closer to an end, and than its step, a parameter is at its bound
 SLOW_FALL_SHARE = 0.5  # of the fall that derivatives predicted: where less came, they are renewed
 MOST_RENEWALS = 4  # of the derivatives for the robot's own parameters in a fit
+MOTION_RENEWALS = 2  # the same of motion, whose derivatives learn from each step
 MOST_FIT_STEPS = 24  # at most, of a fit of motion or one that renewed them
 MOST_STEPS_WITH_KEPT = 12  # at most, of one that kept them
 FIRST_DAMPING = 1e-4  # of the Hessian's diagonal
@@ -173,7 +174,7 @@ def fit(
     # Derivatives of the same model, of more trials than these, are near enough.
     kept = J is not None and (not objective.bends or (near is not None and near.model is model))
     own = [i for i, f in enumerate(model.free) if f.effect is None]
-    renewals = allowed = MOST_RENEWALS if own and not (kept or np.isinf(stop.worth)) else 0
+    renewals = allowed = penalty.most_renewals if own and not (kept or np.isinf(stop.worth)) else 0
     fixed = [i for i in own if J is None or i >= J.shape[1]]
     moving = [i for i, f in enumerate(model.free) if f.effect is not None]
     columns = np.zeros((at.z.size, len(model.free)))
@@ -198,7 +199,7 @@ def fit(
             better, damping, predicted = step.holding(moving).taken(now, penalty.first_damping, enough)
         fall = 0.0 if better is None else now - penalty.cost(better)
         if better is not None:
-            at, now = better, penalty.cost(better)
+            columns, at, now = step.learned(better), better, penalty.cost(better)
             if fall > TRUSTED_FALL_SHARE * predicted:
                 damping = max(0.1 * damping, LEAST_DAMPING * penalty.first_damping)
             if now - left * fall > beat:
@@ -221,10 +222,11 @@ def fit(
 
 @dataclass(frozen=True)
 class _Step:
-    """A step from an evaluated model: half the Hessian (n_free, n_free) and half the gradient (n_free,) of the cost there."""
+    """A step from an evaluated model: derivatives `columns` (n, n_free) of its z, half the cost's Hessian and half its gradient."""
 
     penalty: _Penalty
     at: Evaluation
+    columns: np.ndarray
     x: np.ndarray
     H: np.ndarray
     g: np.ndarray
@@ -233,7 +235,7 @@ class _Step:
     @staticmethod
     def of(penalty: _Penalty, at: Evaluation, columns: np.ndarray) -> _Step:
         x = at.model.vector()
-        return _Step(penalty, at, x, *penalty.normal_equations(x, columns, at.z))
+        return _Step(penalty, at, columns, x, *penalty.normal_equations(x, columns, at.z))
 
     def holding(self, which: Sequence[int]) -> _Step:
         """Return the step in which these free parameters do not move."""
@@ -245,6 +247,19 @@ class _Step:
         low[list(self.held)] = high[list(self.held)] = 0.0
         d = _bounded_step(self.H + damping * np.diag(np.diag(self.H) + 1e-9), self.g, low, high)
         return d, -float(2.0 * self.g @ d + d @ self.H @ d)
+
+    def learned(self, better: Evaluation) -> np.ndarray:
+        """Return the derivatives (n, n_free), those of motion with the least change that gives the change of z just seen.
+
+        J + (dz - J d) w' / (w'd), w = d / std^2 with std in steps, so that the change is the least in widths of descriptions.
+
+        Source: Broyden (1965), a class of methods for solving nonlinear simultaneous equations.
+        """
+        d = better.model.vector() - self.x
+        weighed = d * self.penalty.weight
+        if not (self.penalty.objective.bends and weighed.any()):
+            return self.columns
+        return self.columns + np.outer(better.z - self.at.z - self.columns @ d, weighed / (weighed @ d))
 
     def taken(self, now: float, damping: float, enough: float) -> tuple[Evaluation | None, float, float]:
         """Return the evaluation that lowers the cost from `now`, if any, its damping, and the fall that was predicted.
@@ -289,6 +304,11 @@ class _Penalty:
         cells = {e.id for e in model.twin.effects if "load cells" in e.needs}
         silencing = [i for i, f in enumerate(model.free) if f.effect in cells]
         return _Penalty(objective, model, low, high, prior, prior_weight(model) ** 2, silencing)
+
+    @property
+    def most_renewals(self) -> int:
+        """How often derivatives for the robot's own parameters may be renewed."""
+        return MOTION_RENEWALS if self.objective.bends else MOST_RENEWALS
 
     @property
     def first_damping(self) -> float:
