@@ -122,7 +122,7 @@ def test_a_motion_that_nothing_explains_is_sought_among_all_effects(
     """Friction promises nothing beside a robot whose damper was bent for want of it."""
     world, seen = World(monkeypatch, {"friction": 500.0, "drift": 40.0}), SimpleNamespace(discrepancy=None)
     world.square = {0: 1e6, 1: left * 10_000.0, 2: 1e6}
-    seen.fit = SimpleNamespace(effects=(), as_described=True)
+    seen.fit, seen.effects = SimpleNamespace(effects=(), as_described=True), ()
     monkeypatch.setattr(stage, "described", lambda study, base: seen)
     monkeypatch.setattr(stage, "promised_change", lambda *args: None)
 
@@ -140,6 +140,26 @@ def test_a_motion_that_nothing_explains_is_sought_among_all_effects(
     study: Any = SimpleNamespace(**vars(STUDY) | {"objective": SimpleNamespace(n=10_000, bends=moves)})
     assert world.found(study).best.effects == (("friction",) if tried else ("drift",))
     assert ({"friction"} in world.anew) == tried, "drift was tried already"
+
+
+def test_all_effects_beside_a_set_start_from_one_description_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its derivatives, of motion dear, are taken once for each set to which effects are added, and not for one that has none."""
+    world = World(monkeypatch, {"friction": 500.0, "drift": 40.0, "tilt": 30.0})
+    asked, starts = [], []
+
+    def described(study: Any, member: Any) -> Any:
+        asked.append(member.effects)
+        return SimpleNamespace(effects=member.effects, is_description=True)
+
+    def extended(study: Any, member: Any, effect: str, start: Any, beat: float) -> Any:
+        starts.append(hasattr(member, "is_description"))
+        return world.of(*member.effects, effect)
+
+    monkeypatch.setattr(stage, "described", described)
+    monkeypatch.setattr(stage, "with_effect_added", extended)
+    assert world.found().best.effects == ("drift", "friction")
+    assert asked == [(), ("friction",)]
+    assert starts == [True] * 5
 
 
 @pytest.mark.parametrize(("share", "tried"), [(0.24, False), (0.26, True)])

@@ -38,6 +38,7 @@ class World:
         monkeypatch.setattr(stage, "refit_without", lambda s, base, best, e, known: self.of(*(x for x in best.effects if x != e)))
         monkeypatch.setattr(stage, "left_out", lambda study, fit: self.left_out(fit.effects))
         monkeypatch.setattr(stage, "with_effect_added", lambda study, rest, rival, start: self.of(*rest.effects, rival))
+        monkeypatch.setattr(stage, "described", lambda study, rest: None)
 
     def beyond_pose(self, z: np.ndarray) -> float:
         if z.size == 1:

@@ -134,7 +134,11 @@ def extend(
     fresh: Known,
     seen: ScoredModel | None = None,
 ) -> None:
-    """Add to `fresh` `member` with each of the effects whose pattern promises most beside it, or anything beside `seen`."""
+    """Add to `fresh` `member` with each of the effects whose pattern promises most beside it, or anything beside `seen`.
+
+    Fits start from `member` as `described`, where that is another; its derivatives, of motion dear, serve all of them.
+    """
+    start: ScoredModel | None = None
     top, seen = CANDIDATES_REFITTED if seen is None else len(lacks.patterns), seen or member
     for candidate in rank(context.objective, context.evidence, seen.fit, seen.discrepancy, lacks, top):
         if not _worth_a_fit(context, base, seen, lacks, limits, candidate):
@@ -144,7 +148,8 @@ def extend(
             continue
         context.progress(name)
         beat = HOPELESS_COST_RATIO * min((w.fit.cost for w in fresh.values()), default=np.inf)
-        found = with_effect_added(context, member, candidate.effect, candidate.start, beat)
+        start = start or described(context, member) or member
+        found = with_effect_added(context, start, candidate.effect, candidate.start, beat)
         if found is not None and (found.forms not in fresh or better(found, fresh[found.forms])):
             fresh[found.forms] = found
 

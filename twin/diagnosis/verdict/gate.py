@@ -6,7 +6,7 @@ import numpy as np
 
 from twin.diagnosis.evidence.left_out import left_out
 from twin.diagnosis.evidence.null_distribution import AcceptanceLimits
-from twin.diagnosis.evidence.scored_model import ScoredModel, refit_without, with_effect_added
+from twin.diagnosis.evidence.scored_model import ScoredModel, described, refit_without, with_effect_added
 from twin.diagnosis.fit_context import FitContext
 from twin.diagnosis.search.choose import converged
 from twin.diagnosis.search.lag_or_delay import LATE, tells_laws
@@ -149,6 +149,7 @@ def _in_its_place(context: FitContext, found: Search, screening: Screening, rest
         return max(weighed, key=lambda w: w.score, default=None)
     context.progress(f"{rival} in its place")
     starts = [p.start for p in screening.patterns.patterns if p.effect == rival]
+    rest = described(context, rest) or rest
     fresh = [w for start in starts if (w := with_effect_added(context, rest, rival, start)) is not None]
     other = max(fresh, key=lambda w: w.score, default=None)
     near = other is not None and context.objective.bends and other.score > found.best.score - LARGEST_SCORE_GAP
