@@ -88,7 +88,8 @@ class Fit:
         J, each = self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
         if len(each) > 1 and free.any():
             both = np.ix_(free, free)
-            shown = J @ solve(J.T @ J, self._shown_information()[both])  # without the share that is noise of differences
+            # Without the share that is noise of differences.
+            shown = J if self.again is None else J @ solve(J.T @ J, self._shown_information()[both])
             parts = [(self.trust * shown[a:b].T @ shown[a:b], self.trust * shown[a:b].T @ self.z[a:b]) for a, b in each]
             noise[free] = np.maximum(noise[free], np.sqrt(scatter(parts, self.information()[both])) * step[free])
         return noise
