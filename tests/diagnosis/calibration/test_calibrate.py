@@ -544,20 +544,6 @@ def test_derivatives_of_motion_learn_from_each_step(monkeypatch: pytest.MonkeyPa
     assert np.abs(learnt).max() < 1e-2 * np.abs(kept).max()
 
 
-def test_noise_of_differences_is_no_information() -> None:
-    """Of two numbers data show one alone, the other's derivatives are noise of norm 5: it is known by its description, a step, and
-    not five times as well, as a single set of derivatives says. Of 3,000 readings in six trials the noise of z is one."""
-    rng, n = np.random.default_rng(8), 3000
-    shown = np.stack([rng.normal(size=n), np.zeros(n)], axis=1)
-    J, again = (shown + 5.0 / np.sqrt(n) * rng.normal(size=(n, 2)) for _ in range(2))
-    free = tuple(Free(None, Parameter(name, 0.0, "1", -50.0, 50.0, "made", std=1.0, scale=1.0)) for name in ("a", "b"))
-    at = Evaluation(Model(Twin.of(ROBOT), free), {}, [np.zeros((n // 6, 1))] * 6, rng.normal(size=n))
-    known, unknown = Fit(at, J, 0.0, again=again).std()
-    assert unknown == pytest.approx(1.0, abs=0.15)
-    assert known == pytest.approx(1.0 / np.sqrt(n), rel=0.5)  # six trials tell it to a third
-    assert Fit(at, J, 0.0).std()[1] < 0.5
-
-
 class Product(Linear):
     """Outputs A (x_0 x_1) of a motion: data know the product of two numbers alone, as of a servo's gain and its strength."""
 

@@ -154,18 +154,6 @@ def test_only_derivatives_that_changed_are_computed_again(swung: tuple[Objective
     assert asked == [(TRIALS_PROBED, len(which)), (len(objective.trials) - TRIALS_PROBED, 1)]
 
 
-def test_derivatives_for_effects_are_taken_again_beside(swung: tuple[Objective, Model]) -> None:
-    """The same but for what a fiftieth of a step makes of them; the robot's own as they are."""
-    objective, base = swung
-    model = base.with_effect("tip_payload", {"mass": 0.02}, ("mass",), objective.prepared.n_tendon)
-    at = objective.evaluate(model)
-    known = objective.jacobian(at, range(len(model.free)))
-    again = objective.derivatives_again(at, known)
-    assert again is not None
-    np.testing.assert_array_equal(again[:, :-1], known[:, :-1])
-    assert 0.0 < np.linalg.norm(again[:, -1] - known[:, -1]) < 0.1 * np.linalg.norm(known[:, -1])
-
-
 def test_a_hopeless_fit_renews_nothing(swung: tuple[Objective, Model], monkeypatch: pytest.MonkeyPatch) -> None:
     objective, model = swung
     J = objective.jacobian(objective.evaluate(model), range(len(model.free)))

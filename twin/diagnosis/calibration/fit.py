@@ -45,7 +45,6 @@ class Fit:
 
     `J` (n, n_free): whitened derivatives at the solution, x in steps. `cost` = |z|^2 + prior terms. `systematic` (n_free,) SI:
     possible errors of the parameters from effects that the model lacks, where estimated. `trust`: dC / d|z|^2 at the solution.
-    `again` (n, n_free): derivatives of motion by differences of their own.
     """
 
     evaluation: Evaluation
@@ -53,7 +52,6 @@ class Fit:
     cost: float
     systematic: np.ndarray | None = None
     trust: float = 1.0
-    again: np.ndarray | None = None
 
     @property
     def model(self) -> Model:
@@ -65,18 +63,7 @@ class Fit:
 
     def information(self) -> np.ndarray:
         """Return the posterior information (n_free, n_free) in steps: J'J as far as it is trusted, plus that of the priors."""
-        return self.trust * self._shown_information() + np.diag(prior_weight(self.model) ** 2)
-
-    def _shown_information(self) -> np.ndarray:
-        """Return the information (n_free, n_free) in the data: J'J; of motion the symmetric part of J' `again`, if not below zero.
-
-        Differences of motion have noise, of the places where joints come to rest or bump, alike in no two of them. Its square in
-        J'J would be information along directions that data do not show.
-        """
-        if self.again is None:
-            return self.J.T @ self.J
-        values, V = np.linalg.eigh(0.5 * (self.J.T @ self.again + self.again.T @ self.J))
-        return (V * np.maximum(values, 0.0)) @ V.T
+        return self.trust * (self.J.T @ self.J) + np.diag(prior_weight(self.model) ** 2)
 
     def std(self) -> np.ndarray:
         """Return standard errors (n_free,) in SI: by the noise, or by the disagreement of trials, whichever is larger.
@@ -85,13 +72,10 @@ class Fit:
         """
         noise, free = self._by_noise(), ~self.at_bound()
         step = np.array([f.parameter.step for f in self.model.free])
-        J, each = self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
+        J, each = self.trust * self.J[:, free], list(pairwise(np.cumsum([0, *(r.size for r in self.evaluation.raw)])))
         if len(each) > 1 and free.any():
-            both = np.ix_(free, free)
-            # Without the share that is noise of differences.
-            shown = J if self.again is None else J @ solve(J.T @ J, self._shown_information()[both])
-            parts = [(self.trust * shown[a:b].T @ shown[a:b], self.trust * shown[a:b].T @ self.z[a:b]) for a, b in each]
-            noise[free] = np.maximum(noise[free], np.sqrt(scatter(parts, self.information()[both])) * step[free])
+            parts = [(J[a:b].T @ self.J[a:b, free], J[a:b].T @ self.z[a:b]) for a, b in each]
+            noise[free] = np.maximum(noise[free], np.sqrt(scatter(parts, self.information()[np.ix_(free, free)])) * step[free])
         return noise
 
     def _by_noise(self) -> np.ndarray:
@@ -113,7 +97,7 @@ class Fit:
     def effective_parameters(self) -> float:
         """Return the number of parameters that the data, not the priors, determine: trace of J'J (J'J + P)^-1."""
         data = self.trust * (self.J.T @ self.J)
-        return float(np.trace(solve(data + np.diag(prior_weight(self.model) ** 2), data)))
+        return float(np.trace(solve(self.information(), data)))
 
     def fitted(self, effect: str | None) -> dict[str, FittedValue]:
         """Return the values and standard errors of the free parameters of the robot (None) or of an effect.

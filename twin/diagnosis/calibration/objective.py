@@ -252,20 +252,6 @@ class Objective:
                 J[:, k] = self.columns(at, back, once=True, unsolved="zeros").sum(axis=1)
         return J
 
-    def derivatives_again(self, at: Evaluation, known: np.ndarray) -> np.ndarray | None:
-        """Return dz/dx (n, n_free) of motion, those for effects by differences from a point beside this one; else None.
-
-        The noise of differences, which jumps within a fiftieth of a step, is another there. Those for the robot's own parameters
-        are the `known` ones.
-        """
-        if not self.bends:
-            return None
-        which, out = [i for i, f in enumerate(at.model.free) if f.effect is not None], known.copy()
-        with suppress(SolveError):
-            beside = self.evaluate(at.model.at(at.model.vector() + PARAMETER_DIFFERENCE), at.traces)
-            out[:, which] = self.jacobian(beside, which)
-        return out
-
     def renewed(self, at: Evaluation, which: Sequence[int], known: np.ndarray) -> np.ndarray:
         """Return dz/dx (n, len(which)) as `jacobian`, with columns of `known`, of the same shape, where these hardly changed.
 

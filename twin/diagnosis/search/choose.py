@@ -112,12 +112,9 @@ def add_one_effect(context: FitContext, core: ScoredModel, found: Search, limits
 
 
 def converged(context: FitContext, rough: ScoredModel) -> ScoredModel:
-    """Return a candidate fitted to its minimum; of motion by derivatives in short steps alone, and twice for standard errors."""
-    if not context.objective.bends:
-        return score_model(context, fit(context.objective, rough.fit.model, near=rough.fit.evaluation, refresh=True))
-    objective = context.objective.precise()
-    found = fit(objective, rough.fit.model, near=rough.fit.evaluation, refresh=True)
-    return score_model(context, replace(found, again=objective.derivatives_again(found.evaluation, found.J)))
+    """Return a candidate fitted to its minimum; of motion by derivatives in short steps alone."""
+    objective = context.objective.precise() if context.objective.bends else context.objective
+    return score_model(context, fit(objective, rough.fit.model, near=rough.fit.evaluation, refresh=True))
 
 
 def halved(context: FitContext, base: ScoredModel, best: ScoredModel) -> bool:
