@@ -519,8 +519,8 @@ def test_derivatives_that_have_changed_are_renewed_or_the_fit_ends_elsewhere(mon
     assert np.abs(fit(bench, model).model.vector() - true).max() > 0.1
 
 
-class BentMotion(Bent):
-    """The same of a motion."""
+class Motion(Linear):
+    """A bench whose outputs are those of a motion."""
 
     def __init__(self, A: np.ndarray, y: np.ndarray) -> None:
         super().__init__(A, y)
@@ -529,6 +529,10 @@ class BentMotion(Bent):
     @property
     def bends(self) -> bool:
         return True
+
+
+class BentMotion(Motion, Bent):
+    """A motion that bends likewise."""
 
 
 def test_derivatives_of_motion_learn_from_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -544,16 +548,8 @@ def test_derivatives_of_motion_learn_from_each_step(monkeypatch: pytest.MonkeyPa
     assert np.abs(learnt).max() < 1e-2 * np.abs(kept).max()
 
 
-class Product(Linear):
+class Product(Motion):
     """Outputs A (x_0 x_1) of a motion: data know the product of two numbers alone, as of a servo's gain and its strength."""
-
-    def __init__(self, A: np.ndarray, y: np.ndarray) -> None:
-        super().__init__(A, y)
-        self.n = y.size
-
-    @property
-    def bends(self) -> bool:
-        return True
 
     def within(self, most: float, model: Model, near: Mapping[int, Trace] | None = None) -> Evaluation | None:
         z = self.y - self.A @ np.prod(model.vector(), keepdims=True)
