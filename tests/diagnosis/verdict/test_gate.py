@@ -173,8 +173,16 @@ def test_what_the_design_cannot_tell_from_a_rival_that_does_as_well_is_in_doubt(
 
 
 def test_of_motion_the_rival_is_fitted_whatever_the_design_tells(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A rival that ended 300 behind and takes all but 20 of |z|^2 at its minimum; one 500 behind is not fitted further."""
-    world = World(monkeypatch, friction=0.5, rival=0.0)
+    """A rival that ended 300 behind and takes all but 20 of |z|^2 at its minimum; one 500 behind is not fitted further.
+    It is fitted from the robot as described, where the rest without the effect was bent."""
+    world, starts = World(monkeypatch, friction=0.5, rival=0.0), []
+
+    def added(study: Any, rest: Any, rival: str, start: Any) -> Any:
+        starts.append(hasattr(rest, "is_description"))
+        return world.of(*rest.effects, rival)
+
+    monkeypatch.setattr(stage, "described", lambda study, rest: SimpleNamespace(effects=rest.effects, is_description=True))
+    monkeypatch.setattr(stage, "with_effect_added", added)
     world.context.objective.bends, table = True, (row("friction", apart=0.4),)
     monkeypatch.setattr(stage, "converged", lambda study, w: SimpleNamespace(**vars(w) | {"score": w.score + 280.0}))
     world.of = _as_good(world, "friction", 300.0)  # type: ignore[method-assign]
@@ -186,6 +194,7 @@ def test_of_motion_the_rival_is_fitted_whatever_the_design_tells(monkeypatch: py
     world.context.budget = Budget(-1.0)
     assert world.gated("friction", table=table).best.effects == ("friction",)
     assert world.context.budget.untried == ["rival"]
+    assert starts == [True, True]
 
 
 @pytest.mark.parametrize(
